@@ -151,8 +151,9 @@ def sizes() -> None:
     )
     back = len(pickle.dumps(worker_tasks.ChunkAnswers(answers(grasps))))
     print(
-        f"a chunk of {ChunkSettings.max_grasps} grasps: {there} bytes there ({empty} without grasps), {back} bytes"
-        f" back; {there / ChunkSettings.max_grasps:.0f} and {back / ChunkSettings.max_grasps:.0f} a grasp",
+        f"a chunk of {ChunkSettings.max_grasps} grasps: {there} bytes there"
+        f" ({empty} without grasps), {back} bytes back;"
+        f" {there / ChunkSettings.max_grasps:.0f} and {back / ChunkSettings.max_grasps:.0f} a grasp",
         flush=True,
     )
 

@@ -27,12 +27,12 @@ from burg_drake.evaluation import (
     Campaign,
     Candidates,
     EvaluationSettings,
-    Ledger,
     PartWriter,
-    Request,
+    RunRequest,
     SceneState,
+    SceneStates,
     Shard,
-    _campaign_document,
+    campaign_document,
     create_run,
     encode_verdict,
     load_campaign,
@@ -87,13 +87,13 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
     """Writes a run, or the share of it that a shard has."""
     station = load_station("panda_tabletop")
     settings = EvaluationSettings(mode="reach", grasps_per_object=grasps // 6, shard=shard)
-    request = Request.of(station, settings)
+    request = RunRequest.of(station, settings)
     loaded = scenes_of(scenes)
     found = read_scenes(loaded)
     folder.mkdir(parents=True)
-    campaign = save_campaign(Campaign(folder, _campaign_document(found, request)))
+    campaign = save_campaign(Campaign(folder, campaign_document(found, request)))
     by_name = dict(zip((entry.name for entry in found.entries), loaded, strict=True))
-    ledger = Ledger(folder)
+    ledger = SceneStates(folder)
     writer = PartWriter(folder, campaign.places, campaign.document.instances)
     for name in campaign.names:
         rng = np.random.default_rng(int(name[-5:]))

@@ -174,11 +174,14 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place, for the work beside judging too."""
-    from burg_drake.evaluation import JudgePool, scene_tasks
+    from burg_drake.evaluation import JudgePool, SceneProcesses
+    from tests.evaluation.scenes_here import ScenesHere
 
-    preparers = scene_tasks.preparer_count
+    def scenes(preparer: Any, outputs: Any, workers: int) -> Any:
+        return (ScenesHere if workers == 1 else SceneProcesses)(preparer, outputs, workers)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scene_tasks, "preparer_count", lambda n: 0 if n == 1 else preparers(n))
+        patch.setattr("burg_drake.evaluation.many_scenes.SceneProcesses", scenes)
         patch.setattr("burg_drake.evaluation.executor.JudgePool", _pool_or_this_process(JudgePool))
         yield
 

@@ -14,6 +14,7 @@ from burg_drake.apps import main
 from burg_drake.evaluation import LocalExecutor
 from burg_drake.system_libraries import missing_render_libraries
 from tests.evaluation.inline_executor import Inline
+from tests.evaluation.scenes_here import ScenesHere
 from tests.pages import PAGES, ROOT, blocks
 
 SMALL = """\
@@ -35,7 +36,7 @@ def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(SMALL)
     monkeypatch.setattr(LocalExecutor, "judge", lambda self, *jobs: Inline().judge(*jobs))
-    monkeypatch.setattr("burg_drake.evaluation.scene_tasks.preparer_count", lambda workers: 0)
+    monkeypatch.setattr("burg_drake.evaluation.many_scenes.SceneProcesses", ScenesHere)
     names: dict[str, Any] = {}
     for block in blocks(page):
         if not block.runs:

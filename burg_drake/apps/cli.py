@@ -220,7 +220,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             from burg_drake.apps.commands.completion import complete_line
 
             complete_line(build_parser())
-        _escape_unprintable_output()
+        if isinstance(sys.stdout, io.TextIOWrapper):  # not every terminal knows all characters
+            sys.stdout.reconfigure(errors="backslashreplace")
     # pyarrow's own allocator gives memory back again and again, which costs more than the reading
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     arguments = build_parser().parse_args(argv)
@@ -232,20 +233,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _print_error(
             "interrupted" + getattr(arguments, "after_interrupt", ""), interrupted_code
         )
-    except BurgError as error:
-        if os.environ.get(DEBUG_VARIABLE):
+    except (BurgError, MemoryError, ImportError) as error:
+        message = _describe_error(error, arguments)
+        if os.environ.get(DEBUG_VARIABLE) or message is None:
             raise
-        return _print_error(f"error: {error}{_option_names(error, arguments)}", input_error_code)
-    except MemoryError as error:
-        if os.environ.get(DEBUG_VARIABLE):
-            raise
-        return _print_error(
-            f"error: there is not enough memory for this input. {error}", input_error_code
-        )
-    except ImportError as error:
-        if os.environ.get(DEBUG_VARIABLE) or "cannot open shared object file" not in str(error):
-            raise
-        return _print_error(f"error: {_describe_missing_library(error)}", input_error_code)
+        return _print_error(f"error: {message}", input_error_code)
     except BrokenPipeError:
         if not _drop_unread_output():
             raise
@@ -270,11 +262,22 @@ def _run_command(arguments: argparse.Namespace) -> int:
         raise
 
 
-def _option_names(error: BurgError, arguments: argparse.Namespace) -> str:
-    """The verb's options of the arguments that an error is about, in brackets."""
-    names = (OPTION_DESTINATIONS.get(name, (name,)) for name in error.arguments)
-    flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
-    return f" ({', '.join(flags)})" if flags else ""
+def _describe_error(
+    error: BurgError | MemoryError | ImportError, arguments: argparse.Namespace
+) -> str | None:
+    """What a user can do something about, with the options that an error is about; else None."""
+    if isinstance(error, BurgError):
+        names = (OPTION_DESTINATIONS.get(name, (name,)) for name in error.arguments)
+        flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
+        return f"{error} ({', '.join(flags)})" if flags else str(error)
+    if isinstance(error, MemoryError):
+        return f"there is not enough memory for this input. {error}"
+    if "cannot open shared object file" not in str(error):
+        return None
+    from burg_drake.system_libraries import describe_missing, missing_render_libraries
+
+    missing = missing_render_libraries()
+    return describe_missing(missing) if missing else str(error)
 
 
 def _print_error(message: str, code: int) -> int:
@@ -305,20 +308,6 @@ def _drop_unread_output() -> bool:
         return False
     os.dup2(os.open(os.devnull, os.O_WRONLY), output)
     return True
-
-
-def _escape_unprintable_output() -> None:
-    """Names of files need not be text, and not every terminal knows all characters."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
-
-
-def _describe_missing_library(error: ImportError) -> str:
-    """What to do about a system library that a package could not load."""
-    from burg_drake.system_libraries import describe_missing, missing_render_libraries
-
-    missing = missing_render_libraries()
-    return describe_missing(missing) if missing else str(error)
 
 
 if __name__ == "__main__":

@@ -167,7 +167,7 @@ class LabServer(PageServer):
         pictures: of the trials.
         camera: over the board, if there is one.
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        port: to listen on; the first free one from `first_port` on if None, any if 0.
         secret: of the cookie of browsers on other machines, for one that outlives the process; a
             new one if None.
 

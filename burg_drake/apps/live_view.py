@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import threading
 from dataclasses import asdict
 from http import HTTPStatus
@@ -12,6 +11,7 @@ from typing import Any
 from burg_drake.apps.commands.camera_placement import extra_object_line
 from burg_drake.apps.options.arguments import MAX_PAGE_CONNECTIONS
 from burg_drake.apps.page_server import PageHandler, PageServer, parse_address, parse_picture_number
+from burg_drake.apps.terminal import print_remark
 from burg_drake.cameras import (
     LiveSession,
     OverlayStyle,
@@ -50,10 +50,7 @@ def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> d
         },
         "frames": live.counts.frames,
         "settings": asdict(live.settings),
-        "tolerance": {
-            "mm": 1e3 * style.tolerance,
-            "deg": math.degrees(style.angle_tolerance),
-        },
+        "tolerance": {"mm": 1e3 * style.tolerance, "deg": math.degrees(style.angle_tolerance)},
         "picture": None if live.picture is None else _picture_status(live, live.picture),
         "recording": recording
         and {
@@ -145,7 +142,7 @@ class ViewServer(PageServer):
         live: the session.
         actions: on it.
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        port: to listen on; the first free one from `first_port` on if None, any if 0.
         connections: that are served at a time.
 
     Raises:
@@ -295,7 +292,7 @@ def placement_exit_code(live: LiveSession) -> int:
     if live.counts.valid:
         return 0
     reason = live.counts.reason or live.reader.fault or "no image arrived"
-    print(f"burg-drake: no frame gave a pose: {reason}", file=sys.stderr)
+    print_remark(f"no frame gave a pose: {reason}")
     return 1
 
 

@@ -94,12 +94,9 @@ MAX_REFUSALS = 8
 without an answer."""
 
 
-class ConnectionTimeouts:
-    """Connection timeouts."""
-
-    idle = 30.0  # Seconds between requests, and for a client to receive an answer.
-    request = 10.0  # Seconds for a request's head and body, and for the first request to begin.
-    refusal = 2.0  # Seconds for the request of a surplus connection.
+IDLE_TIMEOUT = 30.0  # Seconds between requests, and for a client to receive an answer.
+REQUEST_TIMEOUT = 10.0  # Seconds for a request's head and body, and for the first request to begin.
+REFUSAL_TIMEOUT = 2.0  # Seconds for the request of a surplus connection.
 
 
 Handler = Callable[[Any], None]
@@ -313,7 +310,7 @@ class PageHandler(BaseHTTPRequestHandler):
     """
 
     protocol_version = "HTTP/1.1"
-    timeout = ConnectionTimeouts.idle
+    timeout = IDLE_TIMEOUT
     server: PageServer
     folder: str
     pages: Mapping[str, tuple[str, str]]
@@ -331,7 +328,7 @@ class PageHandler(BaseHTTPRequestHandler):
     def handle_one_request(self) -> None:
         """Waits for a request, and answers it."""
         if self.server.is_admitted(self.connection):
-            self._stream.expect_within(ConnectionTimeouts.idle)
+            self._stream.expect_within(IDLE_TIMEOUT)
             try:
                 self._received.peek(1)
             except TimeoutError:
@@ -343,11 +340,7 @@ class PageHandler(BaseHTTPRequestHandler):
     @property
     def _request_timeout(self) -> float:
         """Time for a request [s]."""
-        return (
-            ConnectionTimeouts.refusal
-            if self.server.refuses(self.connection)
-            else ConnectionTimeouts.request
-        )
+        return REFUSAL_TIMEOUT if self.server.refuses(self.connection) else REQUEST_TIMEOUT
 
     def admitted(self) -> tuple[str, dict[str, str]]:
         """Path and query of a request.

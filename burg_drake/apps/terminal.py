@@ -10,14 +10,30 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
     from rich.text import Text
 
     from burg_drake.visualization import ColorBar, GraspPicker, LegendEntry
+
+
+def print_remark(text: str) -> None:
+    """Prints a line about the work of a command to standard error."""
+    print(f"burg-drake: {text}", file=sys.stderr, flush=True)
+
+
+def print_warning(text: str) -> None:
+    """Prints a warning to standard error."""
+    print_remark(f"warning: {text}")
+
+
+def print_note_lines(notes: Iterable[str]) -> None:
+    """Prints notes on the results, a line each."""
+    for note in notes:
+        print(f"note: {note}")
 
 
 def wait_for_interrupt() -> NoReturn:
@@ -34,30 +50,27 @@ def wait_for_interrupt() -> NoReturn:
         time.sleep(poll_interval)
 
 
-@contextlib.contextmanager
-def sigterm_as_interrupt() -> Iterator[None]:
+def sigterm_as_interrupt() -> contextlib.AbstractContextManager[None]:
     """SIGTERM ends as Ctrl-C does, so that what is open is finished."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    return _handle_signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def ignore_interrupts() -> contextlib.AbstractContextManager[None]:
+    """Ignores Ctrl-C while the last results are written: an interrupt would lose them."""
+    return _handle_signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextlib.contextmanager
-def ignore_interrupts() -> Iterator[None]:
-    """Ignores Ctrl-C while the last results are written: an interrupt would lose them."""
+def _handle_signal(number: signal.Signals, handler: Any) -> Iterator[None]:
+    """Handles a signal in another way, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before)
 
 
 def print_legend(legend: Sequence[LegendEntry | ColorBar]) -> None:
@@ -194,4 +207,4 @@ def open_in_browser(url: str) -> None:
     import webbrowser
 
     if not webbrowser.open(url):
-        print("burg-drake: no browser was found to open it in", file=sys.stderr)
+        print_remark("no browser was found to open it in")

@@ -1,7 +1,8 @@
-"""Images in, poses and pictures out: calibration, the board's pose, the overlay, how objects stand.
+"""Camera images in, poses and pictures out: calibration, board pose, overlay, placement check.
 
-A camera is described by `optics` and read by `sources`; `pose` finds the board in an image, and
-`projection`, `overlay` and `placement` build on that. `systems` and `live` put it all together.
+`intrinsics` describes a camera, `frame_source` and `source_opening` read its images, and `pose`
+finds the board in them. `scene_projection`, `overlay` and `placement` build on that. The modules
+`*_systems` and `live_session` put it all together.
 """
 
 import lazy_loader

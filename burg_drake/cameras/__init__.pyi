@@ -27,7 +27,6 @@ from .calibration.lens_uncertainty import (
     corner_coverage as corner_coverage,
     image_grid as image_grid,
     image_part_indices as image_part_indices,
-    pixel_uncertainty as pixel_uncertainty,
 )
 from .calibration.target_sheet import target_origin as target_origin, write_target as write_target
 from .calibration.view_guidance import (
@@ -145,8 +144,8 @@ from .placement.object_shape import (
 from .placement.photo_edges import StepLines as StepLines, fit_steps as fit_steps
 from .placement.pinhole_view import (
     ImageContour as ImageContour,
+    ImageWindow as ImageWindow,
     PinholeView as PinholeView,
-    Window as Window,
     visible_outline as visible_outline,
     window_around as window_around,
 )

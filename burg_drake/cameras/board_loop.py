@@ -128,7 +128,7 @@ def build_board_loop(
         scene: what stands on the board, and is drawn over the image at its place.
         station: has the camera.
         camera: its name, or also how it takes images.
-        robot, engine, meshcat: see `station.diagram.build_station_diagram`.
+        robot, engine, meshcat: see `build_station_diagram`.
         style: of the overlay, if not the default.
         filter: between estimate and overlay; the overlay gets the estimate itself if not given.
 

@@ -53,7 +53,7 @@ def noisy_depth(
     _check_image_shape("normals", normals, depth.shape, np.floating)
     _check_image_shape("color", color, depth.shape, np.uint8)
     angle = incidence_angle(depth, intrinsics, normals) if noise.uses_angles else None
-    lost = _missing_pixels(depth, angle, noise, intrinsics, rng, color)
+    lost = _missing_pixels(depth, angle, noise, intrinsics.focal[0], rng, color)
     measured = _add_depth_errors(depth, angle, noise, intrinsics.focal[0], rng)
     measured[lost] = 0.0
     return measured
@@ -79,7 +79,9 @@ def _add_depth_errors(
     if noise.disparity_sigma or noise.disparity_step:
         measured = add_disparity_noise(measured, focal, noise, rng)
     if noise.depth_step:
-        measured = quantize_depth(measured, noise)
+        # In whole multiples, as cameras write it.
+        step = np.float32(noise.depth_step)
+        measured = np.asarray(step * np.rint(measured / step))
     return measured
 
 
@@ -87,7 +89,7 @@ def _missing_pixels(
     depth: Single,
     angle: Single | None,
     noise: DepthNoise,
-    intrinsics: Intrinsics,
+    focal: float,
     rng: np.random.Generator,
     color: Bytes | None,
 ) -> Booleans:
@@ -99,10 +101,8 @@ def _missing_pixels(
         kept *= 1.0 - dark_probability(color, noise)
     lost = random_holes(np.float32(1.0) - kept, noise.hole_size, rng)
     if noise.second_view != "none":
-        same_view = noise.second_view == "same"
-        lost |= hidden_from_second_imager(
-            depth, intrinsics.focal[0], noise.baseline, same_view=same_view
-        )
+        same = noise.second_view == "same"
+        lost |= hidden_from_second_imager(depth, focal, noise.baseline, same_view=same)
     return lost
 
 
@@ -237,14 +237,13 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
         angle: (H, W) of incidence [rad]; None if `axial_angle` is 0.
         noise: has a, b, c and d as `axial_base`, `axial_square`, `axial_center`, `axial_angle`.
     """
-    # Radians. Noise does not depend on smaller angles (Nguyen et al. 2012).
-    min_steep_angle = math.radians(60.0)
     sigma: Single = np.float32(noise.axial_square) * np.square(
         depth - np.float32(noise.axial_center)
     )
     sigma += np.float32(noise.axial_base)
     if noise.axial_angle and angle is not None:
-        steep = (angle > min_steep_angle) & (depth > 0.0)
+        # Radians. Noise does not depend on smaller angles (Nguyen et al. 2012).
+        steep = (angle > math.radians(60.0)) & (depth > 0.0)
         t = np.minimum(angle[steep], np.float32(MAX_NOISE_ANGLE))
         growth = np.square(t / (np.float32(np.pi / 2) - t))
         sigma[steep] += np.float32(noise.axial_angle) * growth / np.sqrt(depth[steep])
@@ -292,12 +291,6 @@ def add_disparity_noise(
     return _drop_invalid(np.asarray(scale / disparity), depth)
 
 
-def quantize_depth(depth: Single, noise: DepthNoise) -> Single:
-    """Depth in whole multiples of `depth_step`, as cameras write it; 0 below half of one."""
-    step = np.float32(noise.depth_step)
-    return np.asarray(step * np.rint(depth / step))
-
-
 def _drop_invalid(moved: Single, depth: Single) -> Single:
     """Nothing where nothing was, or where an error leads to the camera and beyond."""
     return np.where((depth > 0.0) & (moved > 0.0), moved, np.float32(0.0))
@@ -339,9 +332,9 @@ def add_lateral_noise(
         noise: see `lateral_sigma`.
         rng: of the steps.
     """
-    max_sigmas = 3.0  # Standard deviations of lateral noise that are sampled.
     largest = float(lateral_sigma(np.array(MAX_NOISE_ANGLE if angle is not None else 0.0), noise))
-    size = 2 * int(np.ceil(max_sigmas * largest)) + 1
+    # Standard deviations of lateral noise that are sampled.
+    size = 2 * int(np.ceil(3.0 * largest)) + 1
     near = cv2.dilate(edges.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     rows, columns = np.divmod(np.flatnonzero(near & (depth > 0.0)), depth.shape[1])
     sigma = lateral_sigma(np.zeros(len(rows)) if angle is None else angle[rows, columns], noise)
@@ -402,8 +395,6 @@ def hidden_from_second_imager(
     Returns:
         (H, W); False where nothing is.
     """
-    # Pixels. A surface occludes another one if its disparity is larger by this.
-    min_disparity_step = 0.5
     if baseline < 0.0:
         turned = hidden_from_second_imager(depth[:, ::-1], focal, -baseline, same_view=same_view)
         return turned[:, ::-1]
@@ -414,10 +405,8 @@ def hidden_from_second_imager(
     overtaken = np.flatnonzero(_overtaken_pixels(there, disparity) & seen)
     if len(overtaken):
         nearest, pixels = _second_view_disparity(there, disparity)
-        before = (
-            nearest.ravel()[pixels.ravel()[overtaken]]
-            > disparity.ravel()[overtaken] + min_disparity_step
-        )
+        # Pixels. A surface occludes another one if its disparity is larger by this.
+        before = nearest.ravel()[pixels.ravel()[overtaken]] > disparity.ravel()[overtaken] + 0.5
         hidden.ravel()[overtaken[before]] = True
     if same_view:
         hidden |= seen & (there < -0.5)

@@ -175,19 +175,15 @@ _D400_DATA_SHEET = (
     " ideal range); a device's own calibration as librealsense tells it"
 )
 """Source of the RealSense presets."""
+_D400_SIZES = ((640, 480), (848, 480), (1280, 720))
+"""Sizes of the depth images of RealSense cameras, the usual one first."""
 
 D435 = Sensor(
     name="d435",
     color=_scaled_images(
         "d435 color", (1280, 720), (920.7, 920.8), (635.6, 373.1), ((640, 480), (1280, 720))
     ),
-    depth=_scaled_images(
-        "d435 depth",
-        (1280, 800),
-        (637.6, 637.6),
-        (638.3, 410.5),
-        ((640, 480), (848, 480), (1280, 720)),
-    ),
+    depth=_scaled_images("d435 depth", (1280, 800), (637.6, 637.6), (638.3, 410.5), _D400_SIZES),
     depth_range=(0.3, 3.0),
     baseline=0.050,
     source=f"{_D400_DATA_SHEET}; no distortion is told",
@@ -204,17 +200,11 @@ D455 = Sensor(
         ((640, 480), (1280, 720)),
         _distortion(k=(-0.056522, 0.068801, -0.022386), p=(-0.000717, -0.000025)),
     ),
-    depth=_scaled_images(
-        "d455 depth",
-        (1280, 800),
-        (641.5, 641.5),
-        (640.4, 403.8),
-        ((640, 480), (848, 480), (1280, 720)),
-    ),
+    depth=_scaled_images("d455 depth", (1280, 800), (641.5, 641.5), (640.4, 403.8), _D400_SIZES),
     depth_range=(0.6, 6.0),
     baseline=0.095,
-    source=f"{_D400_DATA_SHEET}. It calls the distortion inverse; users found that OpenCV's model, as here, is"
-    " meant",
+    source=f"{_D400_DATA_SHEET}. It calls the distortion inverse; users found that OpenCV's model,"
+    " as here, is meant",
 )
 """Intel RealSense D455, whose depth is that of its left imager."""
 

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.frame_source import Frame
 from burg_drake.cameras.intrinsics import Intrinsics
@@ -19,7 +18,7 @@ from burg_drake.cameras.overlay import Overlay, OverlayStyle
 from burg_drake.cameras.placement.document import PlacementCheck
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.cameras.pose.board_pose import BoardPose
-from burg_drake.core import Array, InvalidInputError, UnknownNameError, suggest_names
+from burg_drake.core import Array, Bytes, InvalidInputError, UnknownNameError, suggest_names
 from burg_drake.scene import Board, Scene, SceneLike, as_scene
 
 if TYPE_CHECKING:
@@ -129,7 +128,7 @@ class FrameProcessor:
 
     def draw(
         self, located: LocatedFrame, settings: ViewSettings, placement: PlacementCheck | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Bytes:
         """The frame with the scene drawn over it, or with a line that says why not.
 
         Returns:
@@ -167,14 +166,13 @@ def placement_order(scene: Scene) -> tuple[str, ...]:
     the far edge of the board, which reads upright, to the near one, so that nothing that stands
     already is in the way. What is fixed comes first."""
 
-    level_height = 0.01  # Metres. Objects whose undersides differ by less are on one level.
-
     def key(name: str) -> tuple[bool, int, float]:
         X_SO, entry = scene.X_SO(name), scene.entry(name)
         corners = np.stack(np.meshgrid(*zip(entry.lower, entry.upper, strict=True)), axis=-1)
         p_SQ = corners.reshape(-1, 3) @ X_SO[:3, :3].T + X_SO[:3, 3]
         middle = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2
-        return name in scene.instances, round(p_SQ[:, 2].min() / level_height), -float(middle[1])
+        # Metres. Objects whose undersides differ by less are on one level.
+        return name in scene.instances, round(p_SQ[:, 2].min() / 0.01), -float(middle[1])
 
     return tuple(sorted((*scene.background, *scene.instances), key=key))
 

@@ -5,14 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import TracebackType
 
-import numpy as np
-from numpy.typing import NDArray
+from burg_drake.core import Array, BurgError, Bytes
 
-from burg_drake.core import Array, BurgError
-
-Image = NDArray[np.uint8]
+Image = Bytes
 
 
 class CameraLost(BurgError):
@@ -84,10 +80,5 @@ class FrameSource(ABC):
     def __enter__(self) -> FrameSource:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()

@@ -20,6 +20,7 @@ from burg_drake.core import (
     READ_ERRORS,
     FileLimits,
     InvalidInputError,
+    Single,
     atomic_write,
     open_npy,
     read_bytes,
@@ -30,11 +31,10 @@ from burg_drake.station import MAX_IMAGE_SIDE
 @contextlib.contextmanager
 def silence_opencv() -> Iterator[None]:
     """Keeps OpenCV and FFmpeg from writing to the terminal what becomes an error of ours."""
-    silent = 0  # LOG_LEVEL_SILENT, which OpenCV 4 does not export to Python.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when FFmpeg is first used
     log = getattr(cv2.utils, "logging", cv2)  # OpenCV 5; in OpenCV 4 they are in cv2 itself
     level = log.getLogLevel()
-    log.setLogLevel(silent)
+    log.setLogLevel(0)  # LOG_LEVEL_SILENT, which OpenCV 4 does not export to Python.
     try:
         yield
     finally:
@@ -165,7 +165,7 @@ def write_image(path: str | Path, image: Image) -> None:
     atomic_write(path, data.tobytes())
 
 
-def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float32]:
+def read_depth(path: str | Path, unit: float | None = None) -> Single:
     """Reads a depth image.
 
     Args:
@@ -178,27 +178,25 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
     Raises:
         InvalidInputError: no such file, or not a depth image.
     """
-    millimetre = 1e-3  # Metres.
     path = Path(path)
     if not path.exists():
         raise InvalidInputError(f"depth image {path} does not exist")
-    depth = _read_array(path) if path.suffix.lower() == ".npy" else _read_depth_image(path)
+    if path.suffix.lower() == ".npy":
+        with open_npy(path) as stored:
+            depth = stored.read("fiu")
+    else:
+        depth = _read_depth_image(path)
     if depth.ndim != 2 or depth.dtype.kind not in "fui" or depth.dtype == np.uint8:
         raise InvalidInputError(
             f"{path} has shape {depth.shape} and type {depth.dtype}; a depth image is (H, W), in"
             " millimetres as 16-bit integers or in metres as floats"
         )
     if unit is None:
-        unit = 1.0 if depth.dtype.kind == "f" else millimetre
-    metres: NDArray[np.float32] = np.nan_to_num(
+        unit = 1.0 if depth.dtype.kind == "f" else 1e-3  # Metres.
+    metres: Single = np.nan_to_num(
         depth.astype(np.float32) * np.float32(unit), posinf=0.0, neginf=0.0
     )
     return metres
-
-
-def _read_array(path: Path) -> NDArray[Any]:
-    with open_npy(path) as stored:
-        return stored.read("fiu")
 
 
 def _read_depth_image(path: Path) -> NDArray[Any]:

@@ -6,10 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, InputPort, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from burg_drake.cameras.depth_camera_noise import noisy_depth
@@ -19,6 +18,7 @@ from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.overlay import Overlay, OverlayStyle
 from burg_drake.cameras.placement.document import PlacementCheck
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
+from burg_drake.cameras.pose_systems import evaluate_optional
 from burg_drake.core import MAX_DOCUMENT_SEED, Bytes, InvalidInputError, rng_from
 from burg_drake.scene import SceneLike, as_scene
 
@@ -47,13 +47,12 @@ class CameraSource(LeafSystem):
     """
 
     def __init__(self, source: FrameSource, fps: float | None = None) -> None:
-        default_fps = 30.0  # Frames per second of sources that do not state them.
         super().__init__()
         first = _next_frame(source)
         if first is None:
             raise InvalidInputError(f"{source.name} has no frames")
         self._source = source
-        color = self.DeclareAbstractState(Value(color_image(first)))
+        color = self.DeclareAbstractState(Value(rgba_image(first.image)))
         self.DeclareStateOutputPort("color_image", color)
         self._depth = None
         if first.depth is not None:
@@ -70,7 +69,8 @@ class CameraSource(LeafSystem):
                 ),
                 {self.discrete_state_ticket(numbers)},
             )
-        period = 1.0 / (fps or source.fps or default_fps)
+        # Frames per second of sources that do not state them.
+        period = 1.0 / (fps or source.fps or 30.0)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, period, self._update)
 
     def _update(self, context: Any, state: Any) -> None:
@@ -83,7 +83,7 @@ class CameraSource(LeafSystem):
             numbers.SetAtIndex(0, 0.0)
             return
         numbers.SetFromVector([1.0, frame.time])
-        state.get_mutable_abstract_state(self._color).set_value(color_image(frame))
+        state.get_mutable_abstract_state(self._color).set_value(rgba_image(frame.image))
         if self._depth is not None and frame.depth is not None:
             state.get_mutable_abstract_state(self._depth).set_value(_depth_image(frame))
 
@@ -97,11 +97,10 @@ def _next_frame(source: FrameSource) -> Frame | None:
             continue
 
 
-def color_image(frame: Frame) -> ImageRgba8U:
-    """A frame's image as Drake has them."""
-    height, width = frame.image.shape[:2]
-    image = ImageRgba8U(width, height)
-    image.mutable_data[..., :3] = frame.image
+def rgba_image(pixels: Bytes) -> ImageRgba8U:
+    """Opaque image of pixels (H, W, 3) as Drake has them."""
+    image = ImageRgba8U(pixels.shape[1], pixels.shape[0])
+    image.mutable_data[..., :3] = pixels
     image.mutable_data[..., 3] = 255
     return image
 
@@ -179,33 +178,26 @@ class DepthNoiseSystem(LeafSystem):
                 f"{self.get_name()}: input port depth_image has no value; connect or fix it"
             )
         perfect = self._depth.Eval(context).data[..., 0]
+        color = None
+        if self.noise.dark_probability:  # else it makes no difference, and may have to be rendered
+            color = evaluate_optional(self._color, context)
         measured = noisy_depth(
             np.where(np.isfinite(perfect), perfect, np.float32(0.0)),
             self.noise,
             self.intrinsics,
             rng_from("depth noise", self._seed, self._moment(context)),
-            normals=self._optional(context, self._normals),
-            color=self._dark(context),
+            normals=evaluate_optional(self._normals, context),
+            color=None if color is None else color.data[..., :3],
         )
         result = ImageDepth32F(self.intrinsics.width, self.intrinsics.height)
         result.mutable_data[..., 0] = np.where(measured > 0.0, measured, np.float32(np.inf))
         output.set_value(result)
 
-    def _dark(self, context: Context) -> Bytes | None:
-        """The colour image, if it makes a difference: it may have to be rendered first."""
-        image = self._optional(context, self._color) if self.noise.dark_probability else None
-        return None if image is None else image.data[..., :3]
-
     def _moment(self, context: Context) -> float | int:
         """What the noise is drawn for: the number of the image, or the time [s]."""
-        rounding_tolerance = 1e-6  # Periods before an image at which a time belongs to it.
         time = float(context.get_time())
-        return (
-            time if self._period is None else math.floor(time / self._period + rounding_tolerance)
-        )
-
-    def _optional(self, context: Context, port: InputPort) -> Any:
-        return port.Eval(context) if port.HasValue(context) else None
+        # Periods before an image at which a time belongs to it.
+        return time if self._period is None else math.floor(time / self._period + 1e-6)
 
 
 class SceneOverlay(LeafSystem):
@@ -261,12 +253,11 @@ class SceneOverlay(LeafSystem):
         )
 
     def _draw(self, context: Context, output: AbstractValue) -> None:
-        no_pose = "no pose of the camera"  # Notice on the image if no reason is known.
         image = self._required(context, self._color_image).data
         size = self._overlay.intrinsics
         size.require_size(image.shape[1], image.shape[0], "the image at port color_image")
         colors = np.ascontiguousarray(image[..., :3])
-        estimate = self._optional(context, self._estimate)
+        estimate = evaluate_optional(self._estimate, context)
         valid = estimate is None or estimate.valid
         if self._valid.HasValue(context):
             valid = self._valid.Eval(context)[0] > 0.5
@@ -274,13 +265,12 @@ class SceneOverlay(LeafSystem):
             X_SC = self._required(context, self._X_SC).GetAsMatrix4()
             drawn = self._overlay.draw(colors, X_SC, placement=self._checked(context))
         else:
-            drawn = self._overlay.notice(colors, (estimate and estimate.reason) or no_pose)
-        result = ImageRgba8U(size.width, size.height)
-        result.mutable_data[:] = _add_opacity(drawn)
-        output.set_value(result)
+            reason = (estimate and estimate.reason) or "no pose of the camera"
+            drawn = self._overlay.notice(colors, reason)
+        output.set_value(rgba_image(drawn))
 
     def _checked(self, context: Context) -> PlacementCheck | None:
-        check = self._optional(context, self._placement)
+        check = evaluate_optional(self._placement, context)
         if check is None or isinstance(check, PlacementCheck):
             return check
         raise InvalidInputError(f"port placement takes a PlacementCheck, not {check!r}")
@@ -291,11 +281,3 @@ class SceneOverlay(LeafSystem):
                 f"{self.get_name()}: input port {port.get_name()} has no value; connect or fix it"
             )
         return port.Eval(context)
-
-    def _optional(self, context: Context, port: Any) -> Any:
-        return port.Eval(context) if port.HasValue(context) else None
-
-
-def _add_opacity(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(H, W, 4) with an opacity of 255."""
-    return np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=2)

@@ -12,10 +12,10 @@ from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
 from burg_drake.core import (
     Array,
+    Booleans,
     FieldError,
     InvalidInputError,
     Ranges,
@@ -71,7 +71,7 @@ class FisheyeLens:
         coefficients: k1, k2, k3, k4.
     """
 
-    coefficients: tuple[float, float, float, float]
+    coefficients: tuple[float, ...]
 
     @cached_property
     def _radius(self) -> Polynomial:
@@ -82,7 +82,7 @@ class FisheyeLens:
         return self._radius.deriv()
 
     @cached_property
-    def turn(self) -> float:
+    def max_angle(self) -> float:
         """Angle at which the polynomial leads back to the middle, or pi [rad]. Beyond, the image
         goes on at one focal length a radian, so that nothing from there is put into it."""
         roots = self._slope.roots()
@@ -91,27 +91,26 @@ class FisheyeLens:
 
     def radius(self, angle: Array) -> Array:
         """Distances from the middle, in focal lengths, of angles off the axis [rad]."""
-        within = np.minimum(angle, self.turn)
+        within = np.minimum(angle, self.max_angle)
         return np.asarray(self._radius(within) + (angle - within))
 
     def slope(self, angle: Array) -> Array:
         """Derivatives of `radius` by the angle."""
-        return np.where(angle < self.turn, self._slope(np.minimum(angle, self.turn)), 1.0)
+        return np.where(angle < self.max_angle, self._slope(np.minimum(angle, self.max_angle)), 1.0)
 
     def angle(self, radius: Array) -> Array:
         """Angles off the axis [rad] that are seen at distances from the middle; pi beyond."""
-        table_size = 512  # Start values of the inversion, which Newton's method refines.
-        newton_steps = 4  # Enough for rounding accuracy.
-        table = np.linspace(0.0, self.turn, table_size)
-        end = float(self._radius(self.turn))
+        # Start values of the inversion, which Newton's method refines.
+        table = np.linspace(0.0, self.max_angle, 512)
+        end = float(self._radius(self.max_angle))
         inner = np.minimum(radius, end)
         angle = np.interp(inner, self._radius(table), table)
-        for _ in range(newton_steps):
+        for _ in range(4):  # Enough for rounding accuracy.
             slope = np.maximum(self._slope(angle), 1e-6)
-            angle = np.clip(angle - (self._radius(angle) - inner) / slope, 0.0, self.turn)
+            angle = np.clip(angle - (self._radius(angle) - inner) / slope, 0.0, self.max_angle)
         return np.minimum(angle + (radius - inner), np.pi)
 
-    def bent(self, p_CQ: Array) -> Array:
+    def project(self, p_CQ: Array) -> Array:
         """(..., 2) where points (..., 3) in the camera's frame are seen, in focal lengths."""
         aside = np.linalg.norm(p_CQ[..., :2], axis=-1)
         radius = self.radius(np.arctan2(aside, p_CQ[..., 2]))
@@ -127,13 +126,12 @@ class FisheyeLens:
         aside = np.sin(angle) / np.maximum(radius, 1e-300)
         return np.concatenate([bent * aside[..., None], np.cos(angle)[..., None]], axis=-1)
 
-    def straightened(self, bent: Array) -> Array:
+    def undistort(self, bent: Array) -> Array:
         """(..., 2) the same as by a lens without distortion; what is further off the axis than
-        `WIDEST`, there."""
-        # Radians. An undistorted image ends there, at 19 focal lengths.
-        max_angle = np.radians(87.0)
+        87 degrees, there."""
         radius = np.linalg.norm(bent, axis=-1)
-        straight = np.tan(np.minimum(self.angle(radius), max_angle))
+        # Radians. An undistorted image ends there, at 19 focal lengths.
+        straight = np.tan(np.minimum(self.angle(radius), np.radians(87.0)))
         scale = np.where(radius > 0.0, straight / np.maximum(radius, 1e-300), 1.0)
         return np.asarray(bent * scale[..., None])
 
@@ -141,8 +139,7 @@ class FisheyeLens:
 @lru_cache(maxsize=16)
 def fisheye_lens(coefficients: tuple[float, ...]) -> FisheyeLens:
     """The lens with four coefficients."""
-    k1, k2, k3, k4 = coefficients
-    return FisheyeLens((k1, k2, k3, k4))
+    return FisheyeLens(coefficients)
 
 
 LensModel = Literal["perspective", "fisheye"]
@@ -288,7 +285,7 @@ class Intrinsics:
 
         p = np.asarray(p_CQ, dtype=float)
         if self.is_fisheye:
-            bent: Array = fisheye_lens(self.distortion).bent(p) * self.focal + self.center
+            bent: Array = fisheye_lens(self.distortion).project(p) * self.focal + self.center
             return bent
         if self.is_pinhole or not p.size:
             straight: Array = p[..., :2] / p[..., 2:] * self.focal + self.center
@@ -309,7 +306,7 @@ class Intrinsics:
         if self.is_pinhole:
             return q.copy()
         if self.is_fisheye:
-            flat: Array = fisheye_lens(self.distortion).straightened((q - self.center) / self.focal)
+            flat: Array = fisheye_lens(self.distortion).undistort((q - self.center) / self.focal)
             return flat * self.focal + self.center
         # 40 rounds: OpenCV's 5 leave some hundredths of a pixel in the corners of a wide lens.
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
@@ -321,9 +318,8 @@ class Intrinsics:
     def rays(self, pixels: Array) -> Array:
         """(..., 3) unit vectors in the camera's frame along which pixels (..., 2) look."""
         if self.is_fisheye:
-            return fisheye_lens(self.distortion).rays(
-                (np.asarray(pixels, dtype=float) - self.center) / self.focal
-            )
+            bent = (np.asarray(pixels, dtype=float) - self.center) / self.focal
+            return fisheye_lens(self.distortion).rays(bent)
         flat = (self.undistort(pixels) - self.center) / self.focal
         rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
         unit: Array = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -401,13 +397,12 @@ class FieldOfView:
         """Least and largest x / z and y / z that are in view, with the margin."""
         # Fraction of the image beyond its edge; lens models fold farther points back.
         margin = 0.05
-        border = np.concatenate(
-            [self.directions[[0, -1]].reshape(-1, 3), self.directions[:, [0, -1]].reshape(-1, 3)]
-        )[:, :2]
+        edges = self.directions[[0, -1]], self.directions[:, [0, -1]]
+        border = np.concatenate([edge.reshape(-1, 3) for edge in edges])[:, :2]
         lower, upper = border.min(axis=0), border.max(axis=0)
         return lower - margin * (upper - lower), upper + margin * (upper - lower)
 
-    def sees(self, p_CQ: Array) -> NDArray[np.bool_]:
+    def sees(self, p_CQ: Array) -> Booleans:
         """(...) whether points (..., 3) lie before the camera and in its field of view, or barely
         outside; only such may be projected."""
         lower, upper = self._field

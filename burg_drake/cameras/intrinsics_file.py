@@ -12,7 +12,6 @@ import yaml
 from burg_drake.cameras.intrinsics import (
     FISHEYE_COEFFICIENTS,
     Intrinsics,
-    LensModel,
     camera_intrinsics,
 )
 from burg_drake.core import (
@@ -71,13 +70,6 @@ def find_simulated_camera(reference: str) -> tuple[Station, str]:
         )
     station.camera(camera)
     return station, camera
-
-
-def is_opencv(text: str) -> bool:
-    """Whether OpenCV wrote a file."""
-    # Texts that only OpenCV's files contain.
-    file_marks = ("%YAML:1.0", "!!opencv-matrix", "<opencv_storage>")
-    return any(mark in text for mark in file_marks)
 
 
 def read_opencv(text: str, name: str) -> Tree:
@@ -180,16 +172,14 @@ def load_intrinsics(path: str | Path) -> Intrinsics:
         return camera_intrinsics(station.camera(camera))
     text = read_text(path)
     name = str(path)
-    if is_opencv(text):
+    # Texts that only OpenCV's files contain.
+    if any(mark in text for mark in ("%YAML:1.0", "!!opencv-matrix", "<opencv_storage>")):
         return _intrinsics_from_opencv(read_opencv(text, name), name)
     data = parse_plain_yaml(
         text, name, empty="the document is empty; expected a camera's intrinsics"
     )
-    if (
-        isinstance(data, dict)
-        and "focal" not in data
-        and any(key in data for key in ROS_MATRIX_KEYS)
-    ):
+    is_ros = isinstance(data, dict) and any(key in data for key in ROS_MATRIX_KEYS)
+    if is_ros and "focal" not in data:
         return _intrinsics_from_ros(data, name)
     return parse_document(text, Intrinsics, name)
 
@@ -259,9 +249,9 @@ def _intrinsics_from_ros(data: Tree, name: str) -> Intrinsics:
     coefficients = _read_numbers(data, ROS_DISTORTION_KEYS, name)
     if model not in ROS_LENS_MODELS:
         raise InvalidInputError(
-            f"{name}: distortion_model {quote_value(model)} is not supported; supported are plumb_bob,"
-            f" rational_polynomial and {ROS_FISHEYE_MODEL} (fisheye): calibrate with `burg-drake camera"
-            " calibrate`"
+            f"{name}: distortion_model {quote_value(model)} is not supported; supported are"
+            f" plumb_bob, rational_polynomial and {ROS_FISHEYE_MODEL} (fisheye): calibrate with"
+            " `burg-drake camera calibrate`"
         )
     if any(coefficients) and len(coefficients) not in ROS_LENS_MODELS[model]:
         raise DocumentError(
@@ -269,14 +259,8 @@ def _intrinsics_from_ros(data: Tree, name: str) -> Intrinsics:
             f" {' or '.join(map(str, ROS_LENS_MODELS[model]))} are expected"
         )
     fisheye = is_ros_fisheye(model, coefficients)
-    return _build_intrinsics(
-        name,
-        camera=_read_text(data, "camera_name", name),
-        size=_read_size(data, name),
-        K=K,
-        model="fisheye" if fisheye else "perspective",
-        coefficients=coefficients if any(coefficients) or fisheye else [],
-    )
+    camera = _read_text(data, "camera_name", name)
+    return _build_intrinsics(data, name, K, coefficients, fisheye=fisheye, camera=camera)
 
 
 def is_ros_fisheye(model: str, coefficients: Sequence[float]) -> bool:
@@ -291,11 +275,9 @@ def _refuse_cropped_image(data: Tree, name: str) -> None:
     """A message tells K of the sensor's image, and which part of it the images are."""
     binning = [_read_integer(data, key, name) for key in ("binning_x", "binning_y") if key in data]
     roi = data.get("roi")
-    if isinstance(roi, dict):
-        keys = ("x_offset", "y_offset", "width", "height")
-        part = [_read_integer(roi, key, name) for key in keys if key in roi]
-    else:
-        part = []
+    roi = roi if isinstance(roi, dict) else {}
+    keys = ("x_offset", "y_offset", "width", "height")
+    part = [_read_integer(roi, key, name) for key in keys if key in roi]
     if any(n > 1 for n in binning) or any(part):
         raise InvalidInputError(
             f"{name}: binning or roi is set, so images show only a part of what the camera matrix"
@@ -374,37 +356,30 @@ def _intrinsics_from_opencv(data: Tree, name: str) -> Intrinsics:
     coefficients = _read_numbers(data, (key,), name) if key in data else []
     if not any(coefficients[5:]):
         coefficients = coefficients[:5]  # OpenCV pads to the longest model
-    return _build_intrinsics(
-        name,
-        camera="",
-        size=_read_size(data, name),
-        K=K,
-        model="fisheye" if is_fisheye else "perspective",
-        coefficients=coefficients if any(coefficients) or is_fisheye else [],
-        residual=rms,
-    )
+    return _build_intrinsics(data, name, K, coefficients, fisheye=is_fisheye, residual=rms)
 
 
 def _build_intrinsics(
+    data: Tree,
     name: str,
-    *,
-    camera: str,
-    size: tuple[int, int],
     K: list[float],
-    model: LensModel,
     coefficients: list[float],
+    *,
+    fisheye: bool,
+    camera: str = "",
     residual: float | None = None,
 ) -> Intrinsics:
     """Intrinsics from numbers of a file; what is wrong names the file."""
+    width, height = _read_size(data, name)
     try:
         return Intrinsics(
             camera=camera,
-            width=size[0],
-            height=size[1],
+            width=width,
+            height=height,
             focal=(K[0], K[4]),
             center=(K[2], K[5]),
-            model=model,
-            distortion=tuple(coefficients),
+            model="fisheye" if fisheye else "perspective",
+            distortion=tuple(coefficients) if any(coefficients) or fisheye else (),
             residual=residual,
         )
     except InvalidInputError as error:

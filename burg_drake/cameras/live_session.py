@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.frame_processing import (
     FrameProcessor,
@@ -25,7 +23,7 @@ from burg_drake.cameras.frame_processing import (
 )
 from burg_drake.cameras.frame_source import CameraLost, Frame, FrameSource
 from burg_drake.cameras.placement.document import PlacementCheck
-from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.core import BurgError, Bytes, InvalidInputError
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class EventLog:
             self._on_event(event)
 
     def after(self, number: int) -> list[Event]:
-        """Those of the last `KEPT` with a higher number, oldest first."""
+        """Events with a higher number, of the last 50, oldest first."""
         with self._lock:
             return [event for event in self._events if event.number > number]
 
@@ -85,14 +83,14 @@ class Picture:
 
     number: int
     located: LocatedFrame
-    overlay: NDArray[np.uint8]
+    overlay: Bytes
     jpeg: bytes
     settings: ViewSettings
     placement: PlacementCheck | None
     milliseconds: dict[str, float]
 
 
-def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
+def encode_jpeg(image: Bytes) -> bytes:
     """JPEG of an RGB image (H, W, 3)."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
     encoded: bytes = data.tobytes()
@@ -193,19 +191,19 @@ class FrameReader:
         if frame is not None:
             if self._paced:
                 self._keep_time(frame)
-            self._hand_over(frame)
+            self._deliver_frame(frame)
         return frame is not None
 
     def _keep_time(self, frame: Frame) -> None:
         """Waits until a file's frame is due; after a delay the rest comes later, not faster."""
-        max_step = 2.0  # Seconds between two frames of a file, whatever their times say.
         now = time.monotonic()
         due, before = self._shown or (now, frame.time)
-        due = max(due + min(max(frame.time - before, 0.0), max_step), now)
+        # Seconds between two frames of a file, whatever their times say.
+        due = max(due + min(max(frame.time - before, 0.0), 2.0), now)
         self._shown = (due, frame.time)
         self._closed.wait(due - now)
 
-    def _hand_over(self, frame: Frame) -> None:
+    def _deliver_frame(self, frame: Frame) -> None:
         if self.state == "lost":
             self._events.add(f"{self.source.name} is back")
         self.state, self.fault = "running", ""
@@ -402,12 +400,12 @@ class LiveSession:
         Raises:
             BaseException: what ended a thread of the session.
         """
-        poll_interval = 0.5  # Seconds between checks for the end of the session.
         end = math.inf if seconds is None else time.monotonic() + seconds
         with self._changed:
             # In pieces: an interrupt may have come in another thread, which does not wake this one.
             while not self._is_over(to_end) and (left := end - time.monotonic()) > 0:
-                self._changed.wait(min(left, poll_interval))
+                # Seconds between checks for the end of the session.
+                self._changed.wait(min(left, 0.5))
         failure = self._failure or self.reader.failure
         if failure is not None:
             raise failure
@@ -418,13 +416,13 @@ class LiveSession:
         return self._is_over(to_end=True)
 
     def _is_over(self, to_end: bool) -> bool:
-        if self._closed or self._failure or self.reader.failure or self._enough:
+        if self._closed or self._failure or self.reader.failure or self._has_all_frames:
             return True
         ended = self.reader.state == "ended" and self.reader.is_empty and not self._busy
         return to_end and ended
 
     @property
-    def _enough(self) -> bool:
+    def _has_all_frames(self) -> bool:
         return self._limit is not None and self.counts.frames >= self._limit
 
     def _wake(self) -> None:
@@ -461,7 +459,7 @@ class LiveSession:
     @property
     def _wants_frame(self) -> bool:
         frozen = self._settings.frozen and self.picture is not None
-        return not (self.reader.is_empty or frozen or self._enough)
+        return not (self.reader.is_empty or frozen or self._has_all_frames)
 
     def _process(self, frame: Frame) -> LocatedFrame | None:
         try:
@@ -510,12 +508,11 @@ class LiveSession:
 
     def _report_pose(self, located: LocatedFrame, now: float) -> None:
         """An event when the pose comes or goes, and stays so for a while."""
-        # Seconds. A pose that appears or disappears for less time is not reported.
-        min_duration = 1.0
         state = (located.estimate.valid, bool(located.estimate.reason))
         if self._same_since[1] != state:
             self._same_since = (now, state)
-        lasting = now - self._same_since[0] >= min_duration
+        # Seconds. A pose that appears or disappears for less time is not reported.
+        lasting = now - self._same_since[0] >= 1.0
         if self._reported is None or (state != self._reported and lasting):
             self._reported = state
             line = describe_pose(located.estimate, self.processor.scene.board)

@@ -26,6 +26,7 @@ from burg_drake.cameras.text_tags import TEXT_COLOR, draw_notice, render_tag, wr
 from burg_drake.core import (
     CATEGORY_COLORS,
     Array,
+    Booleans,
     Bytes,
     Indices,
     InvalidInputError,
@@ -95,17 +96,11 @@ class OverlayStyle:
 
 LIGHT_DIRECTION = np.array([0.35, -0.45, 0.82])
 """Direction to the light, in the sheet's frame S."""
-
-
-class OverlayLines:
-    """Overlay lines."""
-
-    inner_width = 0.6  # Width of inner lines, as a fraction of that of outlines.
-    rim_opacity = 0.65  # Opacity of the dark rim of outlines and arrows.
-    inner_rim_opacity = 0.25  # Opacity of the dark rim of inner lines and footprints.
-    footprint_width = 1.2  # Pixels.
-    arrow_width = 3.0  # Pixels.
-    footprint_opacity = 0.7
+RIM_OPACITY = 0.65  # Opacity of the dark rim of outlines and arrows.
+INNER_RIM_OPACITY = 0.25  # Opacity of the dark rim of inner lines and footprints.
+ARROW_HEAD_LENGTH = 0.010  # Metres.
+ARC_ANGLE = math.radians(80.0)  # Radians.
+ARC_SEGMENTS = 12  # Straight lines of an arc.
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +179,11 @@ class Overlay:
         state = _DrawState(shape, inverse(X_SC), lines, surface, marks)
         colors = np.array([self._colors[name] for name in shape.names], dtype=float)
         blend_surfaces(drawn, surface, colors, style.opacity)
-        inks = [_outline_lines(state, _brighten(colors), style.outline_width), *self._arrows(state)]
+        inks = [_outline_lines(state, _brighten(colors), style.outline_width)]
+        inks += [self._lines(mark.lines, mark.verdict, state.X_CS) for mark in marks.values()]
         if placement is not None and style.errors:
-            inks += [
-                self._lines(circle_extra_object(extra), "off", state.X_CS)
-                for extra in placement.extra
-            ]
+            circles = map(circle_extra_object, placement.extra)
+            inks += [self._lines(circle, "off", state.X_CS) for circle in circles]
         if style.footprints:
             inks.append(self._footprints(state, standing, standing_owner, _brighten(colors)))
         blend_lines(drawn, inks)
@@ -218,7 +212,7 @@ class Overlay:
     def _camera(self, shown: tuple[str, ...] | None) -> tuple[SurfaceCamera, Array, Indices]:
         """What looks at the instances shown, and their footprints with the instances' numbers."""
         if shown not in self._shown:
-            shape = self._whole.of(shown)
+            shape = self._whole.select(shown)
             self._shown[shown] = (SurfaceCamera(shape, self._view), *object_footprints(shape))
         return self._shown[shown]
 
@@ -233,37 +227,21 @@ class Overlay:
         at = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
         there = state.surface.owner[at]
         seen = (there == owner) | (there == NO_OWNER)
-        return _line_set(
-            pixels[seen],
-            colors[owner[seen]],
-            OverlayLines.footprint_width,
-            OverlayLines.footprint_opacity,
-            OverlayLines.inner_rim_opacity,
-        )
-
-    def _arrows(self, state: _DrawState) -> list[LineSet]:
-        return [self._lines(note.lines, note.verdict, state.X_CS) for note in state.marks.values()]
+        return _line_set(pixels[seen], colors[owner[seen]], 1.2, 0.7, INNER_RIM_OPACITY)
 
     def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
         """Lines (N, 2, 3) in S, in the color of what they say."""
         ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
         colors = np.tile(np.array(VERDICT_COLORS[verdict], dtype=float), (len(ends), 1))
-        return _line_set(
-            self.intrinsics.project(ends),
-            colors,
-            OverlayLines.arrow_width,
-            1.0,
-            OverlayLines.rim_opacity,
-        )
+        return _line_set(self.intrinsics.project(ends), colors, 3.0, 1.0, RIM_OPACITY)
 
     def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
         """Names of what can be seen, and how it stands."""
-        font_height = 0.028  # Fraction of the image's height.
-        min_named_pixels = 12  # Instances that show fewer pixels get no name tag.
         owner = state.surface.owner
         seen = np.bincount(owner[owner != NO_OWNER], minlength=len(state.shape.names))
         boxes, plates = [], []
-        for number in np.flatnonzero(seen >= min_named_pixels):
+        # Instances that show fewer pixels get no name tag.
+        for number in np.flatnonzero(seen >= 12):
             ends = state.lines.ends[state.lines.owner == number].reshape(-1, 2)
             name = state.shape.names[number]
             note = state.marks.get(name)
@@ -272,7 +250,8 @@ class Overlay:
                 size = self.intrinsics.width - 1, self.intrinsics.height - 1
                 boxes.append(np.clip([ends.min(axis=0), ends.max(axis=0)], 0, size))
                 color = VERDICT_COLORS[note.verdict] if note else TEXT_COLOR
-                plates.append(render_tag("  ".join(words), color, round(font_height * len(drawn))))
+                # Fraction of the image's height.
+                plates.append(render_tag("  ".join(words), color, round(0.028 * len(drawn))))
         if plates:
             write_tags(drawn, np.array(boxes), plates, owner != NO_OWNER)
 
@@ -316,27 +295,22 @@ def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
             rims[number] = VERDICT_COLORS[state.marks[name].verdict]
     outer = lines.kind == OUTLINE_KIND
     chosen = np.where(outer[:, None], rims[lines.owner], colors[lines.owner])
-    widths = width * np.where(outer, 1.0, OverlayLines.inner_width)
+    # Width of inner lines, as a fraction of that of outlines.
+    widths = width * np.where(outer, 1.0, 0.6)
     for number, name in enumerate(state.shape.names):
         if name in state.marks and state.marks[name].verdict == "uncertain":
             dashed = outer & (lines.owner == number)
             widths[dashed] *= _dash_mask(lines.ends[dashed])
-    return _line_set(
-        lines.ends,
-        chosen,
-        widths,
-        1.0,
-        np.where(outer, OverlayLines.rim_opacity, OverlayLines.inner_rim_opacity),
-    )
+    rim_opacity = np.where(outer, RIM_OPACITY, INNER_RIM_OPACITY)
+    return _line_set(lines.ends, chosen, widths, 1.0, rim_opacity)
 
 
-def _dash_mask(ends: Array) -> NDArray[np.bool_]:
+def _dash_mask(ends: Array) -> Booleans:
     """(N,) which of the short lines (N, 2, 2) around an object [pixels] belong to a dash: those in
     every other sector about its middle, as lines do not come in the order of the outline."""
-    dash_length = 7.0  # Pixels. About half the distance between dashes.
     arms = ends.mean(axis=1) - ends.mean(axis=(0, 1))
     around = 2 * np.pi * np.linalg.norm(arms, axis=1).mean() if len(arms) else 0.0
-    dashes = max(round(around / (2 * dash_length)), 4)
+    dashes = max(round(around / (2 * 7.0)), 4)  # Pixels. About half the distance between dashes.
     share = np.arctan2(arms[:, 1], arms[:, 0]) / (2 * np.pi) % 1.0
     return np.asarray((share * dashes) % 1.0 < 0.6)
 
@@ -357,16 +331,14 @@ def _instance_color(number: int) -> tuple[int, int, int]:
 
 
 def _brighten(colors: Array) -> Array:
-    brightening = 0.4  # Fraction of the difference to white.
-    return colors + brightening * (255.0 - colors)
+    return colors + 0.4 * (255.0 - colors)  # Fraction of the difference to white.
 
 
 def _face_brightness(shape: SceneMesh) -> Bytes:
     """(F,) brightness of faces, lit from above."""
     ambient = 0.4  # Brightness of faces that the light does not reach.
-    lit = np.clip(
-        shape.outline.normals @ (LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)), 0.0, 1.0
-    )
+    light = LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)
+    lit = np.clip(shape.outline.normals @ light, 0.0, 1.0)
     return np.asarray(np.round(255 * (ambient + (1.0 - ambient) * lit)), np.uint8)
 
 
@@ -379,16 +351,6 @@ VERDICT_COLORS: dict[PlacementVerdict, tuple[int, int, int]] = {
     "not_seen": (190, 195, 200),
 }
 """RGB of outlines, arrows and texts."""
-
-
-class ArrowStyle:
-    """Arrow style."""
-
-    min_length = 0.035  # Metres. Arrows for shorter corrections are drawn this long.
-    head_length = 0.010  # Metres.
-    arc_radius = 0.030  # Metres.
-    arc_angle = math.radians(80.0)  # Radians.
-    arc_segments = 12  # Straight lines of an arc.
 
 
 @dataclass(frozen=True, eq=False)
@@ -417,11 +379,9 @@ def correction_mark(placement: Placement, style: OverlayStyle, height: float) ->
     nothing = np.empty((0, 2, 3))
     uncertain = placement.status == "uncertain"
     if placement.displacement is None:
-        return (
-            CorrectionMark("uncertain", "?", nothing)
-            if uncertain
-            else CorrectionMark("not_seen", "not seen", nothing)
-        )
+        if uncertain:
+            return CorrectionMark("uncertain", "?", nothing)
+        return CorrectionMark("not_seen", "not seen", nothing)
     move = -np.array(placement.displacement)
     turn = -(placement.angle or 0.0)
     far, turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
@@ -440,12 +400,11 @@ def correction_mark(placement: Placement, style: OverlayStyle, height: float) ->
 
 def circle_extra_object(extra: ExtraObject) -> Array:
     """(N, 2, 3) lines on the board around something that is no object of the scene, in S [m]."""
-    around = np.linspace(0.0, 2.0 * np.pi, 2 * ArrowStyle.arc_segments + 1)
-    radius = max(0.6 * extra.width, ArrowStyle.head_length)
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * ARC_SEGMENTS + 1)
+    radius = max(0.6 * extra.width, ARROW_HEAD_LENGTH)
     x, y = extra.position
-    points = np.column_stack(
-        [x + radius * np.cos(around), y + radius * np.sin(around), np.zeros_like(around)]
-    )
+    points = np.zeros((len(around), 3))
+    points[:, 0], points[:, 1] = x + radius * np.cos(around), y + radius * np.sin(around)
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
@@ -469,37 +428,27 @@ def _format_number(value: float, sd: float | None) -> str:
 def _arrow_lines(target: Array, move: Array) -> Array:
     """To the target, along a move, drawn longer than that where it is short."""
     length = float(np.linalg.norm(move))
-    drawn = max(length, ArrowStyle.min_length)
+    drawn = max(length, 0.035)  # Metres. Arrows for shorter corrections are drawn this long.
     along = move / length
-    return np.concatenate(
-        [[[target - drawn * along, target]], _arrow_head_lines(target, along, 0.4 * drawn)]
-    )
+    head = _arrow_head_lines(target, along, 0.4 * drawn)
+    return np.concatenate([[[target - drawn * along, target]], head])
 
 
 def _turn_arrow_lines(center: Array, angle: float) -> Array:
     """An arc about the vertical, with a head at its end."""
-    around = (
-        math.copysign(1.0, angle)
-        * np.linspace(
-            -ArrowStyle.arc_angle / 2, ArrowStyle.arc_angle / 2, ArrowStyle.arc_segments + 1
-        )
-        - math.pi / 2
-    )
+    share = np.linspace(-ARC_ANGLE / 2, ARC_ANGLE / 2, ARC_SEGMENTS + 1)
+    around = math.copysign(1.0, angle) * share - math.pi / 2
     radial = np.column_stack([np.cos(around), np.sin(around), np.zeros_like(around)])
-    points = center + ArrowStyle.arc_radius * radial
+    points = center + 0.030 * radial  # Radius of the arc in metres.
     lines = np.stack([points[:-1], points[1:]], axis=1)
     along = points[-1] - points[-2]
-    return np.concatenate(
-        [
-            lines,
-            _arrow_head_lines(points[-1], along / np.linalg.norm(along), ArrowStyle.head_length),
-        ]
-    )
+    head = _arrow_head_lines(points[-1], along / np.linalg.norm(along), ARROW_HEAD_LENGTH)
+    return np.concatenate([lines, head])
 
 
 def _arrow_head_lines(tip: Array, along: Array, length: float) -> Array:
     across = np.array([-along[1], along[0], 0.0])
-    length = min(length, ArrowStyle.head_length)
+    length = min(length, ARROW_HEAD_LENGTH)
     back = tip - length * along
     return np.array([[back + 0.6 * length * across, tip], [back - 0.6 * length * across, tip]])
 
@@ -574,9 +523,9 @@ class LinePixels:
         line: (P,) which of the lines is nearest.
     """
 
-    at: NDArray[np.int64]
+    at: Indices
     distance: Array
-    line: NDArray[np.int64]
+    line: Indices
 
     def cover(self, wider: float = 0.0) -> Array:
         """(P,) share of each pixel that the line covers, or one that is wider on both sides."""
@@ -609,7 +558,7 @@ def rasterize_lines(
 
 def _pixels_near_lines(
     ends: Array, limit: Array, size: tuple[int, int]
-) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+) -> tuple[Indices, Array, Indices]:
     """Pixels nearer to each line than its limit: where, how near, and the line's index."""
     width, height = size
     center = np.round(ends.mean(axis=1)).astype(np.int64)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, InputPort, LeafSystem, State
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
-from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.cameras.pose.board_pose import BoardPose
-from burg_drake.cameras.pose.edge_measurement import perturbed_pose
+from burg_drake.cameras.pose.edge_measurement import perturbed_pose, pose_difference
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.scene import Board
 
@@ -62,31 +62,28 @@ class BoardPoseEstimator(LeafSystem):
         self.DeclareAbstractOutputPort(
             "X_SC", lambda: AbstractValue.Make(RigidTransform()), self._calc_X_SC, images
         )
-        self.DeclareVectorOutputPort("valid", 1, self._calc_valid, images)
-        self.DeclareVectorOutputPort("reprojection_error", 1, self._calc_error, images)
-        self.DeclareVectorOutputPort("covariance", 36, self._calc_covariance, images)
+        for name, size in (("valid", 1), ("reprojection_error", 1), ("covariance", 36)):
+            self.DeclareVectorOutputPort(
+                name,
+                size,
+                lambda context, output, name=name: output.SetFromVector(
+                    np.ravel(getattr(self._estimate.Eval(context), name)).astype(float)
+                ),
+                images,
+            )
 
     def _calc_estimate(self, context: Context, output: AbstractValue) -> None:
         image = self._color.Eval(context).data
         if image.size == 0:
             output.set_value(BoardEstimate(reason="no image yet"))
             return
-        output.set_value(
-            self.board_pose.estimate(image, depth=_evaluate_depth(self._depth, context))
-        )
+        depth = evaluate_optional(self._depth, context)
+        known = None if depth is None or not depth.data.size else depth.data[..., 0]
+        output.set_value(self.board_pose.estimate(image, depth=known))
 
     def _calc_X_SC(self, context: Context, output: AbstractValue) -> None:
         estimate = self._estimate.Eval(context)
         output.set_value(rigid_transform(estimate.X_SC) if estimate.valid else RigidTransform())
-
-    def _calc_valid(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([float(self._estimate.Eval(context).valid)])
-
-    def _calc_error(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([self._estimate.Eval(context).reprojection_error])
-
-    def _calc_covariance(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._estimate.Eval(context).covariance.ravel())
 
 
 def rigid_transform(X_AB: Array) -> RigidTransform:
@@ -94,12 +91,9 @@ def rigid_transform(X_AB: Array) -> RigidTransform:
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(X_AB[:3, :3]), X_AB[:3, 3])
 
 
-def _evaluate_depth(port: InputPort, context: Context) -> np.ndarray | None:
-    """Depth image (H, W), if there is one."""
-    if not port.HasValue(context):
-        return None
-    image = port.Eval(context).data
-    return image[..., 0] if image.size else None
+def evaluate_optional(port: InputPort, context: Context) -> Any:
+    """The value at a port that may be left unconnected; None if it is."""
+    return port.Eval(context) if port.HasValue(context) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,14 +116,14 @@ class Track:
 
 
 class PoseFilter(LeafSystem):
-    """Mean of the latest poses, weighted by covariance, that begins anew when the camera moves.
+    """Mean of the latest poses, weighted by covariance; it starts again when the camera moves.
 
     A Kalman filter for a camera that stands still, in the form of information: with every update
     the old information fades, so that at rest errors are those of a mean of `window` estimates,
     lower by the square root of that. An estimate farther from the filtered pose than noise explains
-    (`GATE`) is held back; with the `patience`-th in a row the filter begins again from it. So what
-    is shown lags behind a moved camera by less than `patience` updates, but for moves that are
-    smaller than the noise, which it follows within about `window` updates.
+    (a chi-square of 33.1) is held back; with the `patience`-th in a row the filter starts again
+    from it. So what is shown lags behind a moved camera by less than `patience` updates, but for
+    moves that are smaller than the noise, which it follows within about `window` updates.
 
     Input ports:
         estimate: `BoardEstimate`, from `BoardPoseEstimator`.
@@ -159,14 +153,14 @@ class PoseFilter(LeafSystem):
         hold: int = 5,
         offset: float | None = None,
     ) -> None:
-        delay = 1e-3  # Periods by which updates are later than the image's.
         super().__init__()
         if period <= 0.0 or window < 1.0 or patience < 1 or hold < 0:
             raise InvalidInputError(
                 "a pose filter takes a period above 0 [s], a window and patience of at least 1, and"
                 " hold of at least 0"
             )
-        offset = delay * period if offset is None else offset
+        # Periods by which updates are later than the image's.
+        offset = 1e-3 * period if offset is None else offset
         if not 0.0 <= offset < period:
             raise InvalidInputError(
                 f"offset of a pose filter is {offset:g} s; give 0 or more, and less than its"
@@ -187,7 +181,6 @@ class PoseFilter(LeafSystem):
 
     def update(self, track: Track, estimate: BoardEstimate) -> Track:
         """What the filter remembers after one more estimate."""
-        gate = 33.1  # Chi-square of 6 degrees of freedom that 1 in 100,000 samples exceeds.
         aged = replace(track, age=track.age + 1)
         if not estimate.valid:
             return aged
@@ -196,13 +189,12 @@ class PoseFilter(LeafSystem):
         fresh = Track(estimate.X_SC, seen, R)
         if track.X_SC is None or not self._valid(track):
             return fresh
-        step = _pose_difference(track.X_SC, estimate.X_SC)
-        if step @ np.linalg.solve(track.covariance + R, step) > gate:
-            rejected_in_a_row = track.rejected_in_a_row + 1
+        step = pose_difference(track.X_SC, estimate.X_SC)
+        # Chi-square of 6 degrees of freedom that 1 in 100,000 samples exceeds.
+        if step @ np.linalg.solve(track.covariance + R, step) > 33.1:
+            rejected = track.rejected_in_a_row + 1
             return (
-                fresh
-                if rejected_in_a_row >= self._patience
-                else replace(aged, rejected_in_a_row=rejected_in_a_row)
+                fresh if rejected >= self._patience else replace(aged, rejected_in_a_row=rejected)
             )
         information = self._keep * track.information + seen
         gain = np.asarray(np.linalg.solve(information, seen))
@@ -236,10 +228,3 @@ class PoseFilter(LeafSystem):
         track = self._track(context)
         known = track.covariance if self._valid(track) else np.full((6, 6), np.nan)
         output.SetFromVector(known.ravel())
-
-
-def _pose_difference(X_SC: Array, X_SC_new: Array) -> Array:
-    """(6,) small rotation [rad] and translation [m] in S from one pose to another."""
-    turn = Rotation.from_matrix(X_SC_new[:3, :3] @ X_SC[:3, :3].T).as_rotvec()
-    step: Array = np.r_[turn, X_SC_new[:3, 3] - X_SC[:3, 3]]
-    return step

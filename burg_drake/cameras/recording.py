@@ -11,7 +11,6 @@ from typing import Any, TextIO
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.image_files import silence_opencv
 from burg_drake.cameras.intrinsics import Intrinsics
@@ -20,13 +19,15 @@ from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.core import (
     Array,
     BurgError,
+    Bytes,
     DocumentError,
+    Indices,
     InvalidInputError,
     make_pose,
     quaternion_from_rotation,
     read_rows,
     require_writable,
-    rotation_from_quaternion as from_quaternion,
+    rotation_from_quaternion,
     save_document,
 )
 
@@ -58,7 +59,7 @@ class RecordingFiles:
 
     @property
     def table(self) -> Path:
-        """`NAME.csv`, see `recording_table`."""
+        """`NAME.csv`, see `RECORDING_COLUMNS`."""
         return self.video.with_suffix(".csv")
 
     @property
@@ -76,17 +77,6 @@ class RecordingFiles:
         wanted = (*self.growing, self.document, *map(partial_path, self.growing))
         return next((path for path in wanted if os.path.lexists(path)), None)
 
-    def require_free(self) -> None:
-        """
-        Raises:
-            InvalidInputError: one of the files exists.
-        """
-        existing = self.existing()
-        if existing is not None:
-            raise InvalidInputError(
-                f"{existing} exists already; choose another name for the recording"
-            )
-
 
 def partial_path(path: Path) -> Path:
     """Where a file is written first; the suffix stays, which tells OpenCV the format."""
@@ -101,15 +91,17 @@ def require_video_path(path: str | Path, *, plain: bool = False) -> Path:
         plain: there will be one without overlay, too.
 
     Raises:
-        InvalidInputError: another suffix than those of `VIDEO_CODECS`, a file exists that the recording
-            would replace, or no writable place.
+        InvalidInputError: another suffix than those of `VIDEO_CODECS`, a file exists that the
+            recording would replace, or no writable place.
     """
     path = Path(path)
     if path.suffix.lower() not in VIDEO_CODECS:
         raise InvalidInputError(
             f"{path}: the name of a recording must end in {' or '.join(VIDEO_CODECS)}"
         )
-    RecordingFiles(path, plain).require_free()
+    existing = RecordingFiles(path, plain).existing()
+    if existing is not None:
+        raise InvalidInputError(f"{existing} exists already; choose another name for the recording")
     require_writable(path)
     return path
 
@@ -131,7 +123,7 @@ class RecordedPoses:
         X_SC: (N, 4, 4) camera in the scene frame; NaN where there was no pose.
     """
 
-    frames: NDArray[np.int64]
+    frames: Indices
     times: Array
     X_SC: Array
 
@@ -144,12 +136,16 @@ def table_row(frame: int, time: float, estimate: BoardEstimate) -> list[Any]:
         time: of the picture [s].
         estimate: of the camera's pose.
     """
-    error = estimate.reprojection_error
+    error, X_SC = estimate.reprojection_error, estimate.X_SC
+    pose = [""] * 7
+    if estimate.valid:
+        values = (*X_SC[:3, 3], *quaternion_from_rotation(X_SC[:3, :3]))
+        pose = [f"{value:.9g}" for value in values]
     return [
         frame,
         f"{time:.6f}",
         int(estimate.valid),
-        *_pose_columns(estimate),
+        *pose,
         f"{error:.6g}" if np.isfinite(error) else "",
         len(estimate.ids),
         estimate.reason,
@@ -172,7 +168,8 @@ def read_poses(path: str | Path) -> RecordedPoses:
         raise
     except (KeyError, ValueError) as error:
         raise DocumentError(
-            f"{path} is not the table of a recording; expected the columns {', '.join(RECORDING_COLUMNS)}"
+            f"{path} is not the table of a recording; expected the columns"
+            f" {', '.join(RECORDING_COLUMNS)}"
         ) from error
     return RecordedPoses(
         np.array([frame for frame, _ in numbers], dtype=np.int64),
@@ -181,22 +178,11 @@ def read_poses(path: str | Path) -> RecordedPoses:
     )
 
 
-def _pose_columns(estimate: BoardEstimate) -> list[str]:
-    if not estimate.valid:
-        return [""] * 7
-    X_SC = estimate.X_SC
-    values = (*X_SC[:3, 3], *quaternion_from_rotation(X_SC[:3, :3]))
-    return [f"{value:.9g}" for value in values]
-
-
 def _read_pose(row: dict[str, Any]) -> Array:
     if row["valid"] != "1":
         return np.full((4, 4), np.nan)
-    p, q = (
-        [float(row[name]) for name in names]
-        for names in (RECORDING_COLUMNS[3:6], RECORDING_COLUMNS[6:10])
-    )
-    return make_pose(from_quaternion(q), p)
+    *p, qw, qx, qy, qz = (float(row[name]) for name in RECORDING_COLUMNS[3:10])
+    return make_pose(rotation_from_quaternion([qw, qx, qy, qz]), p)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -263,7 +249,7 @@ class Recording:
         """Pictures that were added."""
         self.frames_per_second = frames_per_second
         self._clock = 0.0
-        self._last: tuple[float, tuple[NDArray[np.uint8], ...]] | None = None
+        self._last: tuple[float, tuple[Bytes, ...]] | None = None
         self._files = files = RecordingFiles(self.path, plain)
         self._document = RecordingDocument(
             scene=scene,
@@ -288,10 +274,10 @@ class Recording:
 
     def add(
         self,
-        overlay: NDArray[np.uint8],
+        overlay: Bytes,
         estimate: BoardEstimate,
         time: float,
-        plain: NDArray[np.uint8],
+        plain: Bytes,
     ) -> None:
         """Adds a picture.
 
@@ -371,14 +357,14 @@ class Recording:
 
     def _fill(self, time: float) -> None:
         """Repeats the last picture until a new one was taken."""
-        max_pause = 2.0  # Seconds. Longer pauses of a lost camera are shortened in the video.
         assert self._last is not None
         before, pictures = self._last
-        self._clock += min(max(time - before, 0.0), max_pause)
+        # Seconds. Longer pauses of a lost camera are shortened in the video.
+        self._clock += min(max(time - before, 0.0), 2.0)
         while self.frames < round(self.frames_per_second * self._clock):
             self._write(pictures)
 
-    def _write(self, pictures: tuple[NDArray[np.uint8], ...]) -> None:
+    def _write(self, pictures: tuple[Bytes, ...]) -> None:
         for writer, picture in zip(self._writers, pictures, strict=True):
             writer.write(np.ascontiguousarray(picture[..., ::-1]))
         self.frames += 1

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.core import (
     Array,
+    Booleans,
     Indices,
     UnknownNameError,
-    inverse,
     suggest_names,
     transform_points,
 )
@@ -96,16 +95,7 @@ class MeshOutline:
             np.concatenate([edges, self._rim]), np.concatenate([faces, self._first[self._rim]])
         )
 
-    def segments(self, X_CO: Array) -> Array:
-        """(N, 2, 3) ends of the contour's edges in the camera's frame [m], hidden ones as well.
-
-        Args:
-            X_CO: (4, 4) object in the camera's frame.
-        """
-        contour = self.contour(inverse(X_CO)[:3, 3])
-        return transform_points(X_CO, self.vertices[self.edges[contour.edges]])
-
-    def front(self, p_OC: Array, faces: Indices | None = None) -> NDArray[np.bool_]:
+    def front(self, p_OC: Array, faces: Indices | None = None) -> Booleans:
         """Which faces a point of view in O sees from the front, if nothing is before them.
 
         Args:
@@ -117,17 +107,17 @@ class MeshOutline:
 
     @cached_property
     def creases(self) -> Indices:
-        """(N,) edges at which the surface bends outwards or inwards by more than `CREASE`, as far
-        as they hang together over `CREASE_LENGTH`."""
-        min_angle = np.deg2rad(35.0)  # Radians between two faces.
-        min_length = 0.02  # Metres. Shorter creases are bumps of a scan.
-        sharp = np.flatnonzero((np.abs(self._bend) > min_angle) & ~self._open)
+        """(N,) edges at which the surface bends outwards or inwards by more than 35 degrees,
+        as far as they hang together over 2 cm."""
+        # Radians between two faces.
+        sharp = np.flatnonzero((np.abs(self._bend) > np.deg2rad(35.0)) & ~self._open)
         starts, ends = self.edges[sharp].T
         graph = coo_array((np.ones(len(sharp)), (starts, ends)), shape=(len(self.vertices),) * 2)
         _, group = connected_components(graph, directed=False)
         length = np.linalg.norm(self.vertices[ends] - self.vertices[starts], axis=1)
         whole = np.bincount(group[starts], length)
-        return np.asarray(sharp[whole[group[starts]] > min_length])
+        # Metres. Shorter creases are bumps of a scan.
+        return np.asarray(sharp[whole[group[starts]] > 0.02])
 
     def _bends(self) -> Array:
         """(E,) angle between the faces at an edge, positive where it sticks out [rad]."""
@@ -187,7 +177,7 @@ class SceneMesh:
         corners = [[v.min(axis=0), v.max(axis=0)] for v in vertices[1:]]
         self.boxes: Array = np.array(corners).reshape(-1, 2, 3)
 
-    def of(self, names: tuple[str, ...] | None) -> SceneMesh:
+    def select(self, names: tuple[str, ...] | None) -> SceneMesh:
         """Some of the instances alone; all if None.
 
         Raises:
@@ -233,11 +223,11 @@ def object_footprints(shape: SceneMesh) -> tuple[Array, Indices]:
         (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) the number of the
         instance of each; none for what stands on other objects.
     """
-    max_height = 2e-3  # Metres. Lower points of an object are in contact with the board.
     lines, owner = [np.empty((0, 2, 3))], [np.empty(0, np.int64)]
     for number, name in enumerate(shape.names):
         vertices = shape.vertices(name)
-        flat = vertices[vertices[:, 2] <= max_height, :2]
+        # Metres. Lower points of an object are in contact with the board.
+        flat = vertices[vertices[:, 2] <= 2e-3, :2]
         try:
             corners = flat[ConvexHull(flat).vertices]
         except (QhullError, ValueError):  # no, or too few, points, or all on a line

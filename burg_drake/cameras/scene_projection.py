@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import NEAR_DISTANCE, FieldOfView
 from burg_drake.cameras.scene_mesh import SceneMesh
-from burg_drake.core import Array, Indices, inverse, transform_points
+from burg_drake.core import Array, Booleans, Bytes, Indices, inverse, transform_points
 
 OUTLINE_KIND = 0  # A line behind which lies another object or nothing.
 INNER_KIND = 1  # A contour before another part of the same object.
@@ -22,13 +22,11 @@ class VisibleLines:
 
     Attributes:
         ends: (N, 2, 2) in the image [pixels].
-        p_CQ: (N, 2, 3) the same in the camera's frame [m].
         owner: (N,) number of the instance.
         kind: (N,) `OUTLINE_KIND`, `INNER_KIND` or `CREASE_KIND`.
     """
 
     ends: Array
-    p_CQ: Array
     owner: Indices
     kind: Indices
 
@@ -53,8 +51,7 @@ def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLi
     p_CQ, parts = clip_lines(p_CQ, view)
     faces, inside, kind = faces[parts], inside[parts], kind[parts]
     seen, kind = _find_visible(shape, view, X_SC, p_CQ, inside, kind, shape.owner[faces])
-    p_CQ, kind, owner = p_CQ[seen], kind[seen], shape.owner[faces[seen]]
-    return VisibleLines(view.intrinsics.project(p_CQ), p_CQ, owner, kind)
+    return VisibleLines(view.intrinsics.project(p_CQ[seen]), shape.owner[faces[seen]], kind[seen])
 
 
 def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
@@ -67,7 +64,6 @@ def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
     Returns:
         (M, 2, 3) ends of the bits, and (M,) the line that each is of.
     """
-    max_length = 3.0  # Pixels. Longer lines are split; each piece is visible or hidden as a whole.
     depth = p_CQ[..., 2]
     line = np.flatnonzero((depth > NEAR_DISTANCE).any(axis=1))
     p_CQ, depth = p_CQ[line], depth[line]
@@ -80,7 +76,8 @@ def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
         )
     flat = p_CQ[..., :2] / p_CQ[..., 2:] * view.intrinsics.focal
     length = np.linalg.norm(flat[:, 1] - flat[:, 0], axis=1)
-    count = np.maximum(np.ceil(length / max_length), 1).astype(int)
+    # Pixels. Longer lines are split; each piece is visible or hidden as a whole.
+    count = np.maximum(np.ceil(length / 3.0), 1).astype(int)
     part = np.repeat(np.arange(len(count)), count)
     step = np.arange(len(part)) - np.repeat(np.cumsum(count) - count, count)
     # Even steps in the image, so that bits near the camera are not longer than others.
@@ -100,15 +97,12 @@ def _find_visible(
     inside: Array,
     kind: Indices,
     owner: Indices,
-) -> tuple[NDArray[np.bool_], Indices]:
+) -> tuple[Booleans, Indices]:
     """Which bits are seen, and their kinds.
 
     Args:
         inside: (N, 3) points of the surface beside each bit, in C.
     """
-    passing_distance = 0.1  # Pixels between a ray and the contour that it passes.
-    min_depth_step = 2e-3  # Metres behind an inner contour; less is a bump of a scan.
-    tolerance = 5e-5  # Metres; rays have single precision.
     if not len(p_CQ):
         return np.zeros(0, bool), kind
     middle = p_CQ.mean(axis=1)
@@ -116,16 +110,18 @@ def _find_visible(
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
     outward = -np.sign(np.einsum("ij,ij->i", across, inside))
     pixel = middle[:, 2] / max(view.intrinsics.focal)
-    passing = np.where(kind == CREASE_KIND, 0.0, passing_distance * pixel * outward)
+    # Pixels between a ray and the contour that it passes.
+    passing = np.where(kind == CREASE_KIND, 0.0, 0.1 * pixel * outward)
     target = middle + passing[:, None] * across
     distance = np.linalg.norm(target, axis=1)
     directions = (target / distance[:, None]) @ X_SC[:3, :3].T
     origins = np.broadcast_to(X_SC[:3, 3], directions.shape)
     face, hit = shape.rays.first_hits(origins, directions)
-    seen = hit > distance - tolerance
+    seen = hit > distance - 5e-5  # Metres; rays have single precision.
     own = (face >= 0) & (shape.owner[face] == owner)
     inner = own & (kind == OUTLINE_KIND)
-    seen &= ~inner | (hit > distance + min_depth_step)
+    # Metres behind an inner contour; less is a bump of a scan.
+    seen &= ~inner | (hit > distance + 2e-3)
     return seen, np.where(inner, INNER_KIND, kind)
 
 
@@ -144,7 +140,7 @@ class SurfaceImage:
     """
 
     owner: NDArray[np.int16]
-    shade: NDArray[np.uint8]
+    shade: Bytes
 
 
 class SurfaceCamera:
@@ -167,32 +163,30 @@ class SurfaceCamera:
         self._nodes = np.ix_(rows[: blocks[0] + 1], columns[: blocks[1] + 1])
         self._x, self._y = np.moveaxis(directions[self._nodes][..., :2], 2, 0).copy()
 
-    def render(self, X_SC: Array, lines: VisibleLines, shades: NDArray[np.uint8]) -> SurfaceImage:
+    def render(self, X_SC: Array, lines: VisibleLines, shades: Bytes) -> SurfaceImage:
         """The surfaces from a pose of the camera.
 
         Args:
             X_SC: (4, 4) camera's optical frame in the scene frame.
-            lines: that it sees from there, `line_drawing.visible_lines`.
+            lines: that it sees from there, see `visible_lines`.
             shades: (F,) brightness of each face.
         """
         owner, shade = self._at_nodes(X_SC, shades)
         corners = np.stack([owner[:-1, :-1], owner[:-1, 1:], owner[1:, :-1], owner[1:, 1:]])
         mixed = (corners != corners[0]).any(axis=0) | self._outline_blocks(lines)
-        image = SurfaceImage(_upsample(corners[0], self._size), self._interpolate(shade))
+        whole = corners[0].repeat(RAY_SPACING_PX, axis=0).repeat(RAY_SPACING_PX, axis=1)
+        seen = np.ascontiguousarray(whole[: self._size[0], : self._size[1]])
+        image = SurfaceImage(seen, self._interpolate(shade))
         image.shade[image.owner == NO_OWNER] = 0
         blocks = np.argwhere(mixed)
-        within = np.stack(np.meshgrid(*[np.arange(RAY_SPACING_PX)] * 2, indexing="ij"), -1).reshape(
-            1, -1, 2
-        )
+        within = np.argwhere(np.ones((RAY_SPACING_PX, RAY_SPACING_PX)))[None]
         pixels = (blocks[:, None] * RAY_SPACING_PX + within).reshape(-1, 2)
         pixels = pixels[(pixels < self._size).all(axis=1)]
         at = pixels[:, 0], pixels[:, 1]
         image.owner[at], image.shade[at] = self._cast(X_SC, self._directions[at], shades)
         return image
 
-    def _at_nodes(
-        self, X_SC: Array, shades: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.int16], NDArray[np.uint8]]:
+    def _at_nodes(self, X_SC: Array, shades: Bytes) -> tuple[NDArray[np.int16], Bytes]:
         """Owner and shade at the nodes; rays are cast where there may be something."""
         looking = self._candidate_nodes(X_SC)
         owner = np.full(looking.shape, NO_OWNER, np.int16)
@@ -201,7 +195,7 @@ class SurfaceCamera:
         owner[looking], shade[looking] = self._cast(X_SC, directions, shades)
         return owner, shade
 
-    def _candidate_nodes(self, X_SC: Array) -> NDArray[np.bool_]:
+    def _candidate_nodes(self, X_SC: Array) -> Booleans:
         """Nodes that look into the smallest upright rectangle around an instance's box."""
         showing = np.zeros(self._x.shape, bool)
         X_CS = inverse(X_SC)
@@ -219,21 +213,19 @@ class SurfaceCamera:
         return showing
 
     def _cast(
-        self, X_SC: Array, directions: Array, shades: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.int16], NDArray[np.uint8]]:
+        self, X_SC: Array, directions: Array, shades: Bytes
+    ) -> tuple[NDArray[np.int16], Bytes]:
         """Owner and shade of what rays (..., 3) in C meet."""
-        flat = directions.reshape(-1, 3) @ X_SC[:3, :3].T
+        flat, size = directions.reshape(-1, 3) @ X_SC[:3, :3].T, directions.shape[:-1]
         if not len(flat):
-            return np.empty(directions.shape[:-1], np.int16), np.empty(
-                directions.shape[:-1], np.uint8
-            )
+            return np.empty(size, np.int16), np.empty(size, np.uint8)
         face, _ = self.shape.rays.first_hits(np.broadcast_to(X_SC[:3, 3], flat.shape), flat)
         missed = face < 0
         owner = np.where(missed, NO_OWNER, self.shape.owner[face]).astype(np.int16)
         shade = np.where(missed, 0, shades[face]).astype(np.uint8)
-        return owner.reshape(directions.shape[:-1]), shade.reshape(directions.shape[:-1])
+        return owner.reshape(size), shade.reshape(size)
 
-    def _outline_blocks(self, lines: VisibleLines) -> NDArray[np.bool_]:
+    def _outline_blocks(self, lines: VisibleLines) -> Booleans:
         """Blocks that an outline runs through, or within a pixel of; it is cut into short bits."""
         rows, columns = (-(-n // RAY_SPACING_PX) for n in self._size)
         crossed = np.zeros((rows, columns), bool)
@@ -244,7 +236,7 @@ class SurfaceCamera:
             crossed[row[kept], column[kept]] = True
         return crossed
 
-    def _interpolate(self, shade: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _interpolate(self, shade: Bytes) -> Bytes:
         """Shades between the nodes."""
         import cv2
 
@@ -254,8 +246,3 @@ class SurfaceCamera:
             shade, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         return np.asarray(spread, np.uint8)
-
-
-def _upsample(owner: NDArray[np.int16], size: tuple[int, ...]) -> NDArray[np.int16]:
-    whole = np.repeat(np.repeat(owner, RAY_SPACING_PX, axis=0), RAY_SPACING_PX, axis=1)
-    return np.ascontiguousarray(whole[: size[0], : size[1]])

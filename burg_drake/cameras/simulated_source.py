@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 
 from burg_drake.cameras.frame_source import Frame, FrameSource
 from burg_drake.cameras.intrinsics_file import DEFAULT_CAMERA, SIMULATED_PREFIX
-from burg_drake.core import Array
+from burg_drake.core import Array, Bytes
 from burg_drake.scene import Scene
 from burg_drake.station import Station, build_station_diagram
 
@@ -123,7 +123,7 @@ class _Renderer:
         self._context = self._diagram.CreateDefaultContext()
         self._camera = f"camera.{camera}"
 
-    def render(self, moment: float, X_WC: Array | None) -> tuple[NDArray[np.uint8], Array]:
+    def render(self, moment: float, X_WC: Array | None) -> tuple[Bytes, Array]:
         """Colour (H, W, 3) and depth (H, W) at a time, from where the camera is or shall be."""
         self._context.SetTime(moment)
         if X_WC is not None:

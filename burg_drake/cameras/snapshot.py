@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement.document import CheckedScene, PlacementCheck, camera_versions
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.core import (
     Array,
+    Bytes,
     DocumentError,
     FileLimits,
     InvalidInputError,
@@ -36,14 +36,10 @@ if TYPE_CHECKING:
     from burg_drake.scene import Scene
 
 
-class SnapshotFiles:
-    """Snapshot files."""
-
-    image = "image.png"
-    overlay = "overlay.png"
-    depth = "depth.npy"
-    document = "snapshot.yaml"
-    intrinsics = "intrinsics.yaml"
+IMAGE_FILE = "image.png"
+OVERLAY_FILE = "overlay.png"
+DEPTH_FILE = "depth.npy"
+DOCUMENT_FILE = "snapshot.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,8 +107,8 @@ class Snapshot:
     """
 
     document: SnapshotDocument
-    image: NDArray[np.uint8]
-    overlay: NDArray[np.uint8]
+    image: Bytes
+    overlay: Bytes
     depth: Array | None = None
 
 
@@ -146,12 +142,12 @@ def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
         folder.parent.mkdir(parents=True, exist_ok=True)
         beside = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
         beside.mkdir()
-        _write_image(beside / SnapshotFiles.image, snapshot.image)
-        _write_image(beside / SnapshotFiles.overlay, snapshot.overlay)
+        _write_image(beside / IMAGE_FILE, snapshot.image)
+        _write_image(beside / OVERLAY_FILE, snapshot.overlay)
         if snapshot.depth is not None:
-            np.save(beside / SnapshotFiles.depth, snapshot.depth.astype(np.float32))
-        save_document(snapshot.document, beside / SnapshotFiles.document)
-        save_document(snapshot.document.intrinsics, beside / SnapshotFiles.intrinsics)
+            np.save(beside / DEPTH_FILE, snapshot.depth.astype(np.float32))
+        save_document(snapshot.document, beside / DOCUMENT_FILE)
+        save_document(snapshot.document.intrinsics, beside / "intrinsics.yaml")
         beside.rename(folder)
     except OSError as error:
         raise InvalidInputError(
@@ -184,21 +180,15 @@ def load_snapshot(folder: str | Path) -> Snapshot:
             intrinsics.
     """
     folder = Path(folder)
-    if not (folder / SnapshotFiles.document).is_file():
-        raise DocumentError(
-            f"{folder} is not the folder of a snapshot: {SnapshotFiles.document} is missing"
-        )
-    document = load_document(folder / SnapshotFiles.document, SnapshotDocument)
-    image, overlay = (
-        _read_image(folder / name) for name in (SnapshotFiles.image, SnapshotFiles.overlay)
-    )
+    if not (folder / DOCUMENT_FILE).is_file():
+        raise DocumentError(f"{folder} is not the folder of a snapshot: {DOCUMENT_FILE} is missing")
+    document = load_document(folder / DOCUMENT_FILE, SnapshotDocument)
+    image, overlay = _read_image(folder / IMAGE_FILE), _read_image(folder / OVERLAY_FILE)
     height, width = image.shape[:2]
-    document.intrinsics.require_size(width, height, str(folder / SnapshotFiles.image))
-    depth = (
-        _read_depth(folder / SnapshotFiles.depth, (height, width))
-        if (folder / SnapshotFiles.depth).exists()
-        else None
-    )
+    document.intrinsics.require_size(width, height, str(folder / IMAGE_FILE))
+    depth = None
+    if (folder / DEPTH_FILE).exists():
+        depth = _read_depth(folder / DEPTH_FILE, (height, width))
     return Snapshot(document=document, image=image, overlay=overlay, depth=depth)
 
 
@@ -250,14 +240,14 @@ def _finite_or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _write_image(path: Path, image: NDArray[np.uint8]) -> None:
+def _write_image(path: Path, image: Bytes) -> None:
     done, data = cv2.imencode(".png", image[..., ::-1])
     if not done:
         raise OSError(f"OpenCV cannot encode an image of shape {image.shape}")
     path.write_bytes(data.tobytes())
 
 
-def _read_image(path: Path) -> NDArray[np.uint8]:
+def _read_image(path: Path) -> Bytes:
     data: Any = (
         np.frombuffer(read_bytes(path, FileLimits.image_bytes), np.uint8)
         if path.is_file()

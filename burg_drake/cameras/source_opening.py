@@ -14,12 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from burg_drake.cameras.frame_source import (
-    CameraLost as CameraLost,
-    Frame as Frame,
-    FrameSource as FrameSource,
-    Image,
-)
+from burg_drake.cameras.frame_source import CameraLost, Frame, FrameSource, Image
 from burg_drake.cameras.image_files import IMAGE_SUFFIXES, read_image, silence_opencv
 from burg_drake.cameras.intrinsics_file import SIMULATED_PREFIX, find_simulated_camera
 from burg_drake.core import InvalidInputError, expand_home
@@ -52,8 +47,6 @@ def open_source(
         UnknownNameError: no such station, or it has no such camera.
         MissingDependencyError: a simulated camera without the renderer's system libraries.
     """
-    # URLs that OpenCV opens as network streams.
-    stream_prefixes = ("rtsp://", "rtsps://", "rtmp://", "http://", "https://", "udp://", "tcp://")
     scene = None if scene is None else as_scene(scene)
     if not isinstance(reference, (str, Path, int)):
         if len(reference) != 1:
@@ -62,7 +55,9 @@ def open_source(
     text = str(reference).strip()
     if text.startswith(SIMULATED_PREFIX):
         return _open_simulated(text, scene, fps)
-    if text.isdecimal() or text.startswith(("/dev/video", *stream_prefixes)):
+    # URLs that OpenCV opens as network streams.
+    streams = ("rtsp://", "rtsps://", "rtmp://", "http://", "https://", "udp://", "tcp://")
+    if text.isdecimal() or text.startswith(("/dev/video", *streams)):
         return open_device(int(text) if text.isdecimal() else text, size, fps)
     if not text:
         raise InvalidInputError(
@@ -85,7 +80,6 @@ def _open_simulated(reference: str, scene: Scene | None, fps: float | None) -> F
 
 
 def _open_images(references: Sequence[str]) -> FrameSource:
-
     return ImageSource(image_paths(references), references[0] if len(references) == 1 else "")
 
 
@@ -95,7 +89,6 @@ def image_paths(references: Sequence[str]) -> list[Path]:
     Raises:
         InvalidInputError: there are none.
     """
-
     paths: list[Path] = []
     for reference in references:
         path = expand_home(reference)
@@ -155,16 +148,14 @@ class ImageSource(FrameSource):
         self._next = len(self._paths)
 
     def _first_size(self) -> tuple[int, int]:
-        first_error = None
+        errors = []
         for path in self._paths:
             try:
                 height, width = read_image(path).shape[:2]
-            except InvalidInputError as error:
-                first_error = first_error or error
-            else:
                 return width, height
-        assert first_error is not None
-        raise first_error
+            except InvalidInputError as error:
+                errors.append(error)
+        raise errors[0]
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -251,8 +242,7 @@ class VideoSource(FrameSource):
 
     def _next_image(self) -> Image | None:
         """The next frame that can be read; None at the end."""
-        max_broken_frames = 100  # Consecutive unreadable frames after which the file ends.
-        for _ in range(max_broken_frames):
+        for _ in range(100):  # Consecutive unreadable frames after which the file ends.
             good, bgr = self._capture.read()
             if good and bgr is not None and bgr.size:
                 self._taken += 1
@@ -413,8 +403,6 @@ def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
 
 def _candidate_devices(most: int) -> list[int]:
     if sys.platform.startswith("linux"):
-        from pathlib import Path
-
         numbers = (path.name.removeprefix("video") for path in Path("/dev").glob("video*"))
         return sorted(int(number) for number in numbers if number.isdigit())[:most]
     return list(range(min(most, 4)))

@@ -10,17 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from burg_drake.core import Array, Bytes
+from burg_drake.core import Array, Booleans, Bytes
 
 PLATE_COLOR = (24, 28, 34)  # RGB of the plate behind a text.
 TEXT_COLOR = (255, 255, 255)  # RGB of texts.
 NOTICE_COLOR = (255, 214, 120)  # RGB of notices.
 
+Corner = tuple[int, int]
+"""Column and row of a tag's upper left corner [pixels]."""
+Plate = tuple[Bytes, NDArray[np.uint16]]
+"""(h, w, 3) colours of a tag and (h, w, 1) its opacity in 0 to 256."""
+
 
 @lru_cache(maxsize=512)
-def render_tag(
-    text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int = 14
-) -> tuple[Bytes, NDArray[np.uint16]]:
+def render_tag(text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int = 14) -> Plate:
     """A line of text on a dark rounded plate.
 
     Args:
@@ -52,12 +55,11 @@ def render_tag(
 
 def draw_notice(image: Bytes, text: str) -> Bytes:
     """A copy of an image (H, W, 3) with a line of text in its corner, wrapped where it is long."""
-    notice_corner = (8, 8)  # Pixels from the upper left corner of the image.
     drawn = np.array(image, order="C")
-    y = notice_corner[1]
-    for line in _wrap_text(text, drawn.shape[1] - 2 * notice_corner[0]):
+    x, y = 8, 8
+    for line in _wrap_text(text, drawn.shape[1] - 2 * x):
         plate = render_tag(line, NOTICE_COLOR)
-        paste_tag(drawn, plate, (notice_corner[0], y))
+        paste_tag(drawn, plate, (x, y))
         y += plate[0].shape[0] + 2
     return drawn
 
@@ -74,9 +76,7 @@ def _wrap_text(text: str, width: int) -> list[str]:
     return lines
 
 
-def paste_tag(
-    image: Bytes, plate: tuple[Bytes, NDArray[np.uint16]], corner: tuple[int, int]
-) -> None:
+def paste_tag(image: Bytes, plate: Plate, corner: Corner) -> None:
     """Draws a tag into an image (H, W, 3), in place; what lies outside is cut off.
 
     Args:
@@ -95,24 +95,17 @@ def paste_tag(
     image[y0:y1, x0:x1] = (under * (256 - a) + c * a) >> 8
 
 
-Corner = tuple[int, int]
-Plate = tuple[Bytes, NDArray[np.uint16]]
-
-
-def write_tags(
-    image: Bytes, boxes: Array, plates: Sequence[Plate], bodies: NDArray[np.bool_]
-) -> None:
+def write_tags(image: Bytes, boxes: Array, plates: Sequence[Plate], bodies: Booleans) -> None:
     """Draws tags into an image (H, W, 3), in place; see `place_tags`.
 
     Tags that had to move away have a line to the middle of what they name.
     """
-    leader_distance = 12.0  # Pixels. Farther tags are connected to their box by a line.
     sizes = [(colors.shape[1], colors.shape[0]) for colors, _ in plates]
     corners = place_tags(boxes, sizes, bodies)
     for corner, size, box in zip(corners, sizes, boxes, strict=True):
         low, high = np.array(corner), np.array(corner) + size
         apart = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
-        if np.hypot(*apart) > leader_distance:
+        if np.hypot(*apart) > 12.0:  # Pixels. Farther tags are connected to their box by a line.
             middle = np.round(box.mean(axis=0)).astype(int)
             start = np.clip(middle, low, high)
             cv2.line(image, start.tolist(), middle.tolist(), PLATE_COLOR, 1, cv2.LINE_AA)
@@ -120,9 +113,7 @@ def write_tags(
         paste_tag(image, plate, corner)
 
 
-def place_tags(
-    boxes: Array, sizes: Sequence[tuple[int, int]], bodies: NDArray[np.bool_]
-) -> list[Corner]:
+def place_tags(boxes: Array, sizes: Sequence[tuple[int, int]], bodies: Booleans) -> list[Corner]:
     """Finds a place for each tag.
 
     Args:
@@ -134,7 +125,6 @@ def place_tags(
         Column and row of the tags' upper left corners: the place about the box, on no other tag,
         that covers the least of the bodies and is the closest.
     """
-    row_cost = 0.05  # Cost of moving a tag by its height, as a covered fraction of the tag.
     image = bodies.shape[1], bodies.shape[0]
     covered = cv2.integral(bodies.astype(np.uint8))
     placed: list[tuple[int, int, int, int]] = []
@@ -144,41 +134,35 @@ def place_tags(
         (x, y), (width, height) = corner, size
         right, bottom = min(x + width, image[0]), min(y + height, image[1])
         hidden = covered[bottom, right] - covered[y, right] - covered[bottom, x] + covered[y, x]
-        return float(hidden) / (width * height) + row_cost * row
+        # Cost of moving a tag by its height, as a covered fraction of the tag.
+        return float(hidden) / (width * height) + 0.05 * row
 
     # From the top of the image: tags go above, so that what is higher has its place first.
     for i in np.argsort(boxes[:, 0, 1], kind="stable"):
-        options = [
-            (_move_into_image(c, sizes[i], image), row)
-            for c, row in _candidate_corners(boxes[i], *sizes[i])
-        ]
-        free = [
-            o for o in options if not any(_boxes_overlap((*o[0], *sizes[i]), p) for p in placed)
-        ]
-        corners[i] = min(free or options, key=lambda o: cost(o[0], o[1], sizes[i]))[0]
+        size = sizes[i]
+        options = []
+        for corner, row in _candidate_corners(boxes[i], *size):
+            limits = zip(corner, size, image, strict=True)
+            x, y = (min(max(c, 0), max(n - s, 0)) for c, s, n in limits)
+            options.append(((x, y), row))
+        free = [o for o in options if not any(_boxes_overlap((*o[0], *size), p) for p in placed)]
+        corners[i] = min(free or options, key=lambda o: cost(o[0], o[1], size))[0]
         placed.append((*corners[i], *sizes[i]))
     return corners
 
 
 def _candidate_corners(box: Array, width: int, height: int) -> list[tuple[Corner, int]]:
     """Corners of a tag about a box with their distance in rows; of equal ones the best first."""
-    tag_gap = 4  # Pixels between a tag and its body, and between tags.
-    tag_rows = 4  # Distances from the body that are tried, a tag's height apart.
     (left, top), (right, bottom) = np.round(box).astype(int).tolist()
     x, y = (left + right - width) // 2, (top + bottom - height) // 2
     options: list[tuple[Corner, int]] = []
-    for row in range(tag_rows):
-        away = tag_gap + row * (height + 2)
+    for row in range(4):  # Distances from the body that are tried, a tag's height apart.
+        away = 4 + row * (height + 2)  # Pixels between a tag and its body, and between tags.
         for column in (x, left, right - width):
             options += [((column, top - height - away), row), ((column, bottom + away), row)]
         for line in (y, top, bottom - height):
             options += [((right + away, line), row), ((left - width - away, line), row)]
     return [*options, ((x, y), 0)]
-
-
-def _move_into_image(corner: Corner, size: tuple[int, int], image: tuple[int, int]) -> Corner:
-    x, y = (min(max(c, 0), max(n - s, 0)) for c, s, n in zip(corner, size, image, strict=True))
-    return x, y
 
 
 def _boxes_overlap(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> bool:

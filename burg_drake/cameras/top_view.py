@@ -13,19 +13,19 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
 from burg_drake.cameras.intrinsics import NEAR_DISTANCE, Intrinsics
 from burg_drake.cameras.pose.board_pose import BoardPose, grey_image
-from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE
+from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE, consistent_markers
 from burg_drake.cameras.pose.marker_detection import (
     MarkerDetector,
     find_foreign_markers,
+    format_ids,
     side_lengths,
 )
-from burg_drake.core import Array, InvalidInputError, inverse, transform_points
+from burg_drake.core import Array, Bytes, InvalidInputError, inverse, transform_points
 from burg_drake.scene import Board
 
 DEFAULT_PIXEL_SIZE = 0.0005
@@ -114,14 +114,9 @@ class BoardRectifier:
             pixels, error, ids, note = sheet.project(p_SQ), sheet.error, sheet.ids, ""
         else:
             pixels, error, ids, note = self._by_pose(image, p_SQ)
-        return BoardPicture(
-            _sample_image(image, pixels.reshape(*self._shape, 2)),
-            (float(self._lower[0]), float(self._lower[1])),
-            (float(self._upper[0]), float(self._upper[1])),
-            error,
-            ids,
-            note,
-        )
+        top = _sample_image(image, pixels.reshape(*self._shape, 2))
+        lower, upper = ((float(x), float(y)) for x, y in (self._lower, self._upper))
+        return BoardPicture(top, lower, upper, error, ids, note)
 
     def _points(self) -> Array:
         """(N, 2) middles of the top view's pixels in the scene frame [m], row by row."""
@@ -170,7 +165,6 @@ def board_picture(
 def _sample_image(image: Image, pixels: Array) -> Image:
     """(H, W, 3) colours of an image at pixels (H, W, 2); where these lie far apart, of as much of
     the image as they stand for."""
-    outside_color = (128, 128, 128)  # RGB of places that the photo does not show.
     step = np.concatenate([np.diff(pixels, axis=axis).reshape(-1, 2) for axis in (0, 1)])
     shrink = max(1, int(np.median(np.linalg.norm(step, axis=1))))
     if shrink > 1:
@@ -181,11 +175,12 @@ def _sample_image(image: Image, pixels: Array) -> Image:
         )
         pixels = (pixels + 0.5) / shrink - 0.5
     at = pixels.astype(np.float32)
+    # RGB of places that the photo does not show.
+    u, v = np.moveaxis(at, 2, 0)
+    outside = (128, 128, 128)  # RGB of places that the photo does not show.
     return np.asarray(
         cv2.remap(
-            *(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR),
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=outside_color,
+            image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside
         )
     )
 
@@ -224,7 +219,7 @@ class SheetFinder:
         self._layout = board.layout
         self._detector = MarkerDetector(board.layout)
 
-    def find(self, image: NDArray[np.uint8]) -> SheetFit:
+    def find(self, image: Bytes) -> SheetFit:
         """Finds it.
 
         Args:
@@ -233,8 +228,6 @@ class SheetFinder:
         Raises:
             InvalidInputError: the image does not show this board.
         """
-        rough_tolerance = 0.1  # Fraction of a marker's side, without distortion.
-        max_mean_error = 0.05  # Fraction of a marker's side; with more it is another board.
         grey = grey_image(image)
         seen = self._detector.detect(grey)
         if not len(seen.index):
@@ -243,10 +236,11 @@ class SheetFinder:
         middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
         p_SQ = self._layout.p_SQ[seen.index][..., :2]
         corners = (seen.corners - middle) / radius
-        tolerance = max(
-            CORNER_TOLERANCE[0] / radius, rough_tolerance * float(side_lengths(corners).mean())
-        )
-        kept = _consistent_markers(p_SQ, corners, tolerance)
+        # Fraction of a marker's side, without distortion.
+        tolerance = max(CORNER_TOLERANCE[0] / radius, 0.1 * float(side_lengths(corners).mean()))
+        kept = np.ones(len(p_SQ), dtype=bool)
+        if len(p_SQ) > 1:
+            kept = consistent_markers(p_SQ, corners, tolerance)
         n, fit = len(kept), int(kept.sum())
         if fit < max(1, n / 2) or (n > 1 and fit < 2):
             raise InvalidInputError(
@@ -260,7 +254,8 @@ class SheetFinder:
         off = _project(H, distortion, p_SQ) - corners
         scale = self._layout.side / float(side_lengths(corners.reshape(-1, 4, 2)).mean())
         error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
-        if error > max_mean_error * self._layout.side:
+        # Fraction of a marker's side; with more it is another board.
+        if error > 0.05 * self._layout.side:
             raise InvalidInputError(
                 "the image shows another board: the corners of its markers are off by"
                 f" {1e3 * error:.1f} mm on average; are side and spacing right, and is the sheet"
@@ -269,7 +264,7 @@ class SheetFinder:
         ids = tuple(int(i) for i in self._layout.ids[seen.index[kept]])
         return SheetFit(H, distortion, middle, radius, error, ids)
 
-    def _require_no_foreign_markers(self, grey: NDArray[np.uint8], fit: int) -> None:
+    def _require_no_foreign_markers(self, grey: Bytes, fit: int) -> None:
         """Refuses a sheet that has more markers which are not this board's than fit: a part of the
         first row is the same on boards of several sizes."""
         layout = self._layout
@@ -283,37 +278,21 @@ class SheetFinder:
                 f" above {layout.ids[-1]}, the last of this one; are columns and rows right?"
             )
 
-    def _no_markers_reason(self, grey: NDArray[np.uint8], candidates: int) -> str:
+    def _no_markers_reason(self, grey: Bytes, candidates: int) -> str:
         layout = self._layout
         other = find_foreign_markers(grey, layout) if candidates else None
         if other is None:
             return "the image shows no marker of the board; improve the light, or move closer"
         own = f"this one has {layout.dictionary} with ids {layout.ids[0]} to {layout.ids[-1]}"
-        listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
         return (
             f"the image shows another board: {len(other.ids)} markers of {other.dictionary} with"
-            f" ids {listed}; {own}"
+            f" ids {format_ids(other.ids)}; {own}"
         )
-
-
-def _consistent_markers(p_SQ: Array, corners: Array, tolerance: float) -> NDArray[np.bool_]:
-    """(N,) markers with all corners (N, 4, 2) where the homography that most agree on has them."""
-    if len(p_SQ) == 1:
-        return np.ones(1, dtype=bool)
-    cv2.setRNGSeed(0)
-    _, fits = cv2.findHomography(p_SQ.reshape(-1, 2), corners.reshape(-1, 2), cv2.RANSAC, tolerance)
-    if fits is None:
-        return np.zeros(len(p_SQ), dtype=bool)
-    return np.asarray(fits.reshape(-1, 4).all(axis=1))
 
 
 def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:
     """Homography and bend that put corners (N, 2) where they were seen; corners that are half
     hidden, and were found beside their place, hardly count."""
-    min_lens_markers = 6  # Markers from which on the distortion is fitted.
-    max_distortion = 0.3  # Relative shift of an image corner from the centre.
-    max_cost_ratio = 0.5  # The distortion is used if it lowers the cost below this fraction.
-    corner_sd = 0.5  # Pixels.
     H, _ = cv2.findHomography(p_SQ, corners, 0)
     if H is None:
         raise InvalidInputError("the visible part of the board does not determine its pose")
@@ -327,13 +306,15 @@ def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple
             bounds=(-limit, limit),
             x_scale="jac",
             loss="soft_l1",
-            f_scale=corner_sd * pixel,
+            f_scale=0.5 * pixel,  # standard deviation of a corner
         )
 
     plain = fit((H / H[2, 2]).ravel()[:8], np.full(8, np.inf))
-    if markers >= min_lens_markers:
-        bent = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), max_distortion))
-        if bent.cost < max_cost_ratio * plain.cost:
+    if markers >= 6:  # Markers from which on the distortion is fitted.
+        # Relative shift of an image corner from the centre.
+        bent = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), 0.3))
+        # The distortion is used if it lowers the cost below this fraction.
+        if bent.cost < 0.5 * plain.cost:
             return _homography(bent.x), float(bent.x[8])
     return _homography(plain.x), 0.0
 

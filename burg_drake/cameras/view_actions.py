@@ -72,11 +72,9 @@ class ViewActions:
             X_SC_drawn=located.X_SC,
             placement=picture.placement,
         )
+        frame = located.frame
         snapshot = Snapshot(
-            document=document,
-            image=located.frame.image,
-            overlay=picture.overlay,
-            depth=located.frame.depth,
+            document=document, image=frame.image, overlay=picture.overlay, depth=frame.depth
         )
         with self._lock:  # two at once must not choose the same number
             place = Path(folder) if folder is not None else self._free_path("snapshot")
@@ -94,9 +92,6 @@ class ViewActions:
             InvalidInputError: it cannot be written, files of that name exist, a recording is being
                 written already, or no frame comes any more.
         """
-        default_rate = 30.0  # Frames per second.
-        min_rate = 1.0  # Frames per second.
-        max_rate = 240.0  # Some files state 90000 frames per second, which no codec takes.
         with self._lock:
             if self.recording is not None:
                 raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
@@ -106,15 +101,20 @@ class ViewActions:
                     " keep the picture that is shown"
                 )
             if path is None:
-                path = self._free_path("recording", ".mp4", taken=self._is_recorded)
-            rate = self.live.source.fps or default_rate
+                path = self._free_path(
+                    "recording",
+                    ".mp4",
+                    taken=lambda path: RecordingFiles(path, self._plain).existing() is not None,
+                )
+            rate = self.live.source.fps or 30.0  # Frames per second.
             self.recording = Recording(
                 path,
                 self.processor.intrinsics,
                 describe_scene(self.processor.scene),
                 source=self.live.source.name,
                 started=_now(),
-                frames_per_second=min(max(rate, min_rate), max_rate),
+                # Some files state 90000 frames per second, which no codec takes.
+                frames_per_second=min(max(rate, 1.0), 240.0),
                 plain=self._plain,
             )
             self.live.request_pictures()
@@ -168,9 +168,9 @@ class ViewActions:
 
     def _newest(self) -> Picture | None:
         """The newest picture; of a session that idled, the next one."""
-        picture_timeout = 5.0  # Seconds to wait for the first picture of an idle session.
         stale = self.live.request_pictures()
-        return self.live.next_picture(stale, picture_timeout) if stale else self.live.picture
+        # Seconds to wait for the first picture of an idle session.
+        return self.live.next_picture(stale, 5.0) if stale else self.live.picture
 
     def _measure(self, picture: Picture) -> None:
         try:
@@ -203,9 +203,6 @@ class ViewActions:
         except Exception as error:
             self.live.events.add(str(error), bad=True)
 
-    def _is_recorded(self, path: Path) -> bool:
-        return RecordingFiles(path, self._plain).existing() is not None
-
     def _free_path(
         self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
     ) -> Path:
@@ -223,9 +220,7 @@ def placement_summary(check: PlacementCheck) -> str:
     words += [f"{counts['uncertain']} uncertain"] if counts["uncertain"] else []
     words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
     if check.extra:
-        words += (
-            ["1 extra object"] if len(check.extra) == 1 else [f"{len(check.extra)} extra objects"]
-        )
+        words.append(f"{len(check.extra)} extra object{'s' if len(check.extra) > 1 else ''}")
     return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
 
 

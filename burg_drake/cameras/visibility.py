@@ -60,7 +60,7 @@ def _visible_share(
     shape: SceneMesh, caster: RayCaster, name: str, intrinsics: Intrinsics, X_SC: Array
 ) -> float:
     max_slope = 20.0  # Points farther off the axis are outside of every camera's view.
-    alone = shape.of((name,))
+    alone = shape.select((name,))
     p_CV = transform_points(inverse(X_SC), alone.outline.vertices)
     ahead = p_CV[p_CV[:, 2] >= NEAR_DISTANCE]
     if not len(ahead):

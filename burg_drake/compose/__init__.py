@@ -1,7 +1,7 @@
 """A scene while it is composed by hand: commands, history, journal and status, without any page.
 
-Read `session` first; what is edited is in `document`, how in `commands`, and `editing` carries it
-out.
+Read `session` first. `state` holds what is edited, the commands (`*_commands`) change it, and
+`editor` keeps the history and publishes views.
 """
 
 import lazy_loader

@@ -14,8 +14,10 @@ from .editor import Drag as Drag, DragOwner as DragOwner, Editor as Editor
 from .journal import journal_path as journal_path, recover_journal as recover_journal
 from .moving_commands import (
     Align as Align,
+    Axis as Axis,
     Direction as Direction,
     Distribute as Distribute,
+    Edge as Edge,
     MoveObjects as MoveObjects,
     PutDown as PutDown,
     SetPose as SetPose,

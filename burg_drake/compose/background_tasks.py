@@ -167,7 +167,6 @@ class GraspWatch:
             revision: its number.
             first: instances whose counts are wanted first.
         """
-        counting_delay = 0.4  # Seconds without further changes before grasps are counted.
         if revision == self._newest:
             return
         self._newest = revision
@@ -175,7 +174,8 @@ class GraspWatch:
             self._timer.cancel()
         names = tuple(sorted(scene.instances, key=lambda name: name not in first))
         task = GraspCountTask(scene, self._station, names, self._grasps_per_object)
-        self._timer = threading.Timer(counting_delay, self._count, (task, revision))
+        # after 0.4 s without further changes
+        self._timer = threading.Timer(0.4, self._count, (task, revision))
         self._timer.daemon = True
         self._timer.start()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from burg_drake.core import (
     BurgError,
@@ -18,35 +18,15 @@ from burg_drake.core import (
     report_progress,
 )
 
-Result = TypeVar("Result", covariant=True)
 T = TypeVar("T")
 
+ProgressCallback = Callable[..., None]
+"""Takes a task's progress: the share that is done in [0, 1], a word for people and, if there is
+one, a partial result. Raises `TaskCancelled` if nobody waits for the result."""
 
-class ProgressCallback(Protocol):
-    """How a task tells how far it is; it raises `TaskCancelled` if nobody waits for the result."""
-
-    def __call__(self, share: float, word: str, partial: Any = None) -> None:
-        """Tells it.
-
-        Args:
-            share: of the work that is done, in [0, 1].
-            word: for people.
-            partial: what came of it since the last report.
-        """
-
-
-class BackgroundTask(Protocol[Result]):
-    """What a worker does: a dataclass that can be pickled, as can what it gives."""
-
-    def __call__(self, report: ProgressCallback) -> Result:
-        """Does it.
-
-        Args:
-            report: tells how far it is.
-
-        Raises:
-            BurgError: it cannot be done.
-        """
+BackgroundTask = Callable[[ProgressCallback], T]
+"""What a worker does: a dataclass that can be pickled, as can its result. It raises a `BurgError`
+if it cannot be done."""
 
 
 class BackgroundJob(Generic[T]):
@@ -72,7 +52,7 @@ class BackgroundJob(Generic[T]):
         self.done = False
         self._cancel, self._on_change = cancel, on_change
         self._result: list[T] = []
-        self._notify = threading.Event()
+        self._finished = threading.Event()
         self._future: WorkerFuture[T] | None = None
 
     @property
@@ -96,7 +76,7 @@ class BackgroundJob(Generic[T]):
             TimeoutError: it is not there by then.
             BurgError: it cannot be done, or was cancelled.
         """
-        if not self._notify.wait(timeout):
+        if not self._finished.wait(timeout):
             raise TimeoutError(f"nothing after {timeout:g} s")
         return self.result
 
@@ -104,10 +84,12 @@ class BackgroundJob(Generic[T]):
         """Ends it; nothing if it is done."""
         self._cancel(self)
 
-    def report(self, share: float, word: str, partial: Any) -> None:
-        """The worker is so far."""
-        self.progress, self.partial = (share, word), partial
-        self._on_change(self)
+    def report(self, message: tuple[float, str, Any]) -> None:
+        """The worker has told its progress, a word, and what came of it."""
+        if not self.cancelled:
+            share, word, self.partial = message
+            self.progress = (share, word)
+            self._on_change(self)
 
     def finish(self, result: T | BurgError) -> None:
         """It is done."""
@@ -117,7 +99,7 @@ class BackgroundJob(Generic[T]):
             self._result.append(result)
         self.done = True
         self._on_change(self)
-        self._notify.set()
+        self._finished.set()
 
 
 class BackgroundWorker:
@@ -149,7 +131,7 @@ class BackgroundWorker:
             older, self._newest = self._newest, job
             try:
                 job._future = self._pool.submit_task(
-                    Task(run_task_in_worker, (task,), on_progress=_forward_reports(job))
+                    Task(run_task_in_worker, (task,), on_progress=job.report)
                 )
             except RuntimeError:  # it was closed
                 job.cancelled = True
@@ -159,7 +141,9 @@ class BackgroundWorker:
         if job._future is None:
             job.finish(TaskCancelled("this was cancelled"))
         else:
-            job._future.add_done_callback(lambda future: _finish_job(job, future))
+            job._future.add_done_callback(
+                lambda future: job.finish(_job_result_or_error(job, future))
+            )
         return job
 
     def cancel(self, job: BackgroundJob[Any]) -> None:
@@ -172,11 +156,10 @@ class BackgroundWorker:
 
     def close(self) -> None:
         """Ends the process."""
-        shutdown_timeout = 5.0  # Seconds that the process has to end.
         with self._lock:
             if self._newest is not None:
                 self._newest.cancelled = True
-        self._pool.kill_workers(shutdown_timeout)
+        self._pool.kill_workers(5.0)  # seconds that the process has to end
 
 
 def run_task_in_worker(task: BackgroundTask[T]) -> T:
@@ -195,18 +178,6 @@ def run_task_in_worker(task: BackgroundTask[T]) -> T:
         raise
     except (Exception, SystemExit) as error:  # Drake ends some failed checks by SystemExit
         raise _failure_of(error) from error
-
-
-def _forward_reports(job: BackgroundJob[Any]) -> Callable[[Any], None]:
-    def forward(message: tuple[float, str, Any]) -> None:
-        if not job.cancelled:
-            job.report(*message)
-
-    return forward
-
-
-def _finish_job(job: BackgroundJob[T], future: Future[T]) -> None:
-    job.finish(_job_result_or_error(job, future))
 
 
 def _job_result_or_error(job: BackgroundJob[Any], future: Future[Any]) -> Any:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from burg_drake.compose.scene_checker import Surroundings
 from burg_drake.compose.state import State
@@ -31,8 +32,26 @@ class Command(Protocol):
         """
 
 
-def command_label(verb: str, names: tuple[str, ...]) -> str:
+@dataclass(frozen=True)
+class InstancesCommand:
+    """Base class of commands about instances.
+
+    Attributes:
+        names: instances.
+    """
+
+    verb: ClassVar[str]
+
+    names: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        return command_label(self.verb, self.names)
+
+
+def command_label(verb: str, names: Iterable[str]) -> str:
     """A label that names what it is about, unless that is much."""
+    names = tuple(names)
     if not 0 < len(names) <= 2:
         return f"{verb} {len(names)} objects"
     return f"{verb} {' and '.join(names)}"
@@ -54,6 +73,11 @@ def require_number(value: float, what: str, lower: float, upper: float, unit: st
             f"{what} is {given}; give a number from {lower:g} to {upper:g} {unit}".rstrip()
         )
     return number
+
+
+def require_coordinate(value: float, what: str) -> float:
+    """A coordinate or an offset from a field [m]; errors as of `require_number`."""
+    return require_number(value, what, -MAX_COORDINATE, MAX_COORDINATE, "m")
 
 
 BOARD_SIZES = {name: size for name, size in PAPERS.items() if name.startswith("A")}

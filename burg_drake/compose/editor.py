@@ -37,16 +37,16 @@ class DragOwner(Protocol):
     def view(self) -> SessionView:
         """What one sees."""
 
-    def holds(self, drag: Drag) -> bool:
+    def is_current(self, drag: Drag) -> bool:
         """Whether a drag is the one that goes on."""
 
-    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+    def preview_drag(self, drag: Drag, move: MoveObjects) -> SessionView:
         """Shows what is dragged elsewhere."""
 
-    def drop(self, drag: Drag) -> SessionView:
+    def end_drag(self, drag: Drag) -> SessionView:
         """Makes a drag a step."""
 
-    def put_back(self, drag: Drag) -> SessionView:
+    def cancel_drag(self, drag: Drag) -> SessionView:
         """Ends a drag without a step."""
 
 
@@ -73,7 +73,7 @@ class Drag:
     @property
     def is_over(self) -> bool:
         """It was ended or cancelled, or something else changed the scene."""
-        return not self._session.holds(self)
+        return not self._session.is_current(self)
 
     def move(self, X_SO: Mapping[str, ArrayLike], *, changes_height: bool = False) -> SessionView:
         """Holds instances at poses.
@@ -102,7 +102,7 @@ class Drag:
                 if number <= self._checked:  # newer poses were checked while this call waited
                     return self._session.view
                 self._checked, move = self._asked, MoveObjects(self._X_SO, self._changes_height)
-            return self._session.preview(self, move)
+            return self._session.preview_drag(self, move)
 
     def move_by(self, offset: tuple[float, float, float], yaw: float = 0.0) -> SessionView:
         """Holds all instances away from where they were taken, as one.
@@ -117,11 +117,11 @@ class Drag:
 
     def end(self) -> SessionView:
         """Lets the instances go: one step, or none if they did not move."""
-        return self._session.drop(self)
+        return self._session.end_drag(self)
 
     def cancel(self) -> SessionView:
         """Puts the instances back where they were taken."""
-        return self._session.put_back(self)
+        return self._session.cancel_drag(self)
 
 
 Callback = Callable[[SessionView], None]
@@ -258,32 +258,32 @@ class Editor:
             self._publish()
             return self._drag
 
-    def holds(self, drag: Drag) -> bool:
+    def is_current(self, drag: Drag) -> bool:
         """Whether a drag is not over."""
         return self._drag is drag
 
-    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+    def preview_drag(self, drag: Drag, move: MoveObjects) -> SessionView:
         """Shows what is dragged elsewhere; see `Drag.move`.
 
         Raises:
             InvalidInputError: a pose is none, or the drag is over.
         """
         with self._exclusive():
-            self._require(drag)
+            self._require_current(drag)
             return self._show(move.apply(self._history.state, self._surroundings))
 
-    def drop(self, drag: Drag) -> SessionView:
+    def end_drag(self, drag: Drag) -> SessionView:
         """Makes a drag a step; see `Drag.end`."""
         with self._exclusive():
-            self._require(drag)
+            self._require_current(drag)
             self._drag = None
             state = replace(self._state, library=self._history.state.library)
             return self._edit(command_label("move", drag.names), state)
 
-    def put_back(self, drag: Drag) -> SessionView:
+    def cancel_drag(self, drag: Drag) -> SessionView:
         """Ends a drag without a step; see `Drag.cancel`."""
         with self._exclusive():
-            if not self.holds(drag):
+            if not self.is_current(drag):
                 return self._view
             self._drag = None
             return self._show(self._history.state.select(drag.names))
@@ -420,7 +420,7 @@ class Editor:
         )
         return self._notices + tuple(t for t in problems if t and t not in self._dismissed)
 
-    def _require(self, drag: Drag) -> None:
+    def _require_current(self, drag: Drag) -> None:
         if self._drag is not drag:
             raise InvalidInputError(
                 "the scene was changed during the drag, which ended it; drag again"

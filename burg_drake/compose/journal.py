@@ -1,4 +1,4 @@
-"""The journal of a session: every step is written to disk, so that a killed session can be recovered."""
+"""The journal of a session: every step is on disk, so that a killed session can be recovered."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import json
 import math
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from burg_drake.core import (
     InvalidInputError,
     Limits,
     Pose,
-    atomic_write,
     dump_document,
     parse_document,
     parse_json,
@@ -58,7 +56,7 @@ class JournalWriter:
             values["library"] = self._library = library
         return _json_line(values | self._document(step.state.document))
 
-    def at(self, position: int) -> str:
+    def position(self, position: int) -> str:
         """Where among the steps the session is."""
         return _json_line({"at": position})
 
@@ -91,7 +89,7 @@ class JournalWriter:
 
 
 class JournalReader:
-    """Takes the lines of one journal, in their order.
+    """Reads the lines of one journal, in their order.
 
     Attributes:
         origin: what the session was opened with, where that was no file of its own.
@@ -117,8 +115,8 @@ class JournalReader:
         self._damaged = False
         self._whole_line = True
 
-    def take(self, line: str) -> bool:
-        """Takes what can be read of the next line.
+    def read(self, line: str) -> bool:
+        """Reads what can be read of the next line.
 
         An instance that cannot be read is left out, of this line and of later ones.
 
@@ -127,20 +125,20 @@ class JournalReader:
         """
         self._whole_line = True
         try:
-            self._take(parse_json(line, "journal", JOURNAL_LINE_LIMITS))
+            self._read_line(parse_json(line, "journal", JOURNAL_LINE_LIMITS))
         except DAMAGE_ERRORS:
             self._whole_line = False
             self._next = None  # the number of instances in the line is unknown
         self._damaged |= not self._whole_line
         return self._whole_line
 
-    def _take(self, values: dict[str, Any]) -> None:
+    def _read_line(self, values: dict[str, Any]) -> None:
         if "journal" in values:
             if values["journal"] != JOURNAL_VERSION:
                 raise ValueError(f"version {values['journal']!r}")
             self.origin = _read_text(values["origin"])
         elif "step" in values:
-            self._step(values)
+            self._read_step(values)
         elif "at" in values:
             self._go_to(_read_integer(values["at"]))
         elif "saved" in values:
@@ -152,7 +150,7 @@ class JournalReader:
         else:
             raise ValueError("unknown line")
 
-    def _step(self, values: dict[str, Any]) -> None:
+    def _read_step(self, values: dict[str, Any]) -> None:
         library = self._libraries[values["library"]] if "library" in values else self._library
         if library is None:
             raise ValueError("no library")
@@ -191,8 +189,8 @@ class JournalReader:
         instances = self._instances | new
         document = replace(
             head,
-            instances=self._known(values["instances"], instances),
-            background=self._known(values.get("background", []), instances),
+            instances=self._instances_of(values["instances"], instances),
+            background=self._instances_of(values.get("background", []), instances),
         )
         placed = (*document.instances, *document.background)
         if len({instance_name(instance) for instance in placed}) < len(placed):
@@ -212,7 +210,9 @@ class JournalReader:
                 self._whole_line = False
         return found
 
-    def _known(self, numbers: list[Any], instances: dict[int, Instance]) -> tuple[Instance, ...]:
+    def _instances_of(
+        self, numbers: list[Any], instances: dict[int, Instance]
+    ) -> tuple[Instance, ...]:
         """The instances of these numbers, without those that could not be read."""
         missing = [number for number in map(_read_integer, numbers) if number not in instances]
         if missing and self._whole_line and not self._damaged:
@@ -300,69 +300,6 @@ def journal_path(scene: Path) -> Path:
     return scene.with_name(f".{scene.name}.journal")
 
 
-class SessionJournal:
-    """Writes steps as they are taken.
-
-    A journal is begun with the first step. If it cannot be written, all of it is tried again with
-    the next one.
-
-    Attributes:
-        path: of the file.
-        origin: what the session was opened with, where that was no file of its own.
-        problem: why the last steps are not on the disk; None if they are.
-    """
-
-    def __init__(self, path: Path, origin: str = "") -> None:
-        self.path = path
-        self.origin = origin
-        self.problem: str | None = None
-        self._writer: JournalWriter | None = None
-
-    def step(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
-        """The history has one more step, and is there; the rest is as in `JournalWriter.saved`."""
-        position = history.position
-        self._record(lambda w: w.step(history.steps[position], position), history, saved, known)
-
-    def at(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
-        """The history is at another step."""
-        self._record(lambda w: w.at(history.position), history, saved, known)
-
-    def rewrite(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
-        """Writes all of it anew."""
-        writer = JournalWriter()
-        lines = [writer.begin(self.origin)]
-        lines += [writer.step(step, position) for position, step in enumerate(history.steps)]
-        lines += [writer.at(history.position), writer.saved(saved, known)]
-        try:
-            atomic_write(self.path, "".join(lines))
-        except InvalidInputError as error:
-            self._writer, self.problem = None, str(error)
-        else:
-            self._writer, self.problem = writer, None
-
-    def remove(self) -> None:
-        """Takes it off the disk: all that it has is in the scene's file, or is not wanted."""
-        self._writer = None
-        with contextlib.suppress(OSError):
-            self.path.unlink(missing_ok=True)
-
-    def _record(
-        self,
-        line: Callable[[JournalWriter], str],
-        history: History,
-        saved: SceneDocument | None,
-        known: str | None,
-    ) -> None:
-        if self._writer is None:
-            self.rewrite(history, saved, known)
-            return
-        try:
-            _append_line(self.path, line(self._writer).encode())
-        except OSError as error:
-            self._writer = None
-            self.problem = f"cannot write {self.path}: {error.strerror or error}"
-
-
 def recover_journal(path: Path) -> RecoveredSession | None:
     """Reads a journal that a session left.
 
@@ -391,7 +328,7 @@ def recover_journal(path: Path) -> RecoveredSession | None:
             f"{error}; the last session of this scene used it, and its steps are in {path}:"
             " restore the library, or delete that file"
         ) from error
-    damaged = [number for number, line in enumerate(lines, 1) if not reader.take(line)]
+    damaged = [number for number, line in enumerate(lines, 1) if not reader.read(line)]
     return RecoveredSession(
         reader.history,
         reader.saved,
@@ -448,7 +385,7 @@ def _load_libraries(lines: list[str]) -> dict[str, ObjectLibrary]:
     return found
 
 
-def _append_line(path: Path, line: bytes) -> None:
+def append_line(path: Path, line: bytes) -> None:
     """Appends a line, or nothing."""
     with path.open("r+b") as stream:
         end = stream.seek(0, os.SEEK_END)

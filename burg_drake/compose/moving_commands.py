@@ -10,7 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.compose.commands import MAX_COORDINATE, command_label, require_number
+from burg_drake.compose.commands import (
+    InstancesCommand,
+    command_label,
+    require_coordinate,
+    require_number,
+)
 from burg_drake.compose.scene_checker import (
     Surroundings,
     instance_bounds,
@@ -39,7 +44,7 @@ class MoveObjects:
 
     @property
     def label(self) -> str:
-        return command_label("move", tuple(self.X_SO))
+        return command_label("move", self.X_SO)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         require_instance_names(self.X_SO, state)
@@ -49,11 +54,11 @@ class MoveObjects:
                 name: keep_tilt(state.X_SO(name), X, changes_height=self.changes_height)
                 for name, X in X_SO.items()
             }
-        return state.moved(X_SO).select(X_SO)
+        return state.with_poses(X_SO).select(X_SO)
 
 
 @dataclass(frozen=True)
-class SetPose:
+class SetPose(InstancesCommand):
     """Puts objects into a stable pose.
 
     Each keeps where its centre of mass is above the board, its yaw, and the height that it stands
@@ -64,23 +69,22 @@ class SetPose:
         stable_pose: number in the library's entry, the most probable one first.
     """
 
-    names: tuple[str, ...]
     stable_pose: int = 0
 
     @property
     def label(self) -> str:
-        return command_label(f"stable pose {self.stable_pose} of", tuple(self.names))
+        return command_label(f"stable pose {self.stable_pose} of", self.names)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
-        return state.moved({n: self._pose(state, n) for n in names}).select(names)
+        return state.with_poses({n: self._pose(state, n) for n in names}).select(names)
 
     def _pose(self, state: State, name: str) -> Array:
         X_SO = state.X_SO(name)
         p_OcmO = np.array(state.entry(name).mass_properties.center_of_mass)
         p_SOcm = X_SO[:3, :3] @ p_OcmO + X_SO[:3, 3]
         _, yaw = nearest_stable_pose(state, name) or (0, 0.0)
-        height = max(float(instance_bounds(state, name)[0, 2]), 0.0)
+        height = float(instance_bounds(state, name)[0, 2])
         if height <= TOUCH_TOLERANCE:
             height = 0.0
         return pose_on_board(
@@ -92,7 +96,7 @@ class SetPose:
 
 
 @dataclass(frozen=True)
-class Turn:
+class Turn(InstancesCommand):
     """Turns objects about the vertical through the middle of their bounds.
 
     Attributes:
@@ -100,12 +104,9 @@ class Turn:
         angle_deg: counter-clockwise, seen from above.
     """
 
-    names: tuple[str, ...]
-    angle_deg: float
+    verb = "turn"
 
-    @property
-    def label(self) -> str:
-        return command_label("turn", tuple(self.names))
+    angle_deg: float
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
@@ -115,11 +116,11 @@ class Turn:
         X_SM = make_pose(p_AB=(middle[0], middle[1], 0.0))
         X_MS = make_pose(p_AB=(-middle[0], -middle[1], 0.0))
         X = X_SM @ make_pose(rot_z(angle)) @ X_MS
-        return state.moved({name: X @ state.X_SO(name) for name in names}).select(names)
+        return state.with_poses({name: X @ state.X_SO(name) for name in names}).select(names)
 
 
 @dataclass(frozen=True)
-class SnapToGrid:
+class SnapToGrid(InstancesCommand):
     """Brings the origins of objects to the nearest points of a grid over the board.
 
     Attributes:
@@ -127,12 +128,9 @@ class SnapToGrid:
         spacing: of the grid, which starts in the board's corner [m].
     """
 
-    names: tuple[str, ...]
-    spacing: float = 0.01
+    verb = "snap to grid"
 
-    @property
-    def label(self) -> str:
-        return command_label("snap to grid", tuple(self.names))
+    spacing: float = 0.01
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
@@ -140,7 +138,7 @@ class SnapToGrid:
         X_SO = {name: state.X_SO(name) for name in names}
         for X in X_SO.values():
             X[:2, 3] = np.round(X[:2, 3] / spacing) * spacing
-        return state.moved(X_SO).select(names)
+        return state.with_poses(X_SO).select(names)
 
 
 def pose_on_board(
@@ -188,9 +186,7 @@ def _check_object_pose(X_SO: ArrayLike, name: str) -> Array:
         raise InvalidInputError(f"the pose of {name!r} has shape {X.shape}; expected (4, 4)")
     if np.isfinite(X).all():
         for axis, value in zip("xyz", X[:3, 3], strict=True):
-            require_number(
-                float(value), f"{axis} of {name!r}", -MAX_COORDINATE, MAX_COORDINATE, "m"
-            )
+            require_coordinate(float(value), f"{axis} of {name!r}")
     return check_pose(X, f"the pose of {name!r}")
 
 
@@ -199,7 +195,7 @@ Axis = Literal["x", "y"]
 
 
 @dataclass(frozen=True)
-class Align:
+class Align(InstancesCommand):
     """Brings edges of objects, or their middles, onto one line.
 
     Attributes:
@@ -207,12 +203,11 @@ class Align:
         edge: of their footprints that is aligned, with that of the outermost object.
     """
 
-    names: tuple[str, ...]
     edge: Edge
 
     @property
     def label(self) -> str:
-        return command_label(f"align {self.edge.replace('_', ' ')} of", tuple(self.names))
+        return command_label(f"align {self.edge.replace('_', ' ')} of", self.names)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         # Axis and part of the bounds by name, with y upwards as seen from above.
@@ -239,7 +234,7 @@ class Align:
 
 
 @dataclass(frozen=True)
-class Distribute:
+class Distribute(InstancesCommand):
     """Makes the gaps between objects equal; the two outermost stay.
 
     Attributes:
@@ -247,12 +242,11 @@ class Distribute:
         axis: along which the gaps are.
     """
 
-    names: tuple[str, ...]
     axis: Axis
 
     @property
     def label(self) -> str:
-        return command_label(f"distribute along {self.axis}", tuple(self.names))
+        return command_label(f"distribute along {self.axis}", self.names)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         if self.axis not in ("x", "y"):
@@ -277,14 +271,14 @@ def _shift_along_axis(state: State, names: tuple[str, ...], axis: int, shifts: A
         if abs(shift) > 1e-9:
             X_SO[name] = state.X_SO(name)
             X_SO[name][axis, 3] += shift
-    return state.moved(X_SO).select(names)
+    return state.with_poses(X_SO).select(names)
 
 
 Direction = Literal["x", "-x", "y", "-y"]
 
 
 @dataclass(frozen=True)
-class SnapToContact:
+class SnapToContact(InstancesCommand):
     """Moves objects along the board until they touch something, or are at its edge.
 
     Attributes:
@@ -292,12 +286,9 @@ class SnapToContact:
         direction: along an axis of the board.
     """
 
-    names: tuple[str, ...]
-    direction: Direction
+    verb = "snap to contact"
 
-    @property
-    def label(self) -> str:
-        return command_label("snap to contact", tuple(self.names))
+    direction: Direction
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         # Axis of the board and sign.
@@ -316,7 +307,7 @@ class SnapToContact:
 
 
 @dataclass(frozen=True)
-class PutDown:
+class PutDown(InstancesCommand):
     """Lowers objects until they stand on the board or on what is below.
 
     What is in the board is lifted out of it.
@@ -325,23 +316,17 @@ class PutDown:
         names: instances; each goes down on its own, the lowest one first.
     """
 
-    names: tuple[str, ...]
-
-    @property
-    def label(self) -> str:
-        return command_label("put down", tuple(self.names))
+    verb = "put down"
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
         heights = {name: float(instance_bounds(state, name)[0, 2]) for name in names}
         for name in sorted(names, key=heights.__getitem__):
             if heights[name] < 0.0:
-                state = state.moved({name: _shifted_pose(state, name, (0, 0, -heights[name]))})
+                state = state.with_poses({name: _shifted_pose(state, name, (0, 0, -heights[name]))})
             else:
-                down = (0.0, 0.0, -1.0)
-                state = _move_to_contact(
-                    state, (name,), np.array(down), heights[name], surroundings
-                )
+                down = np.array((0.0, 0.0, -1.0))
+                state = _move_to_contact(state, (name,), down, heights[name], surroundings)
         return state.select(names)
 
 
@@ -354,7 +339,7 @@ def _move_to_contact(
     if distance <= 0.0:
         return state.select(names)
     X_SO = {name: _shifted_pose(state, name, distance * direction) for name in names}
-    return state.moved(X_SO).select(names)
+    return state.with_poses(X_SO).select(names)
 
 
 def _shifted_pose(state: State, name: str, offset: Array | tuple[float, float, float]) -> Array:

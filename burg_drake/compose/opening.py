@@ -77,10 +77,8 @@ def open_scene_file(path: Path, address: str = "") -> OpenedScene:
         if found and found.history and found.history.state.document != found.saved:
             if found.known != known:
                 notices += (
-                    (
-                        f"{path} was changed by another program; the unsaved changes of the last"
-                        " session are shown"
-                    ),
+                    f"{path} was changed by another program; the unsaved changes of the last"
+                    " session are shown",
                 )
             return _open_recovered(path, path, found, lock, notices)
         if found and found.history and found.known == known:

@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from burg_drake.compose.commands import MAX_COORDINATE, command_label, require_number
+from burg_drake.compose.commands import (
+    InstancesCommand,
+    command_label,
+    require_coordinate,
+    require_number,
+)
 from burg_drake.compose.moving_commands import pose_on_board, stable_pose_matrix
 from burg_drake.compose.scene_checker import (
     Surroundings,
@@ -74,18 +79,13 @@ class AddObject:
             X_SO, yaw_deg, position = self._free_place(state, surroundings, yaw_deg)
         yaw = np.deg2rad(yaw_deg)
         x, y = (
-            require_number(
-                value, f"{axis} of the new {self.object!r}", -MAX_COORDINATE, MAX_COORDINATE, "m"
-            )
+            require_coordinate(value, f"{axis} of the new {self.object!r}")
             for axis, value in zip("xy", position, strict=True)
         )
         name = unused_name(self.object, surroundings.taken_names(state))
-        instance = Instance(
-            name="" if name == self.object else name,
-            object=self.object,
-            X_SO=Pose.readable(pose_on_board(X_SO, (x, y), yaw)),
-        )
-        return state.added([instance], fixed=_names_without_mass(state, [instance]))
+        X_new = Pose.readable(pose_on_board(X_SO, (x, y), yaw))
+        instance = rename_instance(Instance(object=self.object, X_SO=X_new), name)
+        return state.with_instances([instance], fixed=_names_without_mass(state, [instance]))
 
     def _free_place(
         self, state: State, surroundings: Surroundings, yaw_deg: float
@@ -111,22 +111,18 @@ class AddObject:
 
 
 @dataclass(frozen=True)
-class Delete:
+class Delete(InstancesCommand):
     """Takes instances out of the scene."""
 
-    names: tuple[str, ...]
-
-    @property
-    def label(self) -> str:
-        return command_label("delete", tuple(self.names))
+    verb = "delete"
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
-        return state.changed(lambda i: None if instance_name(i) in names else i)
+        return state.replace_instances(lambda i: None if instance_name(i) in names else i)
 
 
 @dataclass(frozen=True)
-class Duplicate:
+class Duplicate(InstancesCommand):
     """Puts copies beside instances.
 
     Attributes:
@@ -135,18 +131,15 @@ class Duplicate:
             on the board and free if None, or to the right of all that is there.
     """
 
-    names: tuple[str, ...]
-    offset: tuple[float, float] | None = None
+    verb = "duplicate"
 
-    @property
-    def label(self) -> str:
-        return command_label("duplicate", tuple(self.names))
+    offset: tuple[float, float] | None = None
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
         offset = _copy_offset(state, surroundings, names) if self.offset is None else self.offset
         x, y = (
-            require_number(value, f"offset along {axis}", -MAX_COORDINATE, MAX_COORDINATE, "m")
+            require_coordinate(value, f"offset along {axis}")
             for axis, value in zip("xy", offset, strict=True)
         )
         X = make_pose(p_AB=(x, y, 0.0))
@@ -159,7 +152,7 @@ class Duplicate:
             copies.append(rename_instance(copy, copy_name))
             if state.instance(name) in state.document.background:
                 fixed.add(copy_name)
-        return state.added(copies, fixed=fixed)
+        return state.with_instances(copies, fixed=fixed)
 
 
 @dataclass(frozen=True)
@@ -178,14 +171,14 @@ class Rename:
         if self.new == self.name:
             return state.select([self.name])
         surroundings.require_unused(self.new, state)
-        renamed = state.changed(
+        renamed = state.replace_instances(
             lambda i: rename_instance(i, self.new) if instance_name(i) == self.name else i
         )
         return renamed.select([self.new])
 
 
 @dataclass(frozen=True)
-class SetFixed:
+class SetFixed(InstancesCommand):
     """Makes free instances part of the background, or the other way round.
 
     Attributes:
@@ -193,12 +186,11 @@ class SetFixed:
         fixed: whether they shall stay where they are when the scene is simulated.
     """
 
-    names: tuple[str, ...]
     fixed: bool = True
 
     @property
     def label(self) -> str:
-        return command_label("fix" if self.fixed else "free", tuple(self.names))
+        return command_label("fix" if self.fixed else "free", self.names)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
@@ -212,9 +204,9 @@ class SetFixed:
         document = state.document
         others = document.instances if self.fixed else document.background
         moving = [i for i in others if instance_name(i) in names]
-        rest = state.changed(lambda i: None if i in moving else i)
+        rest = state.replace_instances(lambda i: None if i in moving else i)
         fixed = map(instance_name, moving) if self.fixed else ()
-        return rest.added(moving, fixed=tuple(fixed)).select(names)
+        return rest.with_instances(moving, fixed=tuple(fixed)).select(names)
 
 
 @dataclass(frozen=True)
@@ -246,7 +238,6 @@ def _copy_offset(
 ) -> tuple[float, float]:
     """Offset of copies: the shortest to where they are free on the board, or to the right of all
     that is there."""
-    copy_gap = 0.01  # Metres between the board's objects and copies that have no room on it.
     heights = [instance_bounds(state, name)[:, 2] for name in names]
     obstacles = _station_obstacles(surroundings, float(np.min(heights)), float(np.max(heights)))
     polygons = [instance_shadow(state, name) for name in names]
@@ -255,7 +246,8 @@ def _copy_offset(
         lost = missing_objects(state)
         others = [instance_shadow(state, name) for name in state.instances if name not in lost]
         right = max(float(polygon[:, 0].max()) for polygon in (*others, *obstacles))
-        return right + copy_gap - min(float(polygon[:, 0].min()) for polygon in polygons), 0.0
+        left = min(float(polygon[:, 0].min()) for polygon in polygons)
+        return right + 0.01 - left, 0.0  # with a gap of 1 cm
     return float(offset[0]), float(offset[1])
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from burg_drake.compose.state import State
-from burg_drake.core import Array, FieldError, require_name, rotation_angle, transform_points
+from burg_drake.core import Array, FieldError, require_name, rot_z, rotation_angle, transform_points
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import (
     TOUCH_TOLERANCE,
@@ -53,8 +53,7 @@ def _hull_vertices(path: Path, build: str) -> Array:
 
     p_OV = read_vertices(path)
     try:
-        hull: Array = p_OV[ConvexHull(p_OV).vertices]
-        return hull
+        return np.asarray(p_OV[ConvexHull(p_OV).vertices])
     except (QhullError, ValueError):  # flat
         return p_OV
 
@@ -83,10 +82,9 @@ def instance_shadow(state: State, name: str) -> Array:
 
 
 def object_shadow(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
-    """(N, 2) what an object covers of the board, and at most `SHADOW_TOLERANCE` more [m]."""
-    shadow_tolerance = 2e-4  # Metres by which simplified polygons may reach beyond the exact ones.
+    """(N, 2) what an object covers of the board, and at most 0.2 mm more [m]."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
-    return simplify_polygon(convex_polygon(p_SV[:, :2]), shadow_tolerance)
+    return simplify_polygon(convex_polygon(p_SV[:, :2]), 2e-4)
 
 
 def yaw_between(R_SA: Array, R_SB: Array) -> float:
@@ -103,8 +101,6 @@ def nearest_stable_pose(state: State, name: str) -> tuple[int, float] | None:
 
     None for an object without stable poses.
     """
-    from burg_drake.core import rot_z
-
     R_SO = state.X_SO(name)[:3, :3]
     found: list[tuple[float, int, float]] = []
     for k, stable in enumerate(state.entry(name).stable_poses):
@@ -162,15 +158,13 @@ class SceneChecker:
         """
         found, missing = {}, missing_objects(state)
         for name in state.selection:
-            if (
-                name in missing
-                or (height := float(instance_bounds(state, name)[0, 2])) <= TOUCH_TOLERANCE
-            ):
+            if name in missing:
                 continue
-            down = (0.0, 0.0, -1.0)
-            gap = self.check(state).travel(
-                scene_of_known_objects(state, path), (name,), down, height
-            )
+            height = float(instance_bounds(state, name)[0, 2])
+            if height <= TOUCH_TOLERANCE:
+                continue
+            scene = scene_of_known_objects(state, path)
+            gap = self.check(state).travel(scene, (name,), (0.0, 0.0, -1.0), height)
             if gap > TOUCH_TOLERANCE:
                 found[name] = gap
         return found
@@ -291,10 +285,9 @@ def find_free_offset(
     Returns:
         (2,) the way [m]; None if there is no room.
     """
-    min_spacing = 0.01  # Metres between the places that are tried.
     clearance = 0.005  # Metres between new objects and others, seen from above.
     size = np.array(state.document.board.size)
-    pitch = max(min_spacing, float(size.max()) / 60)
+    pitch = max(0.01, float(size.max()) / 60)  # Metres between the places that are tried.
     ticks = [np.arange(-(s // pitch), s // pitch + 1) * pitch for s in size]
     offsets = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
     offsets = offsets[np.argsort((offsets**2).sum(axis=1), kind="stable")]

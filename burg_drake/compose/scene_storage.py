@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake.compose.journal import SessionJournal, journal_path
+from burg_drake.compose.journal import JournalWriter, append_line, journal_path
 from burg_drake.compose.state import History
 from burg_drake.core import (
     BurgError,
@@ -188,8 +189,9 @@ class SceneStorage:
     Attributes:
         place: where the scene's file is, or would be if it had one.
         path: the scene's file; None if it has none.
-        known: `scene_file.fingerprint` that the file should have.
+        known: `file_fingerprint` that the file should have.
         saved: what it holds.
+        problem: why the last steps are not in the journal; None if they are.
     """
 
     def __init__(
@@ -203,13 +205,9 @@ class SceneStorage:
         origin: str = "",
     ) -> None:
         self.place, self.path, self.known, self.saved = place, path, known, saved
-        self._lock = lock
-        self._journal = SessionJournal(journal_path(place), origin)
-
-    @property
-    def problem(self) -> str | None:
-        """Why steps are not in the journal; None if they are."""
-        return self._journal.problem
+        self.problem: str | None = None
+        self._lock, self._origin = lock, origin
+        self._journal: JournalWriter | None = None  # a new journal is begun if None
 
     def announce(self, address: str) -> None:
         """Says where the session's page is, for those who find the scene in use."""
@@ -217,15 +215,43 @@ class SceneStorage:
 
     def record_step(self, history: History) -> None:
         """The history has one more step, and is there."""
-        self._journal.step(history, self.saved, self.known)
+        position = history.position
+        self._append(lambda journal: journal.step(history.steps[position], position), history)
 
     def record_position(self, history: History) -> None:
         """The history is at another step."""
-        self._journal.at(history, self.saved, self.known)
+        self._append(lambda journal: journal.position(history.position), history)
 
     def record_all(self, history: History) -> None:
-        """The history is another one."""
-        self._journal.rewrite(history, self.saved, self.known)
+        """Writes the whole journal again, as the history is another one."""
+        journal = JournalWriter()
+        lines = [journal.begin(self._origin)]
+        lines += [journal.step(step, position) for position, step in enumerate(history.steps)]
+        lines += [journal.position(history.position), journal.saved(self.saved, self.known)]
+        try:
+            atomic_write(journal_path(self.place), "".join(lines))
+        except InvalidInputError as error:
+            self._journal, self.problem = None, str(error)
+        else:
+            self._journal, self.problem = journal, None
+
+    def _append(self, line: Callable[[JournalWriter], str], history: History) -> None:
+        """Adds a line to the journal. After an error all of it is written with the next line."""
+        if self._journal is None:
+            self.record_all(history)
+            return
+        path = journal_path(self.place)
+        try:
+            append_line(path, line(self._journal).encode())
+        except OSError as error:
+            self._journal = None
+            self.problem = f"cannot write {path}: {error.strerror or error}"
+
+    def _remove_journal(self) -> None:
+        """All that it has is in the scene's file, or is not wanted."""
+        self._journal = None
+        with contextlib.suppress(OSError):
+            journal_path(self.place).unlink(missing_ok=True)
 
     def save(self, history: History, name: str | None, folder: Path, *, overwrite: bool) -> None:
         """Writes the scene; the history gets its name. See `ComposeSession.save`."""
@@ -246,13 +272,12 @@ class SceneStorage:
                 lock.release()
             raise
         if elsewhere:
-            self._journal.remove()
+            self._remove_journal()
             self._lock.release()
             self._lock, self.place = lock, place
-            self._journal = SessionJournal(journal_path(place))
         history.rename(written.name, written.library, state.library)
         self.path, self.known, self.saved = place, fingerprint, written
-        self._journal.origin = ""
+        self._origin = ""
         self.record_all(history)
 
     def close(self, *, keep: bool) -> None:
@@ -262,5 +287,5 @@ class SceneStorage:
             keep: the journal, as there is something in it that is in no file.
         """
         if not keep:
-            self._journal.remove()
+            self._remove_journal()
         self._lock.release()

@@ -95,7 +95,8 @@ def require_objects_of_scene(state: State, library: ObjectLibrary) -> None:
     heavy = [instance_name(i) for i in state.document.instances if library.entry(i.object).is_fixed]
     if heavy:
         raise InvalidInputError(
-            f"library {library.root} has no mass for {list_names(heavy)}; make them background first"
+            f"library {library.root} has no mass for {list_names(heavy)}; make them background"
+            " first"
         )
 
 
@@ -245,7 +246,7 @@ class ComposeSession(BackgroundEditor):
                 raise InvalidInputError("this scene was never saved, so it cannot be loaded")
             self._require_saved(discard=discard)
             if path != self._storage.path:
-                return self._change(open_scene_file(path, self._address))
+                return self._switch_scene(open_scene_file(path, self._address))
             known = file_fingerprint(path)
             scene = load_scene(path)
             self._drag = None
@@ -268,10 +269,12 @@ class ComposeSession(BackgroundEditor):
         """
         with self._exclusive():
             self._require_saved(discard=discard)
-            reference = self._history.state.library.root if library is None else self._own(library)
+            reference = (
+                self._history.state.library.root if library is None else self._library_path(library)
+            )
             if library is None and self._history.state.document.library in builtin_names("models"):
                 reference = self._history.state.document.library
-            return self._change(new_scene(reference, self.folder, self._address))
+            return self._switch_scene(new_scene(reference, self.folder, self._address))
 
     def printout(self, settings: PrintSettings | None = None) -> Printout:
         """The board with the scene as it is, as PDF; see `printout.print_board`.
@@ -304,12 +307,12 @@ class ComposeSession(BackgroundEditor):
             UnknownNameError: there is no such library, or it lacks objects of the scene.
             DocumentError: its document does not fit the schema.
         """
-        library = load_library(self._own(reference))
+        library = load_library(self._library_path(reference))
         built_in = str(reference) in builtin_names("models")
         written = str(reference) if built_in else portable_reference(library.root, self.folder)
         return self.do(UseLibrary(library, written))
 
-    def _own(self, reference: str | Path) -> str | Path:
+    def _library_path(self, reference: str | Path) -> str | Path:
         """Where one of `libraries` is; a `Path` is what it is, as no page gives one.
 
         Raises:
@@ -331,7 +334,7 @@ class ComposeSession(BackgroundEditor):
             self._update_surroundings()
             return self._view
 
-    def _change(self, opened: OpenedScene) -> SessionView:
+    def _switch_scene(self, opened: OpenedScene) -> SessionView:
         """Goes over to another scene."""
         self._drop_settling()
         self._storage.close(keep=False)

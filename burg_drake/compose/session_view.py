@@ -113,14 +113,7 @@ def instance_statuses(
         state: with the instances.
         issues: of the scene; None if it cannot be checked.
     """
-    # Statuses in order of severity.
-    worst_first = (
-        "collision",
-        "in_ground",
-        "out_of_bounds",
-        "hovering",
-        "sunken",
-    )
+    worst_first = ("collision", "in_ground", "out_of_bounds", "hovering", "sunken")
     if issues is None:
         return dict.fromkeys(state.instances, "unknown")
     found_statuses: dict[str, set[InstanceStatus]] = {name: set() for name in state.instances}

@@ -43,7 +43,8 @@ class State:
         known = self.instances
         if name not in known:
             raise UnknownNameError(
-                f"scene {self.document.name!r} has no instance {name!r}; {suggest_names(name, known)}"
+                f"scene {self.document.name!r} has no instance {name!r};"
+                f" {suggest_names(name, known)}"
             )
         return known[name]
 
@@ -70,7 +71,7 @@ class State:
             self.instance(name)
         return replace(self, selection=selection)
 
-    def changed(self, change: Callable[[Instance], Instance | None]) -> State:
+    def replace_instances(self, change: Callable[[Instance], Instance | None]) -> State:
         """The same with each instance replaced, or taken away where `change` gives None."""
         document = replace(
             self.document,
@@ -82,7 +83,7 @@ class State:
             self, document=document, selection=tuple(n for n in self.selection if n in there)
         )
 
-    def moved(self, X_SO: Mapping[str, Array]) -> State:
+    def with_poses(self, X_SO: Mapping[str, Array]) -> State:
         """The same with instances at other poses (4, 4); rounded as `Pose.readable` has it.
 
         Raises:
@@ -99,9 +100,9 @@ class State:
                 return instance
             return replace(instance, X_SO=Pose.readable(X))
 
-        return self.changed(place)
+        return self.replace_instances(place)
 
-    def added(self, new: Iterable[Instance], *, fixed: Collection[str] = ()) -> State:
+    def with_instances(self, new: Iterable[Instance], *, fixed: Collection[str] = ()) -> State:
         """The same with more instances, selected; those named in `fixed` are background."""
         new = tuple(new)
         document = self.document

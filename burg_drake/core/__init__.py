@@ -1,7 +1,7 @@
-"""The ground floor: what all rooms need, and nothing that needs Drake.
+"""What all rooms need: frames, documents, grasp sets, verdicts, workers; nothing needs Drake.
 
-Read `frames` and `errors` first; then `documents` and `grasps`, which the project's files are made
-of.
+Read `frames` and `errors` first; then `documents` and `grasp_set`, which the project's files are
+made of.
 """
 
 import lazy_loader

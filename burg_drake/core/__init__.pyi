@@ -109,6 +109,7 @@ from .files import (
     read_text as read_text,
     remove_unfinished as remove_unfinished,
     report_read_errors as report_read_errors,
+    report_write_errors as report_write_errors,
     require_writable as require_writable,
     short_message as short_message,
     suppress_numpy_warnings as suppress_numpy_warnings,
@@ -136,11 +137,7 @@ from .grasp_set import (
     GraspSet as GraspSet,
     GraspSetFormat as GraspSetFormat,
 )
-from .number_rows import (
-    DecimalGrid as DecimalGrid,
-    format_rows as format_rows,
-    round_to_grid as round_to_grid,
-)
+from .number_rows import format_rows as format_rows, round_to_grid as round_to_grid
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,
     format_count as format_count,
@@ -193,6 +190,7 @@ from .progress import (
 from .provenance import (
     JUDGING_PACKAGES as JUDGING_PACKAGES,
     content_hash as content_hash,
+    package_version as package_version,
     provenance_parts as provenance_parts,
     rng_from as rng_from,
     software_versions as software_versions,

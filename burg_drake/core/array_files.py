@@ -46,12 +46,12 @@ class ReadBudget:
 
     Attributes:
         path: of the file.
-        left: bytes.
+        bytes_left: the memory.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.left = MAX_ARRAY_BYTES
+        self.bytes_left = MAX_ARRAY_BYTES
 
     def require(self, where: str, nbytes: int) -> None:
         """Refuses an array that takes more than is left.
@@ -59,7 +59,7 @@ class ReadBudget:
         Raises:
             InvalidInputError: it does.
         """
-        if nbytes > self.left:
+        if nbytes > self.bytes_left:
             raise InvalidInputError(
                 f"{where} would take {_size_text(nbytes)} of memory; all arrays of a file"
                 f" together may take {_size_text(MAX_ARRAY_BYTES)}"
@@ -68,7 +68,7 @@ class ReadBudget:
     def take(self, where: str, nbytes: int) -> None:
         """The same, and counts what is not refused."""
         self.require(where, nbytes)
-        self.left -= nbytes
+        self.bytes_left -= nbytes
 
 
 @dataclass(frozen=True)
@@ -97,13 +97,12 @@ class StoredArray:
         """The data, if it is what is expected.
 
         Args:
-            kinds: allowed ones; a key of `TYPES`.
+            kinds: allowed ones, of `numpy.dtype.kind`.
             shapes: allowed ones; none for any.
 
         Raises:
             InvalidInputError: other values or another shape, or too much of either.
         """
-        # Kinds in words.
         descriptions = {
             "f": "floating-point numbers",
             "fiu": "numbers",
@@ -121,7 +120,7 @@ class StoredArray:
         self.allowance.take(self.where, self.itemsize * math.prod(self.shape))
         return self.load()
 
-    def rows(self, *shape: int) -> int:
+    def require_rows(self, *shape: int) -> int:
         """How many grasps there are if the array has a value of this shape for each.
 
         Raises:
@@ -209,7 +208,8 @@ class NpzFile:
             with self._archive.open(info) as stream:
                 return np.lib.format.read_array(stream, allow_pickle=False)
 
-        return _make_stored_array(where, shape, dtype, load, self._allowance)
+        allowance = self._allowance
+        return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)
 
 
 @contextmanager
@@ -234,7 +234,8 @@ def open_npy(path: Path) -> Iterator[StoredArray]:
             stream.seek(0)
             return np.lib.format.read_array(stream, allow_pickle=False)
 
-        yield _make_stored_array(str(path), shape, dtype, load, ReadBudget(path))
+        allowance = ReadBudget(path)
+        yield StoredArray(str(path), shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)
 
 
 def npy_shape(path: Path) -> ArrayShape | None:
@@ -270,12 +271,6 @@ def _read_header(stream: IO[bytes], where: str, size: int) -> tuple[ArrayShape, 
             f" needs {announced} bytes, but the file has {available}"
         )
     return shape, dtype
-
-
-def _make_stored_array(
-    where: str, shape: ArrayShape, dtype: np.dtype[Any], load: Any, allowance: ReadBudget
-) -> StoredArray:
-    return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)
 
 
 DEFLATE_FILTER = 1  # HDF5's number of the deflate filter.
@@ -353,15 +348,8 @@ class Hdf5File:
             values = np.asarray(data[()])
             return values if text is None else np.char.decode(values, "utf-8")
 
-        return StoredArray(
-            where,
-            data.shape,
-            kind,
-            "text" if text is not None else str(data.dtype),
-            itemsize,
-            load,
-            self._allowance,
-        )
+        type = "text" if text is not None else str(data.dtype)
+        return StoredArray(where, data.shape, kind, type, itemsize, load, self._allowance)
 
     def _free_texts(self, where: str, data: Any) -> NDArray[np.str_]:
         """Texts of any length, many of which may share the same bytes of the file."""
@@ -371,7 +359,7 @@ class Hdf5File:
         if len(data.shape) != 1:
             raise InvalidInputError(f"{where} has shape {data.shape}; expected (N,)")
         if data.chunks is None:  # no more at once than would fit if each were as long as the file
-            part = max(1, self._allowance.left // (4 * self.path.stat().st_size))
+            part = max(1, self._allowance.bytes_left // (4 * self.path.stat().st_size))
         else:
             part = max(1, len(data))
             self._allowance.require(where, _total_text_bytes(where, data))
@@ -447,12 +435,9 @@ def _inflated_chunks(where: str, data: Any, itemsize: int, above: int = 0) -> It
 
 def _require_declared_size(where: str, data: Any) -> None:
     """Refuses a dataset that unpacks to more than its size."""
-    max_ratio = 1032  # Bytes per compressed byte (zlib.net/zlib_tech.html).
-    unchecked_size = 64 << 20  # Bytes that a chunk may inflate to without a check.
     if DEFLATE_FILTER in _filters_of(where, data):
-        for _ in _inflated_chunks(
-            where, data, data.dtype.itemsize, above=unchecked_size // max_ratio
-        ):
+        # A byte inflates to at most 1032 (zlib.net/zlib_tech.html): 64 MiB are not checked.
+        for _ in _inflated_chunks(where, data, data.dtype.itemsize, above=(64 << 20) // 1032):
             pass
 
 

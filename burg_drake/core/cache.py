@@ -19,18 +19,17 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.array_files import NUMBER_KINDS, NpzFile, open_npz
+from burg_drake.core.array_files import NUMBER_KINDS, open_npz
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.files import UNFINISHED_FILE, atomic_write, report_read_errors
 from burg_drake.core.paths import expand_home
-from burg_drake.core.provenance import content_hash
+from burg_drake.core.provenance import content_hash, package_version
 
 MAX_CACHE_BYTES = 512 << 20
 """Size of the whole cache. A robot takes 0.2 to 3 MB, a scene 10 to 25 MB."""
@@ -89,8 +88,6 @@ def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
 
 def _read_entry(path: Path, made_by: str) -> Arrays | None:
     """What an entry holds; None, and a line that says why, where it cannot be used."""
-    # Seconds between updates of the modification time of an entry in use.
-    refresh_interval = 86_400.0
     try:
         mark = path.stat().st_mtime
     except OSError:
@@ -98,7 +95,10 @@ def _read_entry(path: Path, made_by: str) -> Arrays | None:
     try:
         with report_read_errors(path, "an entry of the cache"), open_npz(path) as archive:
             origin = archive.array("made_by").read("U", ()).item()
-            found = _entry_arrays(archive) if origin == made_by else None
+            names = [name for name in archive.names if name != "made_by"]
+            found = None
+            if origin == made_by:
+                found = {name: archive.array(name).read(NUMBER_KINDS) for name in names}
     except InvalidInputError as error:
         _log.warning(
             "burg-drake: %s; this was only a cached copy, so the result is computed again", error
@@ -106,7 +106,7 @@ def _read_entry(path: Path, made_by: str) -> Arrays | None:
         return None
     if found is None:
         _log_other_version(path.parent)
-    elif time.time() - mark > refresh_interval:
+    elif time.time() - mark > 86_400.0:  # once a day
         with contextlib.suppress(OSError):
             os.utime(path)
     return found
@@ -136,12 +136,6 @@ def _log_other_version(folder: Path) -> None:
     )
 
 
-def _entry_arrays(archive: NpzFile) -> Arrays:
-    return {
-        name: archive.array(name).read(NUMBER_KINDS) for name in archive.names if name != "made_by"
-    }
-
-
 def _write_entry(path: Path, arrays: Arrays, made_by: str) -> None:
     """Writes an entry, if that is possible."""
     buffer = io.BytesIO()
@@ -157,16 +151,15 @@ def _write_entry(path: Path, arrays: Arrays, made_by: str) -> None:
 
 
 def _remove_old_entries(folder: Path) -> None:
-    """Removes the entries longest unused beyond `MAX_CACHE_BYTES`, and what killed processes left."""
-    max_write_time = 3_600.0  # Seconds after which an unfinished file must be of a killed process.
+    """Removes entries beyond `MAX_CACHE_BYTES`, the longest unused first, and unfinished files."""
     entries, now = [], time.time()
     for path in folder.iterdir():
         with contextlib.suppress(OSError):  # another process has removed it
             found = path.stat()
             if path.suffix == ".npz" and not path.name.startswith("."):
                 entries.append((found.st_mtime, found.st_size, path))
-            elif UNFINISHED_FILE.fullmatch(path.name) and now - found.st_mtime > max_write_time:
-                path.unlink()
+            elif UNFINISHED_FILE.fullmatch(path.name) and now - found.st_mtime > 3_600.0:
+                path.unlink()  # of a killed process
     total = 0
     for _, size, path in sorted(entries, reverse=True):
         total += size
@@ -178,16 +171,8 @@ def _remove_old_entries(folder: Path) -> None:
 @functools.cache
 def _code_version() -> tuple[str, ...]:
     """Hash of the code, and versions of what it computes with."""
-    # Packages whose code affects cached arrays.
     rooms = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
     package = Path(__file__).parents[1]
     files = [file for room in rooms for file in sorted((package / room).rglob("*.py"))]
     code = content_hash([file.relative_to(package).as_posix() for file in files], files)
-    return code, *(_package_version(name) for name in VERSIONED_PACKAGES)
-
-
-def _package_version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:  # a Drake that was built from source has no metadata
-        return "unknown"
+    return code, *(package_version(name) for name in VERSIONED_PACKAGES)

@@ -32,13 +32,11 @@ CATEGORY_COLORS: tuple[Rgba, ...] = (
 
 def distinct_colors(count: int) -> list[Rgb]:
     """Any number of colours (red, green, blue in [0, 1]), all different."""
-    # Golden angle as a share of a turn: each new hue falls into the largest gap.
-    hue_step = 0.381966
-    first_hue = 0.56
-    # Lightness and saturation, in turn: few hues can be told apart.
+    # Hues differ by the golden angle, so that each new one falls into the largest gap. Lightness
+    # and saturation take turns, as few hues can be told apart.
     tones = ((0.56, 0.60), (0.42, 0.62), (0.68, 0.55), (0.50, 0.42))
     return [
-        colorsys.hls_to_rgb((first_hue + i * hue_step) % 1.0, *tones[i % len(tones)])
+        colorsys.hls_to_rgb((0.56 + i * 0.381966) % 1.0, *tones[i % len(tones)])
         for i in range(count)
     ]
 

@@ -15,8 +15,6 @@ from typing import Any
 from urllib.parse import quote
 
 from burg_drake.core.columns import (
-    DIMENSIONLESS,
-    TEXT_UNIT,
     Column,
     InstancesField,
     JointsField,
@@ -37,21 +35,17 @@ def _verdict_columns(kind: type[VerdictField]) -> dict[str, Column]:
 
 COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
     "Grasps": {
-        "id": Column(TEXT_UNIT, "the grasp; in results and reach tables INSTANCE-GRASP"),
-        "instance": Column(TEXT_UNIT, "the object's name in the scene"),
-        "object": Column(TEXT_UNIT, "the object's name in its library"),
+        "id": Column("", "the grasp; in results and reach tables INSTANCE-GRASP"),
+        "instance": Column("", "the object's name in the scene"),
+        "object": Column("", "the object's name in its library"),
         "width": Column("m", "distance of the contacts along the closing direction"),
         "score": Column(
-            DIMENSIONLESS,
+            "1",
             "quality of the grasp, higher is better; what it measures depends on its source",
         ),
-        "x": Column("m", "origin of the grasp frame G in the object frame O"),
-        "y": Column("m", "origin of the grasp frame G in the object frame O"),
-        "z": Column("m", "origin of the grasp frame G in the object frame O"),
-        "qw": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: real part"),
-        "qx": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: x"),
-        "qy": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: y"),
-        "qz": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: z"),
+        **dict.fromkeys("xyz", Column("m", "origin of the grasp frame G in the object frame O")),
+        "qw": Column("1", "rotation of G in O as a unit quaternion: real part"),
+        **{f"q{k}": Column("1", f"rotation of G in O as a unit quaternion: {k}") for k in "xyz"},
         "X_OG": Column(
             "m",
             "pose of G in O with all digits; in tables the upper three rows of the matrix",
@@ -61,7 +55,7 @@ COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
     "Margins and cost": {
         **_verdict_columns(MarginsField),
         "friction": Column(
-            DIMENSIONLESS,
+            "1",
             "friction coefficient of the target; empty in results of `evaluate`, which takes the"
             " library's",
         ),
@@ -72,53 +66,45 @@ COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
         **_verdict_columns(StagesField),
     },
     "Origin of a row": {
-        "seed": Column(
-            DIMENSIONLESS, "seed of the sampling; in robustness tables that of the perturbations"
-        ),
-        "engine": Column(TEXT_UNIT, "engine preset; marked if its settings were changed"),
-        "run": Column(
-            TEXT_UNIT, "short hash of everything that determines the results; hash in run.yaml"
-        ),
-        "scene": Column(TEXT_UNIT, "path of the scene, or the name of a built-in one"),
-        "scene_content": Column(TEXT_UNIT, "content hash of the scene with its objects"),
-        "station": Column(TEXT_UNIT, "path of the station, or the name of a built-in one"),
-        "station_content": Column(TEXT_UNIT, "content hash of the station with its models"),
-        "mode": Column(TEXT_UNIT, "how each grasp was judged: hand, reach or arm"),
-        "engine_settings": Column(TEXT_UNIT, "settings of the engine as NAME=VALUE, SI units"),
-        "trial_settings": Column(
-            TEXT_UNIT, "settings of the trial's phases as NAME=VALUE, SI units"
-        ),
-        "versions": Column(TEXT_UNIT, "versions of software and machine as NAME=VALUE"),
+        "seed": Column("1", "seed of the sampling; in robustness tables that of the perturbations"),
+        "engine": Column("", "engine preset; marked if its settings were changed"),
+        "run": Column("", "short hash of everything that determines the results; hash in run.yaml"),
+        "scene": Column("", "path of the scene, or the name of a built-in one"),
+        "scene_content": Column("", "content hash of the scene with its objects"),
+        "station": Column("", "path of the station, or the name of a built-in one"),
+        "station_content": Column("", "content hash of the station with its models"),
+        "mode": Column("", "how each grasp was judged: hand, reach or arm"),
+        "engine_settings": Column("", "settings of the engine as NAME=VALUE, SI units"),
+        "trial_settings": Column("", "settings of the trial's phases as NAME=VALUE, SI units"),
+        "versions": Column("", "versions of software and machine as NAME=VALUE"),
     },
     "Robustness": {
         "friction_min": Column(
-            DIMENSIONLESS,
-            (
-                "smallest friction coefficient with which the grasp lifts; 0 if it lifts with"
-                " all that were tried"
-            ),
+            "1",
+            "smallest friction coefficient with which the grasp lifts; 0 if it lifts with all that"
+            " were tried",
         ),
-        "repeats": Column(DIMENSIONLESS, "number of perturbed repeats"),
-        "lifted": Column(DIMENSIONLESS, "number of perturbed repeats that lifted"),
-        "success": Column(DIMENSIONLESS, "share of the perturbed repeats that lifted"),
-        "success_low": Column(DIMENSIONLESS, "lower end of Wilson's 95 % interval of that share"),
-        "success_high": Column(DIMENSIONLESS, "upper end of Wilson's 95 % interval of that share"),
-        "failed": Column(TEXT_UNIT, "tests that could not be simulated"),
-        "settings": Column(TEXT_UNIT, "settings of the tests as NAME=VALUE, SI units"),
+        "repeats": Column("1", "number of perturbed repeats"),
+        "lifted": Column("1", "number of perturbed repeats that lifted"),
+        "success": Column("1", "share of the perturbed repeats that lifted"),
+        "success_low": Column("1", "lower end of Wilson's 95 % interval of that share"),
+        "success_high": Column("1", "upper end of Wilson's 95 % interval of that share"),
+        "failed": Column("", "tests that could not be simulated"),
+        "settings": Column("", "settings of the tests as NAME=VALUE, SI units"),
     },
     "Analytic quality": {
         "force_closure": Column(
-            DIMENSIONLESS, "1 if the line between the contacts lies within both friction cones"
+            "1", "1 if the line between the contacts lies within both friction cones"
         ),
-        "friction_needed": Column(DIMENSIONLESS, "smallest friction coefficient for force closure"),
+        "friction_needed": Column("1", "smallest friction coefficient for force closure"),
         "antipodal_angle": Column(
             "rad", "largest angle between closing direction and inward normal"
         ),
         "slide": Column(
             "m", "distance that the object slides in the hand until it is held; inf if it never is"
         ),
-        "epsilon": Column(DIMENSIONLESS, "radius of the largest ball within the wrench space"),
-        "volume": Column(DIMENSIONLESS, "volume of the wrench space"),
+        "epsilon": Column("1", "radius of the largest ball within the wrench space"),
+        "volume": Column("1", "volume of the wrench space"),
         "load_margin": Column(
             "weights",
             "force that the grip withstands in the worst direction; below 1 the object's"
@@ -132,23 +118,19 @@ COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
         "contact_offset": Column(
             "m", "distance of the centre of mass from the line between the contacts"
         ),
-        "nearest": Column(TEXT_UNIT, "the body that the open hand is nearest to or overlaps"),
-        "screened": Column(TEXT_UNIT, "clear, or the collision of the open hand"),
-        "collides_with": Column(TEXT_UNIT, "the body that the open hand collides with"),
+        "nearest": Column("", "the body that the open hand is nearest to or overlaps"),
+        "screened": Column("", "clear, or the collision of the open hand"),
+        "collides_with": Column("", "the body that the open hand collides with"),
     },
     "From other projects": {
         "pregrasp_width": Column("m", "distance between the pads at the pregrasp"),
-        "object_in_gripper": Column(
-            DIMENSIONLESS, "label: 1 if the grasp holds its object, 0 if not"
-        ),
-        "label": Column(
-            DIMENSIONLESS, "of VGN and GIGA: 1 if the grasp holds its object, 0 if not"
-        ),
-        "scene_id": Column(TEXT_UNIT, "of VGN and GIGA: the scene of a grasp"),
+        "object_in_gripper": Column("1", "label: 1 if the grasp holds its object, 0 if not"),
+        "label": Column("1", "of VGN and GIGA: 1 if the grasp holds its object, 0 if not"),
+        "scene_id": Column("", "of VGN and GIGA: the scene of a grasp"),
         "height": Column("m", "of GraspNet-1Billion: height of the fingers"),
         "depth": Column("m", "of GraspNet-1Billion: how far the fingers reach beyond the centre"),
-        "object_id": Column(DIMENSIONLESS, "of GraspNet-1Billion: number of the object"),
-        "name": Column(TEXT_UNIT, "of Isaac Sim: the grasp's name in its file"),
+        "object_id": Column("1", "of GraspNet-1Billion: number of the object"),
+        "name": Column("", "of Isaac Sim: the grasp's name in its file"),
     },
 }
 """All columns with fixed names, by subject."""
@@ -163,33 +145,20 @@ COLUMN_FAMILIES: Mapping[str, Column] = {
     ),
     "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
     "shake_AXIS_g": Column(
-        "g", ("amplitude of an oscillation along an axis of G that the grip withstands")
+        "g", "amplitude of an oscillation along an axis of G that the grip withstands"
     ),
-    "n_OUTCOME": Column(DIMENSIONLESS, "number of perturbed repeats with this outcome"),
+    "n_OUTCOME": Column("1", "number of perturbed repeats with this outcome"),
 }
 """Columns with a variable part in their name, written in capitals."""
 
 _COLUMNS = {name: column for group in COLUMN_GROUPS.values() for name, column in group.items()}
 """All columns with fixed names."""
-_COLUMN_PATTERNS = tuple(
-    (
-        re.compile(
-            re.sub(
-                "[A-Z]{2,}",
-                lambda part: {
-                    "NAME": ".+",
-                    "NUMBER": r"\d+",
-                    "AXIS": "[+-]?[xyz]",
-                    "OUTCOME": "[a-z_]+",
-                }[part[0]],
-                name,
-            )
-        ),
-        column,
-    )
+_NAME_PARTS = {"NAME": ".+", "NUMBER": r"\d+", "AXIS": "[+-]?[xyz]", "OUTCOME": "[a-z_]+"}
+_COLUMN_PATTERNS = {
+    re.compile(re.sub("[A-Z]{2,}", lambda part: _NAME_PARTS[part[0]], name)): column
     for name, column in COLUMN_FAMILIES.items()
-)
-"""Patterns of the names of `COLUMN_FAMILIES`."""
+}
+"""Columns by the patterns of their names in `COLUMN_FAMILIES`."""
 INPUT_PREFIX = "given_"
 """Prefix of the columns of results that came with the grasps."""
 
@@ -198,13 +167,11 @@ def describe_column(name: str) -> Column | None:
     """What a column is; None of one that others have made up."""
     if name in _COLUMNS:
         return _COLUMNS[name]
-    for pattern, column in _COLUMN_PATTERNS:
+    for pattern, column in _COLUMN_PATTERNS.items():
         if pattern.fullmatch(name):
             return column
     if name.startswith(INPUT_PREFIX):
-        theirs = describe_column(name.removeprefix(INPUT_PREFIX)) or Column(
-            TEXT_UNIT, "not known here"
-        )
+        theirs = describe_column(name.removeprefix(INPUT_PREFIX)) or Column("", "not known here")
         return replace(theirs, description=f"came with the grasps: {theirs.description}")
     return None
 
@@ -218,7 +185,7 @@ def column_metadata(name: str) -> dict[str, str]:
 def display_unit(name: str) -> tuple[str, float]:
     """The unit in which people read a column, empty if it has none, and the factor to it."""
     column = describe_column(name)
-    return ("", 1.0) if column is None else column.shown
+    return ("", 1.0) if column is None else column.display_unit
 
 
 def column_title(name: str) -> str:
@@ -244,8 +211,8 @@ def format_column_value(name: str, value: float, digits: int | None = None) -> s
     """
     if math.isnan(value):
         return "-"
-    column = describe_column(name) or Column(DIMENSIONLESS, "")
-    unit, factor = column.shown
+    column = describe_column(name) or Column("1", "")
+    unit, factor = column.display_unit
     number = f"{value * factor:.{column.digits if digits is None else digits}f}"
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 

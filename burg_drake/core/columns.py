@@ -1,9 +1,8 @@
-"""Columns of tables, and the kinds of fields from which a verdict's columns are written and read."""
+"""Columns of tables, and the kinds of a verdict's fields, by which they are written and read."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final, Literal
@@ -22,8 +21,8 @@ class Column:
     """Meaning of a column, and how people read its numbers.
 
     Attributes:
-        unit: `TEXT_UNIT`, `DIMENSIONLESS`, or a unit such as m, rad, N, s; `g` is the standard gravity of
-            9.81 m/s2, and `weights` are those of the object.
+        unit: `TEXT_UNIT`, `DIMENSIONLESS`, or a unit such as m, rad, N, s; `g` is the standard
+            gravity of 9.81 m/s2, and `weights` are those of the object.
         description: what its values are, in which frame.
         own_unit: for people, where it is not the usual one of its unit, and the factor to it.
         title: what people call it in a line or the head of a table; its name if empty.
@@ -39,21 +38,13 @@ class Column:
     digits: int = 1
 
     @property
-    def shown(self) -> tuple[str, float]:
+    def display_unit(self) -> tuple[str, float]:
         """The unit in which people read it, empty if there is none, and the factor to it."""
-        # Unit for people and factor by SI unit.
-        display_units = {
-            "m": ("mm", 1e3),
-            "rad": ("°", 180 / math.pi),
-            "m2": ("mm²", 1e6),
-            "N": ("N", 1.0),
-            "s": ("s", 1.0),
-        }
-        return self.own_unit or display_units.get(self.unit, ("", 1.0))
+        usual = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi), "m2": ("mm²", 1e6)}
+        same = (self.unit if self.unit in ("N", "s") else "", 1.0)
+        return self.own_unit or usual.get(self.unit, same)
 
 
-FIELD_KIND: Final = "kind"
-"""Key in the metadata of a dataclass field."""
 VerdictPart = Literal["decided", "measured", "posture", "cost"]
 """Parts of a row that fields of a verdict lie in, from left to right; other columns stand between
 them."""
@@ -80,30 +71,36 @@ class TableShape:
         return mode_includes(self.mode, least, approach=self.approach)
 
 
-@dataclass(frozen=True, kw_only=True)
-class VerdictField(ABC):
-    """A field of a verdict: what it means and how it is written.
+@dataclass(frozen=True)
+class VerdictField:
+    """A field of a verdict, in one column of its own name: what it means and how it is written.
 
     Attributes:
+        unit, meaning: of its columns, see `Column`.
         name: of the field.
-        column: unit and meaning of its columns.
         mode: the first mode whose tables have it.
         part: of a row, in which its columns lie.
     """
 
-    name: str = ""
-    column: Column
-    mode: Least = "hand"
-    part: VerdictPart = "measured"
+    unit: str
+    meaning: str
+    name: str = field(default="", kw_only=True)
+    mode: Least = field(default="hand", kw_only=True)
+    part: VerdictPart = field(default="measured", kw_only=True)
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """For the field of a dataclass."""
+        return {"kind": self}
 
     @property
     def is_text(self) -> bool:
         """Whether its cells are texts; else they are numbers."""
         return False
 
-    @abstractmethod
     def columns(self, shape: TableShape) -> dict[str, Any]:
         """Names of its columns, with the key under which its values have their cells."""
+        return {self.name: None}
 
     def cell(self, value: Any, key: Any) -> Any:
         """The cell of a value in one of its columns; None if it has none."""
@@ -125,7 +122,7 @@ class VerdictField(ABC):
         """
         return {key: _number_or_nan(number) for key, number in data.items()}
 
-    def joined(self, values: Sequence[Any]) -> Any:
+    def merge(self, values: Sequence[Any]) -> Any:
         """What several stages found together, in their order."""
         return {key: float(number) for value in values for key, number in value.items()}
 
@@ -133,9 +130,9 @@ class VerdictField(ABC):
         """What a replay has to find again to the bit, by its name for people."""
         return {}
 
-    @abstractmethod
     def meanings(self) -> dict[str, Column]:
         """Its columns; what differs in their names is in capitals."""
+        return {self.name: Column(self.unit, self.meaning)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,13 +146,11 @@ class TextField(VerdictField):
 
     of: type[str] = str
     replayed: bool = True
+    part: VerdictPart = "decided"
 
     @property
     def is_text(self) -> bool:
         return True
-
-    def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {self.name: None}
 
     def cell(self, value: Any, key: Any) -> Any:
         return str(value)
@@ -171,14 +166,11 @@ class TextField(VerdictField):
             raise TypeError(f"{quote_value(data)} is not a text")
         return self.of(data)
 
-    def joined(self, values: Sequence[Any]) -> Any:
+    def merge(self, values: Sequence[Any]) -> Any:
         return values[-1]
 
     def compared(self, value: Any) -> dict[str, float | str]:
         return {self.name: str(value)} if self.replayed else {}
-
-    def meanings(self) -> dict[str, Column]:
-        return {self.name: self.column}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,8 +181,7 @@ class NumberField(VerdictField):
     the last one that has a number counts.
     """
 
-    def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {self.name: None}
+    part: VerdictPart = "decided"
 
     def cell(self, value: Any, key: Any) -> Any:
         return value
@@ -205,11 +196,8 @@ class NumberField(VerdictField):
     def from_json(self, data: Any) -> Any:
         return None if data is None else _require_number(data)
 
-    def joined(self, values: Sequence[Any]) -> Any:
+    def merge(self, values: Sequence[Any]) -> Any:
         return next((value for value in reversed(values) if value is not None), None)
-
-    def meanings(self) -> dict[str, Column]:
-        return {self.name: self.column}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,7 +215,7 @@ class MarginsField(VerdictField):
     def from_row(self, row: Mapping[str, Any]) -> Any:
         return {f.name: row[f.name] for f in fields(self.of) if f.name in row}
 
-    def joined(self, values: Sequence[Any]) -> Any:
+    def merge(self, values: Sequence[Any]) -> Any:
         found: dict[str, float] = {}
         for name, number in ((k, v) for margins in values for k, v in margins.items()):
             if name not in found or not math.isnan(number):
@@ -258,7 +246,7 @@ class InstancesField(VerdictField):
         return {self.prefix.replace("_", " ") + name: number for name, number in value.items()}
 
     def meanings(self) -> dict[str, Column]:
-        return {self.prefix + "NAME": self.column}
+        return {self.prefix + "NAME": Column(self.unit, self.meaning)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,6 +257,7 @@ class JointsField(VerdictField):
     """
 
     prefix: str
+    part: VerdictPart = "posture"
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
         return {f"{self.prefix}{k + 1}": k for k in range(shape.joints)}
@@ -282,11 +271,11 @@ class JointsField(VerdictField):
     def from_json(self, data: Any) -> Any:
         return tuple(map(_require_number, data))
 
-    def joined(self, values: Sequence[Any]) -> Any:
+    def merge(self, values: Sequence[Any]) -> Any:
         return next(filter(None, values), ())
 
     def meanings(self) -> dict[str, Column]:
-        return {self.prefix + "NUMBER": self.column}
+        return {self.prefix + "NUMBER": Column(self.unit, self.meaning)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -298,6 +287,7 @@ class StagesField(VerdictField):
     """
 
     times: Mapping[Stage, tuple[str, str, Mode]]
+    part: VerdictPart = "cost"
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
         return {n: stage for stage, (n, _, mode) in self.times.items() if shape.has(mode)}
@@ -309,7 +299,7 @@ class StagesField(VerdictField):
         return {Stage(stage): _require_number(seconds) for stage, seconds in data.items()}
 
     def meanings(self) -> dict[str, Column]:
-        return {name: Column(self.column.unit, says) for name, says, _ in self.times.values()}
+        return {name: Column(self.unit, says) for name, says, _ in self.times.values()}
 
 
 def margin_field(
@@ -319,21 +309,18 @@ def margin_field(
     mode: Least = "hand",
     stage: Stage = Stage.EXECUTED,
     smaller_is_better: bool = False,
-    own_unit: tuple[str, float] | None = None,
-    title: str = "",
-    axis: str = "",
-    digits: int = 1,
+    **display: Any,
 ) -> Any:
     """A margin: NaN where it was not measured.
 
     Args:
-        unit, meaning, own_unit, title, axis, digits: see `Column`.
+        unit, meaning, display: see `Column`.
         mode: the first mode in which it is measured.
         stage: the last one that measures it; `EXECUTED` of what a trial measures.
         smaller_is_better: whether a grasp is the better the smaller it is.
     """
     metadata = {
-        "column": Column(unit, meaning, own_unit, title, axis, digits),
+        "column": Column(unit, meaning, **display),
         "mode": mode,
         "stage": stage,
         "smaller_is_better": smaller_is_better,
@@ -341,56 +328,12 @@ def margin_field(
     return field(default=math.nan, metadata=metadata)
 
 
-def text_metadata(
-    meaning: str,
-    *,
-    of: type[str] = str,
-    mode: Least = "hand",
-    part: VerdictPart = "decided",
-    replayed: bool = True,
-) -> dict[str, VerdictField]:
-    """Metadata of a text; see `TextField`."""
-    column = Column(TEXT_UNIT, meaning)
-    return {FIELD_KIND: TextField(column=column, mode=mode, part=part, of=of, replayed=replayed)}
-
-
-def number_metadata(
-    unit: str, meaning: str, *, part: VerdictPart = "decided"
-) -> dict[str, VerdictField]:
-    """Metadata of a number; see `NumberField`."""
-    return {FIELD_KIND: NumberField(column=Column(unit, meaning), part=part)}
-
-
-def margins_metadata(of: type[Any]) -> dict[str, VerdictField]:
-    """Metadata of numbers by the names of margins that a dataclass declares."""
-    return {FIELD_KIND: MarginsField(column=Column(TEXT_UNIT, "continuous slack"), of=of)}
-
-
-def instances_metadata(
-    prefix: str, unit: str, meaning: str, *, mode: Least = "hand"
-) -> dict[str, VerdictField]:
-    """Metadata of numbers by instance; see `InstancesField`."""
-    return {FIELD_KIND: InstancesField(column=Column(unit, meaning), prefix=prefix, mode=mode)}
-
-
-def joints_metadata(prefix: str, unit: str, meaning: str) -> dict[str, VerdictField]:
-    """Metadata of a number for each joint; see `JointsField`."""
-    return {FIELD_KIND: JointsField(column=Column(unit, meaning), prefix=prefix, part="posture")}
-
-
-def stages_metadata(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictField]:
-    """Metadata of times by stage; see `StagesField`."""
-    return {
-        FIELD_KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")
-    }
-
-
 def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
     """The fields of a record that have a kind, in the order of their declaration."""
     return tuple(
-        replace(one.metadata[FIELD_KIND], name=one.name)
+        replace(one.metadata["kind"], name=one.name)
         for one in fields(record)
-        if FIELD_KIND in one.metadata
+        if "kind" in one.metadata
     )
 
 

@@ -27,7 +27,7 @@ DOCUMENT_KINDS = {
     "snapshot": "burg_drake.cameras.snapshot:SnapshotDocument",
     "recording": "burg_drake.cameras.recording:RecordingDocument",
     "run": "burg_drake.evaluation.run_document:RunDocument",
-    "campaign": "burg_drake.evaluation.campaign_document:CampaignDocument",
+    "campaign": "burg_drake.evaluation.run_document:CampaignDocument",
     "plans": "burg_drake.evaluation.feasibility:PlansDocument",
     "gap": "burg_drake.experiment.gap.gap_steps:GapDocument",
     "export": "burg_drake.export.scene_export:ExportRecord",

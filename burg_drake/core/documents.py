@@ -81,15 +81,20 @@ class Reader:
             if key.value == "version":
                 given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
                 if given != str(current):
-                    what = f"{shorten_text(given)} cannot be read; this release reads version {current}"
-                    raise self.fail(value, "version", what)
+                    what = f"{shorten_text(given)} cannot be read"
+                    raise self.fail(
+                        value, "version", f"{what}; this release reads version {current}"
+                    )
                 return
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
         origin = typing.get_origin(kind)
         if origin in (typing.Union, types.UnionType):
-            return self.read_optional(node, kind, where)
+            if node.tag == "tag:yaml.org,2002:null":
+                return None
+            (kind,) = (a for a in typing.get_args(kind) if a is not type(None))
+            return self.read(node, kind, where)
         if origin is typing.Literal:
             allowed = [str(a) for a in typing.get_args(kind)]
             return self.choice(node, where, dict(zip(allowed, typing.get_args(kind), strict=True)))
@@ -103,14 +108,6 @@ class Reader:
             members = {str(m.value): m for m in kind}
             return self.choice(node, where, members, ordered=True)
         return self.read_scalar(node, kind, where)
-
-    def read_optional(self, node: yaml.Node, kind: Any, where: str) -> Any:
-        options = [a for a in typing.get_args(kind) if a is not type(None)]
-        if node.tag == "tag:yaml.org,2002:null":
-            return None
-        if len(options) != 1:
-            raise TypeError(f"schema type {kind} is not supported")
-        return self.read(node, options[0], where)
 
     def choice(
         self, node: yaml.Node, where: str, options: dict[str, Any], *, ordered: bool = False
@@ -184,8 +181,6 @@ class Reader:
             raise self.fail(node, where, str(error)) from error
 
     def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
-        max_number = 1e30  # Above any useful number, in any unit.
-        max_integer = 1 << 64  # Seeds may have 64 bits.
         expected = {
             bool: "true or false",
             int: "a whole number",
@@ -206,7 +201,8 @@ class Reader:
             value = math.nan if kind is bool else kind(node.value)
         except ValueError:  # also of whole numbers of 4,300 digits
             value = math.nan
-        if abs(value) < (max_integer if kind is int else max_number):
+        # Seeds may have 64 bits; 1e30 is above any useful number, in any unit.
+        if abs(value) < (1 << 64 if kind is int else 1e30):
             return value
         if abs(value) < math.inf:
             raise self.fail(node, where, f"{quote_value(node.value)} is too large a number")
@@ -307,7 +303,8 @@ def parse_document(text: str, schema: type[T], name: str) -> T:
 
 def empty_document_message(schema: type) -> str:
     """What to say of a text without content."""
-    return f"the document is empty; expected keys {_field_names(schema)}"
+    keys = ", ".join(f.name for f in dataclasses.fields(schema))
+    return f"the document is empty; expected keys {keys}"
 
 
 def read_document(node: yaml.Node, schema: type[T], name: str) -> T:
@@ -359,9 +356,8 @@ class _Dumper(yaml.SafeDumper):
         return super().represent_sequence(tag, sequence, flow_style=scalar)
 
     def represent_scalar(self, tag: str, value: Any, style: str | None = None) -> Any:
-        # YAML reads these as spaces, or drops them, unless escaped.
-        line_breaks = frozenset("\x85\u2028\u2029")
-        breaks = isinstance(value, str) and not line_breaks.isdisjoint(value)
+        # YAML reads these line breaks as spaces, or drops them, unless escaped.
+        breaks = isinstance(value, str) and not set("\x85\u2028\u2029").isdisjoint(value)
         return super().represent_scalar(tag, value, '"' if breaks else style)
 
 
@@ -397,10 +393,6 @@ def _is_default(field: dataclasses.Field[Any], value: Any) -> bool:
     return False
 
 
-def _field_names(schema: type) -> str:
-    return ", ".join(f.name for f in dataclasses.fields(schema))
-
-
 _JSON_TYPES: dict[Any, Any] = {
     bool: "boolean",
     int: "integer",
@@ -425,8 +417,7 @@ def json_schema(kind: str) -> dict[str, Any]:
     Raises:
         UnknownNameError: there is no such kind.
     """
-    # The newest draft that all common editors support.
-    dialect = "http://json-schema.org/draft-07/schema#"
+    dialect = "http://json-schema.org/draft-07/schema#"  # the newest that editors support
     document = document_class(kind)
     parts: dict[str, Any] = {}
     body = _dataclass_schema(document, parts)
@@ -488,9 +479,8 @@ def _type_schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """The schema of a type; mappings of dataclasses are added to `parts` and referred to."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
-        return _nullable_schema(
-            _type_schema(next(a for a in arguments if a is not type(None)), parts)
-        )
+        (inner,) = (a for a in arguments if a is not type(None))
+        return _nullable_schema(_type_schema(inner, parts))
     if origin is typing.Literal:
         return {"enum": list(arguments)}
     if origin in (list, tuple):
@@ -539,11 +529,9 @@ def _field_descriptions(kind: type) -> dict[str, str]:
     found = {"version": "Version of the file format."}
     for base in reversed(kind.__mro__):
         text = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")[2]
-        for names, meaning in _ATTRIBUTE_ENTRY.findall(
-            inspect.cleandoc(re.compile(r"^[A-Z]\w+:$", re.MULTILINE).split(text)[0])
-        ):
-            sentence = re.compile(r"^[a-z]{3,}\b").sub(
-                lambda word: word[0].capitalize(), " ".join(meaning.split())
-            )
+        text = re.split(r"^[A-Z]\w+:$", text, maxsplit=1, flags=re.MULTILINE)[0]
+        for names, meaning in _ATTRIBUTE_ENTRY.findall(inspect.cleandoc(text)):
+            sentence = " ".join(meaning.split())
+            sentence = re.sub(r"^[a-z]{3,}\b", lambda word: word[0].capitalize(), sentence)
             found |= dict.fromkeys(re.split(r",\s*", names), sentence)
     return found

@@ -147,8 +147,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 def list_names(names: Sequence[str]) -> str:
     """Names for a message; of many the first few, and how many more there are."""
-    max_names = 24  # Longest list that a message has in full.
-    n_first = 9  # Names of a longer list that a message has.
-    if len(names) <= max_names:
+    if len(names) <= 24:
         return ", ".join(names) or "(none)"
-    return f"{', '.join(names[:n_first])} and {len(names) - n_first} others"
+    return f"{', '.join(names[:9])} and {len(names) - 9} others"

@@ -105,7 +105,8 @@ def open_regular(path: str | Path) -> BinaryIO:
     try:
         mode = os.stat(path).st_mode
         if stat.S_ISREG(mode):
-            return open(path, "rb", opener=_open_nonblocking)
+            # Not blocking, should it have become a pipe meanwhile.
+            return open(path, "rb", opener=lambda p, flags: os.open(p, flags | os.O_NONBLOCK))
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not a valid path"  # with NUL
         raise InvalidInputError(f"cannot read {shorten_text(str(path), 500)}: {why}") from error
@@ -113,10 +114,6 @@ def open_regular(path: str | Path) -> BinaryIO:
         raise InvalidInputError(f"cannot read {path}: it is a pipe; save it to a file first")
     kind = "a folder" if stat.S_ISDIR(mode) else "a device"
     raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
-
-
-def _open_nonblocking(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK)  # should it have become a pipe meanwhile
 
 
 def atomic_write(path: str | Path, content: str | bytes) -> None:
@@ -202,6 +199,17 @@ def ensure_writable_folder(path: str | Path) -> Path:
     return path
 
 
+@contextmanager
+def report_write_errors(path: Path) -> Iterator[None]:
+    """Raises an InvalidInputError that names the path in place of an OSError."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+
+
 def require_writable(path: str | Path) -> None:
     """Finds out whether a file can be written, before any work is spent on it; makes none.
 
@@ -210,14 +218,10 @@ def require_writable(path: str | Path) -> None:
             be.
     """
     path = Path(path)
-    try:
+    with report_write_errors(path):
         _require_regular_file(path)
         with tempfile.TemporaryFile(dir=next(p for p in path.absolute().parents if p.exists())):
             pass
-    except OSError as error:
-        raise InvalidInputError(
-            f"cannot write {path}: {error.strerror or error}; choose a writable place"
-        ) from error
 
 
 def _require_regular_file(path: Path) -> None:
@@ -247,7 +251,7 @@ class Limits:
 
 
 class FileLimits:
-    """File limits."""
+    """What files of a kind may have at most, so that reading them always ends."""
 
     # Files of people and of this project. Each value takes 0.4 kB of memory.
     document = Limits(size=16 * MIB, values=1_000_000)

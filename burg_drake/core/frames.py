@@ -121,8 +121,8 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         The poses as float array.
 
     Raises:
-        InvalidInputError: wrong shape, not finite, beyond `MAX_POSE_COORDINATE`, not a right-handed rotation,
-            or bad last row.
+        InvalidInputError: wrong shape, not finite, beyond `MAX_POSE_COORDINATE`, not a right-handed
+            rotation, or bad last row.
     """
     tolerance = 1e-6  # Largest deviation from orthonormality.
     X = np.asarray(X_AB, dtype=float)

@@ -25,10 +25,9 @@ from burg_drake.core.structured_text import parse_json
 
 def grasp_identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> NDArray[np.str_]:
     """(N,) hashes of names, poses and widths (BLAKE2b, which takes a microsecond a grasp)."""
-    n_digits = 12  # Among 100,000 grasps two share an identifier with probability 2e-5.
     numbers = np.column_stack([X_OG.reshape(-1, 16), width]).astype("<f8")
     prefixes = {
-        name: hashlib.blake2b(f"{name}\0".encode(), digest_size=n_digits // 2)
+        name: hashlib.blake2b(f"{name}\0".encode(), digest_size=6)
         for name in np.unique(object).tolist()
     }
     ids = []
@@ -36,7 +35,7 @@ def grasp_identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> ND
         digest = prefixes[name].copy()
         digest.update(row.data)
         ids.append(digest.hexdigest())
-    return np.array(ids, dtype=f"<U{n_digits}")
+    return np.array(ids, dtype="<U12")  # of 100,000 grasps two share one with probability 2e-5
 
 
 FIXED_COLUMNS = ("width", "id", "object", "score")
@@ -44,58 +43,17 @@ FIXED_COLUMNS = ("width", "id", "object", "score")
 
 
 class GraspSetFormat:
-    """Grasp set format."""
+    """What the header of a file of grasps says."""
 
     name = "burg_drake.grasps"
     version = 2
     readable_versions = (1, 2)  # Version 1 had no further columns.
-    fixed_arrays = ("X_OG", *FIXED_COLUMNS)  # Arrays that every set has.
-    text_arrays = ("id", "object")
-    column_prefix = "column:"  # Prefix of the names of further columns in `.npz`.
 
+
+COLUMN_PREFIX = "column:"
+"""Prefix of the names of further columns in `.npz`."""
 
 SetColumns = dict[str, NDArray[Any]]
-
-
-def write_grasp_arrays(
-    path: str | Path, provenance: Mapping[str, Any], fixed: SetColumns, columns: SetColumns
-) -> None:
-    """Writes a set of N grasps; see `GraspSet.save`.
-
-    Args:
-        path: ends in `.npz` or `.h5`.
-        provenance: JSON values.
-        fixed: the arrays of `GraspSetFormat.fixed_arrays`: (N, 4, 4) poses, and (N,) each of the others.
-        columns: (N,) further values by name.
-
-    Raises:
-        InvalidInputError: another suffix, or the place cannot be written to.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".npz", ".h5", ".hdf5"):
-        raise InvalidInputError(f"{path} ends in {suffix!r}; give a name that ends in .npz or .h5")
-    shareable = with_shareable_references(provenance, Path(path).absolute().parent)
-    header = {
-        "format": GraspSetFormat.name,
-        "version": GraspSetFormat.version,
-        "provenance": shareable,
-    }
-    write = _npz_bytes if suffix == ".npz" else _hdf5_bytes
-    atomic_write(path, write(header, fixed, columns))
-
-
-def read_grasp_arrays(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
-    """Provenance, fixed arrays and further columns, as `write_grasp_arrays` takes them.
-
-    Raises:
-        ValueError: or another of `core.files.READ_ERRORS`, where the file is not as it was written.
-        InvalidInputError: a file of another format or of a newer version.
-    """
-    header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
-    if not isinstance(header["provenance"], dict):
-        raise ValueError("its provenance is not a mapping")
-    provenance = with_resolved_references(header["provenance"], path.absolute().parent)
-    return provenance, fixed, columns
 
 
 def _check_header(path: Path, header: dict[str, Any]) -> None:
@@ -122,18 +80,19 @@ def _read_columns(
     for name in {*FIXED_COLUMNS, ""} & set(further):
         raise ValueError(f"it has a further column {name!r}, which must not be called that")
     poses = array("X_OG")
-    n = poses.rows(4, 4)
+    n = poses.require_rows(4, 4)
     fixed = {"X_OG": poses.read("f").astype(float)}
-    for name in GraspSetFormat.fixed_arrays[1:]:
-        values = array(name).read("U" if name in GraspSetFormat.text_arrays else "f", (n,))
-        fixed[name] = values if name in GraspSetFormat.text_arrays else values.astype(float)
+    for name in FIXED_COLUMNS:
+        is_text = name in ("id", "object")
+        values = array(name).read("U" if is_text else "f", (n,))
+        fixed[name] = values if is_text else values.astype(float)
     columns = {name: array(key).read(NUMBER_KINDS + "U", (n,)) for name, key in further.items()}
     return fixed, columns
 
 
 def _npz_bytes(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> bytes:
     buffer = io.BytesIO()
-    further = {GraspSetFormat.column_prefix + name: values for name, values in columns.items()}
+    further = {COLUMN_PREFIX + name: values for name, values in columns.items()}
     arrays: dict[str, Any] = {"header": np.array(json.dumps(header)), **fixed, **further}
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
@@ -143,20 +102,18 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
     with open_npz(path) as file:
         if "header" not in file.names:
             raise InvalidInputError(
-                f"{path} is not a grasp set: it has no array 'header', only {list_names(file.names)};"
-                " write it with GraspSet.create(X_OG, object=NAME).save(FILE), where X_OG has shape"
-                " (N, 4, 4); a plain .npy of that shape is read as poses of BURG-Toolkit"
+                f"{path} is not a grasp set: it has no array 'header', only"
+                f" {list_names(file.names)}; write it with GraspSet.create(X_OG, object=NAME)"
+                ".save(FILE), where X_OG has shape (N, 4, 4); a plain .npy of that shape is read"
+                " as poses of BURG-Toolkit"
             )
         stored = file.array("header")
         if stored.itemsize > 4 * FileLimits.document.size:
             raise ValueError("its header is too long")
         header = parse_json(str(stored.read("U", ())), f"{path}: header")
         _check_header(path, header)
-        further = {
-            n.removeprefix(GraspSetFormat.column_prefix): n
-            for n in file.names
-            if n.startswith(GraspSetFormat.column_prefix)
-        }
+        names = [name for name in file.names if name.startswith(COLUMN_PREFIX)]
+        further = {name.removeprefix(COLUMN_PREFIX): name for name in names}
         return header, *_read_columns(file.array, further)
 
 
@@ -274,9 +231,8 @@ class GraspSet:
         poses = poses.reshape(-1, 4, 4)
         n = len(poses)
         names = _copy_column("object", np.asarray(object, dtype=str), n)
-        widths = (
-            _copy_column("width", np.asarray(np.nan if width is None else width, float), n) + 0.0
-        )
+        widths = _copy_column("width", np.asarray(np.nan if width is None else width, float), n)
+        widths += 0.0  # without negative zeros
         _require_widths(widths)
         scores = _copy_column("score", np.asarray(np.nan if score is None else score, float), n)
         ids = grasp_identifiers(names, poses, widths)
@@ -347,7 +303,7 @@ class GraspSet:
         return replace(self, score=score, columns=columns)
 
     def canonical(self) -> GraspSet:
-        """The same physical grasps with fingers named alike: see `frames.canonical_fingers`.
+        """The same physical grasps with fingers named alike: see `canonical_fingers`.
 
         Identifiers change where the fingers are swapped.
         """
@@ -408,8 +364,20 @@ class GraspSet:
         Raises:
             InvalidInputError: another suffix, or the place cannot be written to.
         """
-        fixed = {name: getattr(self, name) for name in GraspSetFormat.fixed_arrays}
-        write_grasp_arrays(path, self.provenance, fixed, dict(self.columns))
+        suffix = Path(path).suffix.lower()
+        if suffix not in (".npz", ".h5", ".hdf5"):
+            raise InvalidInputError(
+                f"{path} ends in {suffix!r}; give a name that ends in .npz or .h5"
+            )
+        provenance = with_shareable_references(self.provenance, Path(path).absolute().parent)
+        header = {
+            "format": GraspSetFormat.name,
+            "version": GraspSetFormat.version,
+            "provenance": provenance,
+        }
+        fixed = {name: getattr(self, name) for name in ("X_OG", *FIXED_COLUMNS)}
+        write = _npz_bytes if suffix == ".npz" else _hdf5_bytes
+        atomic_write(path, write(header, fixed, dict(self.columns)))
 
     @classmethod
     def load(cls, path: str | Path) -> GraspSet:
@@ -420,7 +388,10 @@ class GraspSet:
         """
         path = Path(path)
         with report_read_errors(path, "a grasp set written by burg_drake"):
-            provenance, fixed, columns = read_grasp_arrays(path)
+            header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
+            if not isinstance(header["provenance"], dict):
+                raise ValueError("its provenance is not a mapping")
+            provenance = with_resolved_references(header["provenance"], path.absolute().parent)
             grasps = cls(**fixed, provenance=provenance, columns=columns)
             require_valid_grasps(grasps)
             return grasps
@@ -439,9 +410,8 @@ def require_valid_grasps(grasps: GraspSet) -> None:
     _require_widths(grasps.width)
     _, first, same = np.unique(grasps.id, return_index=True, return_inverse=True)
     twin = first[same]
-    differs = (grasps.object != grasps.object[twin]) | (grasps.X_OG[twin] != grasps.X_OG).any(
-        (1, 2)
-    )
+    differs = grasps.object != grasps.object[twin]
+    differs |= (grasps.X_OG[twin] != grasps.X_OG).any((1, 2))
     differs |= ~((grasps.width == grasps.width[twin]) | np.isnan(grasps.width))
     differs |= np.isnan(grasps.width) != np.isnan(grasps.width[twin])
     if differs.any():

@@ -67,7 +67,7 @@ class Outcome(StrEnum):
         outcome._value_, outcome.meaning = value, meaning
         return outcome
 
-    COLLISION_TARGET = "collision_target", ("at the grasp the open hand overlaps the object itself")
+    COLLISION_TARGET = "collision_target", "at the grasp the open hand overlaps the object itself"
     COLLISION_TABLE = "collision_table", "at the grasp the open hand overlaps the table"
     COLLISION_CLUTTER = "collision_clutter", "at the grasp the open hand overlaps another object"
     COLLISION_BACKGROUND = (
@@ -89,11 +89,11 @@ class Outcome(StrEnum):
     NO_IK = "no_ik", "no arm configuration reaches the grasp, even without joint limits"
     JOINT_LIMIT = (
         "joint_limit",
-        ("all arm configurations that reach the grasp are beyond a joint limit"),
+        "all arm configurations that reach the grasp are beyond a joint limit",
     )
     ARM_COLLISION = (
         "arm_collision",
-        ("the arm collides in every configuration that was found within the joint limits"),
+        "the arm collides in every configuration that was found within the joint limits",
     )
     APPROACH_LINE = (
         "approach_line",
@@ -106,7 +106,7 @@ class Outcome(StrEnum):
     ONE_FINGER = "one_finger", "the fingers stopped with only one of them at the object"
     CLOSED_EMPTY = (
         "closed_empty",
-        ("the object was touched, but slipped away while the fingers closed"),
+        "the object was touched, but slipped away while the fingers closed",
     )
     SLIPPED = "slipped", "both fingers held the object, and lost it during the lift"
     BLOCKED = "blocked", "during the motion the hand or the arm hit something fixed"
@@ -126,7 +126,7 @@ class Outcome(StrEnum):
     )
     REACHABLE = (
         "reachable",
-        ("the arm can execute the grasp; it was not simulated, as the mode did not ask for that"),
+        "the arm can execute the grasp; it was not simulated, as the mode did not ask for that",
     )
 
     @property
@@ -138,7 +138,6 @@ class Outcome(StrEnum):
     @property
     def stage(self) -> Stage:
         """The stage that decides this outcome."""
-        # The hand cannot approach or leave, or the arm cannot reach.
         reach_outcomes = (
             Outcome.HAND_COLLISION_APPROACH,
             Outcome.HAND_COLLISION_RETREAT,
@@ -147,7 +146,6 @@ class Outcome(StrEnum):
             Outcome.JOINT_LIMIT,
             Outcome.ARM_COLLISION,
         )
-        # The arm cannot move there, straight in, back and up.
         plan_outcomes = (
             Outcome.APPROACH_LINE,
             Outcome.RETREAT_LINE,
@@ -210,18 +208,10 @@ class RealOutcome(StrEnum):
     @property
     def of_arm(self) -> bool:
         """Whether only an arm ends a trial so: a run of the hand alone cannot predict it."""
-        arm_outcomes = (
-            *(
-                "no_ik",
-                "joint_limit",
-                "arm_collision",
-                "approach_line",
-                "retreat_line",
-                "lift_line",
-            ),
-            *("no_path", "protective_stop"),
+        return self.value in (
+            *("no_ik", "joint_limit", "arm_collision", "approach_line", "retreat_line"),
+            *("lift_line", "no_path", "protective_stop"),
         )
-        return self.value in arm_outcomes
 
     @property
     def attempted(self) -> bool:
@@ -237,7 +227,6 @@ class RealOutcome(StrEnum):
 
 def outcome_label(outcome: str) -> str:
     """An outcome, simulated or real, as buttons, pages and tables call it."""
-    # Labels that are not the value with spaces.
     labels = {
         "lifted_disturbed": "lifted, others moved",
         "lifted_turned": "lifted, turned",

@@ -45,10 +45,10 @@ def require_name(name: str, *place: str | int) -> None:
     Raises:
         FieldError: it is not a name.
     """
-    if not re.compile(r"(?!\.)[\w.-]+").fullmatch(name) or len(name.encode()) > MAX_NAME_BYTES:
+    if not re.fullmatch(r"(?!\.)[\w.-]+", name) or len(name.encode()) > MAX_NAME_BYTES:
         raise FieldError(
-            f"name {quote_value(name)} cannot be used in paths; give letters, digits, '_', '-' and '.',"
-            f" no '.' in front, at most {MAX_NAME_BYTES} bytes",
+            f"name {quote_value(name)} cannot be used in paths; give letters, digits, '_', '-' and"
+            f" '.', no '.' in front, at most {MAX_NAME_BYTES} bytes",
             *place,
         )
 
@@ -61,7 +61,7 @@ def require_names(names: Iterable[str], key: str) -> None:
 
 def make_name(text: str) -> str:
     """A name made of any text: `my scene (2)` becomes `my_scene_2`, and nothing `unnamed`."""
-    name = re.compile(r"[^\w.-]+").sub("_", text).lstrip(".").strip("_")
+    name = re.sub(r"[^\w.-]+", "_", text).lstrip(".").strip("_")
     return name.encode()[:MAX_NAME_BYTES].decode(errors="ignore") or "unnamed"
 
 
@@ -109,17 +109,14 @@ class Packages:
             cached = drake_models_folder()
             places.append(f"Drake's cache ({cached})" if cached else "the installed Drake")
         meant = did_you_mean(name, self.stated)
-        stating = "add the folder that it is in to ROS_PACKAGE_PATH"
+        advice = "add the folder that it is in to ROS_PACKAGE_PATH"
         if self.document is not None:
-            stating = f"name its folder by {self.key}: {{{name}: FOLDER}} in {self.document}"
-        fetching = (
-            "; or let Drake download it once, with PackageMap().GetPath('drake_models')"
-            if name == "drake_models"
-            else ""
-        )
+            advice = f"name its folder by {self.key}: {{{name}: FOLDER}} in {self.document}"
+        if name == "drake_models":
+            advice += "; or let Drake download it once, with PackageMap().GetPath('drake_models')"
         return (
             f"package {name!r} is not found in {', '.join(places)};"
-            f"{f' {meant} If not,' if meant else ''} {stating}{fetching}"
+            f"{f' {meant} If not,' if meant else ''} {advice}"
         )
 
 
@@ -160,12 +157,9 @@ def drake_models_folder() -> Path | None:
         folder = f"{manifest['sha256']}-{prefix}"
     except (InvalidInputError, ValueError, KeyError, TypeError, AttributeError):
         return None
+    cache = Path(os.environ.get("XDG_CACHE_HOME", os.path.expanduser("~/.cache")))
     if "TEST_TMPDIR" in os.environ:
-        cache = Path(os.environ["TEST_TMPDIR"]) / ".cache"
-    elif "XDG_CACHE_HOME" in os.environ:
-        cache = Path(os.environ["XDG_CACHE_HOME"])
-    else:
-        cache = Path(os.path.expanduser("~")) / ".cache"
+        cache = Path(os.environ["TEST_TMPDIR"], ".cache")
     return cache / "drake/package_map" / folder
 
 
@@ -180,9 +174,8 @@ def _package_folders(name: str, near: Path) -> Iterator[Path]:
     for path in _folders_in_variable("AMENT_PREFIX_PATH"):
         if os.path.isdir(path / "share" / name):
             yield path / "share" / name
-    own = {"drake": _drake_share_folder, "drake_models": drake_models_folder}.get(
-        name, lambda: None
-    )()
+    find_own = {"drake": _drake_share_folder, "drake_models": drake_models_folder}.get(name)
+    own = find_own() if find_own is not None else None
     if own is not None and own.is_dir():
         yield own
 
@@ -190,10 +183,9 @@ def _package_folders(name: str, near: Path) -> Iterator[Path]:
 def _search_tree(name: str, folder: Path, seen: set[str]) -> Iterator[Path]:
     """Packages of a name in a folder and in those in it; there are none in packages and in hidden
     folders."""
-    # Files by which ROS and Drake skip a folder.
-    ignore_files = ("AMENT_IGNORE", "CATKIN_IGNORE", "COLCON_IGNORE")
+    marks = ("AMENT_IGNORE", "CATKIN_IGNORE", "COLCON_IGNORE")  # by which ROS and Drake skip it
     real = os.path.realpath(folder)
-    if real in seen or any(os.path.exists(folder / mark) for mark in ignore_files):
+    if real in seen or any(os.path.exists(folder / mark) for mark in marks):
         return
     seen.add(real)
     if os.path.exists(folder / "package.xml"):
@@ -215,13 +207,15 @@ def _manifest_name(folder: Path) -> str:
     if not os.path.isfile(manifest):
         return ""
     try:
-        text = read_bytes(manifest, FileLimits.document.size).decode(errors="replace")
+        found = re.search(r"<name>\s*([^<]*?)\s*</name>", _read_without_comments(manifest))
     except InvalidInputError:
         return ""
-    found = re.compile(r"<name>\s*([^<]*?)\s*</name>").search(
-        re.compile(r"<!--.*?-->", re.DOTALL).sub("", text)
-    )
     return found[1] if found else ""
+
+
+def _read_without_comments(file: Path) -> str:
+    text = read_bytes(file, FileLimits.document.size).decode(errors="replace")
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
 
 
 def _folders_in_variable(variable: str) -> list[Path]:
@@ -280,7 +274,6 @@ def resolve_reference(
             where the package was looked for.
         InvalidInputError: it is a pipe.
     """
-    # What a message calls one entry of each kind.
     words = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
     text = str(reference)
     if text.startswith(PACKAGE_URI):
@@ -332,9 +325,8 @@ def builtin_names(kind: str) -> list[str]:
 def portable_reference(path: Path, folder: Path) -> str:
     """How a document in `folder` refers to a file or folder: package:// for what the package
     ships, else the relative path."""
-    installed_folders = ("models", "scenes", "stations")  # Folders that the package installs.
     path = path.resolve()
-    for name in installed_folders:
+    for name in ("models", "scenes", "stations"):  # what the package installs
         shipped = data_root() / name
         if path.is_relative_to(shipped):
             return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
@@ -356,11 +348,12 @@ def shareable_reference(path: Path, folder: Path) -> str:
 
 
 def with_shareable_references(values: Any, folder: Path) -> Any:
-    """JSON values whose absolute paths, under `KEYS`, are those of `shareable_reference`."""
-    return _map_paths(
-        values,
-        lambda text: shareable_reference(Path(text), folder) if os.path.isabs(text) else text,
-    )
+    """JSON values of a provenance, whose absolute paths are those of `shareable_reference`."""
+
+    def change(text: str) -> str:
+        return shareable_reference(Path(text), folder) if os.path.isabs(text) else text
+
+    return _map_paths(values, change)
 
 
 def with_resolved_references(values: Any, folder: Path) -> Any:
@@ -370,7 +363,14 @@ def with_resolved_references(values: Any, folder: Path) -> Any:
         values: of a document in `folder`.
         folder: the folder.
     """
-    return _map_paths(values, lambda text: _resolve_if_present(text, folder))
+
+    def change(text: str) -> str:
+        try:
+            return str(resolve_reference(text, base=folder.resolve())) if text else text
+        except (UnknownNameError, OSError, ValueError, RuntimeError):
+            return text
+
+    return _map_paths(values, change)
 
 
 def is_resolved(reference: str, *kinds: str) -> bool:
@@ -379,33 +379,24 @@ def is_resolved(reference: str, *kinds: str) -> bool:
 
     Args:
         reference: from a provenance.
-        kinds: of what may be built in, as `resources.builtin_names` has them.
+        kinds: of what may be built in, see `builtin_names`.
     """
     if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):
         return True
     return any(reference in builtin_names(kind) for kind in kinds)
 
 
-def _resolve_if_present(text: str, folder: Path) -> str:
-    try:
-        return str(resolve_reference(text, base=folder.resolve())) if text else text
-    except (UnknownNameError, OSError, ValueError, RuntimeError):
-        return text
-
-
 def _map_paths(values: Any, change: Any) -> Any:
-    # Keys of a provenance whose values are paths.
-    path_keys = frozenset({"scene", "library", "station", "run", "document", "file"})
-    if isinstance(values, Mapping):
-        return {
-            key: change(value)
-            if key in path_keys and isinstance(value, str)
-            else _map_paths(value, change)
-            for key, value in values.items()
-        }
+    path_keys = ("scene", "library", "station", "run", "document", "file")
     if isinstance(values, list):
         return [_map_paths(value, change) for value in values]
-    return values
+    if not isinstance(values, Mapping):
+        return values
+    changed = {}
+    for key, value in values.items():
+        is_path = key in path_keys and isinstance(value, str)
+        changed[key] = change(value) if is_path else _map_paths(value, change)
+    return changed
 
 
 def referenced_files(model: Path, packages: Packages) -> list[Path]:
@@ -416,9 +407,8 @@ def referenced_files(model: Path, packages: Packages) -> list[Path]:
         model: an SDF or URDF file.
         packages: where packages are looked for.
     """
-    return [
-        file for file in dict.fromkeys(_walk_references(model, packages, {model})) if file.is_file()
-    ]
+    found = dict.fromkeys(_walk_references(model, packages, {model}))
+    return [file for file in found if file.is_file()]
 
 
 def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
@@ -430,10 +420,8 @@ def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
     if not may_reference_packages(model):
         return {}  # as most, of which some name many files
     found: dict[str, Path] = {}
-    for file in (
-        model,
-        *(f for f in referenced_files(model, packages) if f.suffix in (".sdf", ".urdf")),
-    ):
+    named = [f for f in referenced_files(model, packages) if f.suffix in (".sdf", ".urdf")]
+    for file in (model, *named):
         for reference in _read_references(file):
             parts = PACKAGE_REFERENCE.fullmatch(reference)
             if parts is None or parts[1] in (*found, "burg_drake"):
@@ -447,10 +435,8 @@ def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
 
 def may_reference_packages(model: Path) -> bool:
     """Whether a model may name files of packages, or other models."""
-    # Every model that names packages or other models has one of these.
-    marks = (b"package://", b"model://", b"<include")
     text = read_bytes(model, FileLimits.document.size)
-    return any(mark in text for mark in marks)
+    return any(mark in text for mark in (b"package://", b"model://", b"<include"))
 
 
 def _walk_references(model: Path, packages: Packages, seen: set[Path]) -> Iterator[Path]:
@@ -471,14 +457,6 @@ def _walk_references(model: Path, packages: Packages, seen: set[Path]) -> Iterat
 
 def _read_references(model: Path) -> list[str]:
     """What stands for files in a model, each once."""
-    text = re.compile(r"<!--.*?-->", re.DOTALL).sub(
-        "", read_bytes(model, FileLimits.document.size).decode(errors="replace")
-    )
-    return list(
-        dict.fromkeys(
-            uri or name
-            for uri, name in re.compile(
-                r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']"""
-            ).findall(text)
-        )
-    )
+    pattern = r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']"""
+    found = re.findall(pattern, _read_without_comments(model))
+    return list(dict.fromkeys(uri or name for uri, name in found))

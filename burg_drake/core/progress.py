@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from types import TracebackType
 from typing import Any
 
 from burg_drake.core.number_text import format_number
@@ -110,7 +109,7 @@ class ProgressMeter:
         """
         if self._started is None:
             self._work = None if self._work is None else self._work - work
-            self._begin(count, outcome, note)
+            self._restart_clock(count, outcome, note)
             return
         self._worked += work
         elapsed, left = self._clock() - self._started, self._event.left
@@ -119,22 +118,22 @@ class ProgressMeter:
         elif self._worked > 0.0:
             left = (self._work / self._worked - 1.0) * elapsed
         self._event = replace(self._event, elapsed=elapsed, left=left)
-        self._take(count, outcome, note)
+        self._add_results(count, outcome, note)
 
     def skip(self, count: float = 1, *, note: str = "") -> None:
         """Takes results that cost nothing: the pace is that of the others, from now on."""
-        self._begin(count, None, note)
+        self._restart_clock(count, None, note)
 
     def expect(self, total: float) -> None:
         """Says how many results there are in all, where that has become known better."""
         self._event = replace(self._event, total=total)
 
-    def _begin(self, count: float, outcome: Outcome | None, note: str) -> None:
+    def _restart_clock(self, count: float, outcome: Outcome | None, note: str) -> None:
         self._started = self._clock()
         self._event = replace(self._event, before=self._event.done + count, elapsed=0.0)
-        self._take(count, outcome, note)
+        self._add_results(count, outcome, note)
 
-    def _take(self, count: float, outcome: Outcome | None, note: str) -> None:
+    def _add_results(self, count: float, outcome: Outcome | None, note: str) -> None:
         done, outcomes = self._event.done + count, self._event.outcomes
         if outcome is not None and outcomes is not None:
             outcomes[outcome] += 1
@@ -162,12 +161,7 @@ class Reporter(AbstractContextManager["Reporter"]):
         """Takes an event."""
         self._show(event)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._close()
 
 
@@ -216,8 +210,7 @@ class _LogLines:
         self._forecast = self._any_shown = False
 
     def show(self, event: Progress) -> None:
-        line_interval = 30.0  # Seconds between lines in a log file.
-        min_elapsed = 5.0  # Seconds after which the remaining time is shown.
+        min_elapsed = 5.0  # seconds after which the remaining time is shown
         now = self._clock()
         known = event.remaining is not None and (
             event.left is not None or event.elapsed >= min_elapsed
@@ -228,7 +221,7 @@ class _LogLines:
             return
         shown_forecast = self._forecast and not new
         finished = 0 < event.total == event.done
-        if new or finished or (known and not shown_forecast) or now - self._last >= line_interval:
+        if new or finished or (known and not shown_forecast) or now - self._last >= 30.0:
             self._phase, self._last = event.phase, now
             self._any_shown = self._any_shown or not starting
             self._forecast = shown_forecast or known

@@ -81,16 +81,20 @@ def software_versions(
     """
     own = sys.modules["burg_drake"]  # not imported: type checkers would see a circle of all faces
     found = {"burg_drake": str(own.__version__)}
-    found |= {name: _installed_version(package) for name, package in packages.items()}
+    found |= {name: package_version(package) for name, package in packages.items()}
     found["python"] = platform.python_version()
     return found | {"platform": platform.platform()} if with_platform else found
 
 
-def _installed_version(package: str) -> str:
+def package_version(package: str, missing: str = "unknown") -> str:
+    """The installed version of a package; `missing` if it has no metadata.
+
+    A Drake that was built from source, for example, has none.
+    """
     try:
         return version(package)
-    except PackageNotFoundError:  # built from source, or from another package or the system
-        return "unknown"
+    except PackageNotFoundError:
+        return missing
 
 
 def provenance_parts(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:

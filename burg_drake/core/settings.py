@@ -39,7 +39,7 @@ MAX_DOCUMENT_SEED = (1 << 64) - 1
 
 
 class Units:
-    """Units."""
+    """Units that people give, where fields have metres, radians and shares."""
 
     millimetres = DisplayUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
     # As in files of motions and gaps: differs from the product in the last digit.

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core.arrays import Array
-
 Z_95 = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
 
@@ -52,19 +50,9 @@ def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple
     low, high = wilson_interval(int(k.sum()), int(whole))
     if len(n) < 2:
         return low, high
-    share = float(k.sum()) / whole
-    half = _student_quantile(len(n) - 1) * _ratio_standard_error(k, n, share)
-    return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
-
-
-def _ratio_standard_error(k: Array, n: Array, share: float) -> float:
-    """Standard error of a ratio of totals over clusters."""
-    clusters = len(n)
-    spread = float(((k - share * n) ** 2).sum()) * clusters / (clusters - 1)
-    return math.sqrt(spread) / float(n.sum())
-
-
-def _student_quantile(freedom: int) -> float:
     from scipy.special import stdtrit
 
-    return float(stdtrit(freedom, 0.975))
+    share = float(k.sum()) / whole
+    spread = float(((k - share * n) ** 2).sum()) * len(n) / (len(n) - 1)
+    half = float(stdtrit(len(n) - 1, 0.975)) * (math.sqrt(spread) / whole)
+    return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))

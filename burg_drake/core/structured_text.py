@@ -26,14 +26,8 @@ YamlEvent = Any
 """Of PyYAML, whose kinds of event have different attributes."""
 
 STANDARD_TAGS = frozenset(
-    {
-        "!",
-        *(
-            f"tag:yaml.org,2002:{kind}"
-            for kind in ("str", "int", "float", "bool", "null", "map", "seq")
-        ),
-    }
-)
+    f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "bool", "null", "map", "seq")
+) | {"!"}
 """Tags of YAML's own scalar and collection types."""
 
 
@@ -90,31 +84,32 @@ def checked_yaml_events(
             what = f"more than {limits.values:,} values; an alias counts as all that it refers to"
             raise _event_error(name, event, what)
         if getattr(event, "tag", None) is not None and event.tag not in tags:
-            raise _event_error(
-                name, event, f"tag {quote_value(event.tag)} is not supported; leave it out"
-            )
+            what = f"tag {quote_value(event.tag)} is not supported; leave it out"
+            raise _event_error(name, event, what)
         yield event
 
 
 def _parse_events(text: str, name: str, limits: Limits) -> Iterator[YamlEvent]:
     max_directives = 8  # LibYAML compares each %TAG directive with all before it.
-    # LibYAML's message (from 0.2.6 on) for more than 1,000 levels.
-    depth_problem = "exceeded maximum nesting depth"
     if text.count("%TAG") > max_directives:
         raise DocumentError(f"{name}: more than {max_directives} %TAG directives; leave them out")
     try:
         yield from yaml.parse(text, Loader=YAML_LOADER)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        if problem == depth_problem:
-            raise DocumentError(f"{name}{line}: {_depth_message(limits)}") from error
-        raise DocumentError(f"{name}{line}: not valid YAML: {problem}") from error
+        what = f"not valid YAML: {problem}"
+        if problem == "exceeded maximum nesting depth":  # LibYAML's, of more than 1,000 levels
+            what = _depth_message(limits)
+        raise DocumentError(f"{name}{_problem_line(error)}: {what}") from error
 
 
 def _depth_message(limits: Limits) -> str:
     return f"nested more than {limits.depth} levels deep"
+
+
+def _problem_line(error: yaml.YAMLError) -> str:
+    mark = getattr(error, "problem_mark", None)
+    return f":{mark.line + 1}" if mark else ""
 
 
 def _event_error(name: str, event: YamlEvent, what: str) -> DocumentError:
@@ -143,16 +138,12 @@ def parse_yaml_node(text: str, name: str, empty: str = "the document is empty") 
     for event in checked_yaml_events(text, name):
         starts += isinstance(event, yaml.DocumentStartEvent)
         if starts > 1:
-            line = event.start_mark.line + 1
-            raise DocumentError(f"{name}:{line}: not valid YAML: a second document begins")
+            raise _event_error(name, event, "not valid YAML: a second document begins")
     try:
         node = yaml.compose(text, Loader=YAML_LOADER)
     except yaml.YAMLError as error:  # that only composing finds: the same anchor twice
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
-        raise DocumentError(
-            f"{name}{line}: not valid YAML: {str(error).splitlines()[0]}"
-        ) from error
+        what = f"not valid YAML: {str(error).splitlines()[0]}"
+        raise DocumentError(f"{name}{_problem_line(error)}: {what}") from error
     if node is None:
         raise DocumentError(f"{name}: {empty}")
     return node
@@ -169,9 +160,8 @@ def load_plain_yaml(path: str | Path) -> Tree:
         DocumentError: it cannot be read, is not YAML, is beyond the limits or is empty, or a
             mapping has a key twice; the message names file and line.
     """
-    return parse_plain_yaml(
-        read_text(path, FileLimits.grasp_file), str(path), FileLimits.grasp_file
-    )
+    limits = FileLimits.grasp_file
+    return parse_plain_yaml(read_text(path, limits), str(path), limits)
 
 
 def parse_plain_yaml(
@@ -212,13 +202,11 @@ def _build_tree(
         result = {}
         while type(item := next(events)) is not yaml.MappingEndEvent:
             key = _build_tree(item, events, anchors, name)
-            line = item.start_mark.line + 1
             if not isinstance(key, str):
-                raise DocumentError(f"{name}:{line}: a key is a list or a mapping; expected a name")
+                raise _event_error(name, item, "a key is a list or a mapping; expected a name")
             if key in result:
-                raise DocumentError(
-                    f"{name}:{line}: {quote_value(key)} appears twice in the same mapping"
-                )
+                what = f"{quote_value(key)} appears twice in the same mapping"
+                raise _event_error(name, item, what)
             result[key] = _build_tree(next(events), events, anchors, name)
     if event.anchor is not None:
         anchors[event.anchor] = result
@@ -253,8 +241,8 @@ def parse_json(text: str, name: str, limits: Limits = FileLimits.document) -> An
         if len(digits) > MAX_INTEGER_DIGITS:
             line = text.count("\n", 0, text.find(digits)) + 1
             raise DocumentError(
-                f"{name}:{line}: {quote_value(digits)} has more digits than the {MAX_INTEGER_DIGITS} that a whole"
-                " number may have"
+                f"{name}:{line}: {quote_value(digits)} has more digits than the"
+                f" {MAX_INTEGER_DIGITS} that a whole number may have"
             )
         return int(digits)
 
@@ -282,4 +270,4 @@ def _check_size_and_depth(text: str, name: str, limits: Limits) -> None:
     steps = _DEPTH_CHANGE[structure]
     depth = np.cumsum(steps[steps != 0], dtype=np.int64)
     if depth.max(initial=0) > limits.depth:
-        raise DocumentError(f"{name}: nested more than {limits.depth} levels deep")
+        raise DocumentError(f"{name}: {_depth_message(limits)}")

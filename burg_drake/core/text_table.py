@@ -68,15 +68,15 @@ class TextTable:
     @property
     def width(self) -> int:
         """Characters that a line needs if nothing is shortened or wrapped."""
-        return sum(self._natural(range(len(self._heads)))) + 2 * (len(self._heads) - 1)
+        return sum(self._natural_widths(range(len(self._heads)))) + 2 * (len(self._heads) - 1)
 
     def lines(self, width: int) -> list[tuple[str, bool]]:
         """The lines, none wider than `width` unless a number alone is, and whether each is bold."""
         lines = [(line, False) for line in _wrap_text(self.title, width)]
-        for block in self._blocks(width):
+        for block in self._split_into_blocks(width):
             if lines:
                 lines.append(("", False))
-            lines += self._block(block, width)
+            lines += self._block_lines(block, width)
         if self.caption:
             lines.append(("", False))
             lines += [(line, False) for line in _wrap_text(self.caption, width)]
@@ -108,7 +108,7 @@ class TextTable:
     def _cells(self, column: int) -> list[str]:
         return [row.cells[column] for row in self._rows if row.cells]
 
-    def _natural(self, columns: Iterable[int], *, broken: bool = False) -> list[int]:
+    def _natural_widths(self, columns: Iterable[int], *, broken: bool = False) -> list[int]:
         """Width of columns if nothing is cut; heads may break at blanks."""
         heads = ["\n".join(self._heads[c].split()) if broken else self._heads[c] for c in columns]
         return [
@@ -116,21 +116,21 @@ class TextTable:
             for c, head in zip(columns, heads, strict=True)
         ]
 
-    def _least(self, columns: Iterable[int]) -> list[int]:
+    def _minimum_widths(self, columns: Iterable[int]) -> list[int]:
         # Characters; only shorter names and texts get narrower.
         min_widths = {"name": 16, "text": 20}
-        wide = self._natural(columns, broken=True)
+        wide = self._natural_widths(columns, broken=True)
         return [
             min(natural, min_widths.get(self._kinds[c], natural))
             for c, natural in zip(columns, wide, strict=True)
         ]
 
-    def _blocks(self, width: int) -> list[list[int]]:
+    def _split_into_blocks(self, width: int) -> list[list[int]]:
         """Columns that fit side by side; the first one is in every block."""
         everything = list(range(len(self._heads)))
         blocks = [everything[:1]]
         for column in everything[1:]:
-            least = self._least([*blocks[-1], column])
+            least = self._minimum_widths([*blocks[-1], column])
             if sum(least) + len(least) - 1 > width and len(blocks[-1]) > 1:
                 blocks.append(everything[:1])
             blocks[-1].append(column)
@@ -141,10 +141,10 @@ class TextTable:
         everything whole, broken heads, narrow gaps, and the widest names and texts shortened."""
         wide: list[int] = []
         for broken, gap in ((False, 2), (True, 2), (True, 1)):
-            wide = self._natural(columns, broken=broken)
+            wide = self._natural_widths(columns, broken=broken)
             if sum(wide) + gap * (len(wide) - 1) <= width:
                 return wide, gap
-        least = self._least(columns)
+        least = self._minimum_widths(columns)
         while sum(wide) + len(wide) - 1 > width:
             widest = max(range(len(wide)), key=lambda k: (wide[k] > least[k], wide[k]))
             if wide[widest] == least[widest]:
@@ -152,10 +152,10 @@ class TextTable:
             wide[widest] -= 1
         return wide, 1
 
-    def _block(self, columns: Sequence[int], width: int) -> list[tuple[str, bool]]:
+    def _block_lines(self, columns: Sequence[int], width: int) -> list[tuple[str, bool]]:
         wide, gap = self._widths(columns, width)
         heads = [_wrap_heading(self._heads[c], w) for c, w in zip(columns, wide, strict=True)]
-        fitted = [self._fitted(c, w) for c, w in zip(columns, wide, strict=True)]
+        fitted = [self._fit_cells(c, w) for c, w in zip(columns, wide, strict=True)]
         right = [self._kinds[c] == "number" for c in columns]
 
         def joined(cells: Sequence[Sequence[str]], *, below: bool) -> list[str]:
@@ -181,7 +181,7 @@ class TextTable:
             lines += [(x, row.bold) for x in joined(cells, below=False)] if cells else [("", False)]
         return lines
 
-    def _fitted(self, column: int, width: int) -> dict[str, list[str]]:
+    def _fit_cells(self, column: int, width: int) -> dict[str, list[str]]:
         """The lines of each cell of a column."""
         cells = dict.fromkeys(self._cells(column))
         if self._kinds[column] == "number":

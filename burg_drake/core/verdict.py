@@ -10,16 +10,15 @@ from typing import Any
 from burg_drake.core.columns import (
     DIMENSIONLESS,
     InstancesField,
+    JointsField,
+    MarginsField,
+    NumberField,
+    StagesField,
     TableShape,
+    TextField,
     VerdictField,
     VerdictPart,
-    instances_metadata,
-    joints_metadata,
     margin_field,
-    margins_metadata,
-    number_metadata,
-    stages_metadata,
-    text_metadata,
     verdict_fields,
 )
 from burg_drake.core.outcomes import Mode, Outcome, Stage
@@ -187,57 +186,64 @@ class TrialFindings:
             or where the trial began at the grasp.
     """
 
-    blocker: str = field(default="", metadata=text_metadata("the body that was in the way"))
+    blocker: str = field(
+        default="", metadata=TextField("", "the body that was in the way").metadata
+    )
     reason: str = field(
         default="",
-        metadata=text_metadata(
-            "why there is no outcome, or no plan: the message of what failed", replayed=False
-        ),
+        metadata=TextField(
+            "", "why there is no outcome, or no plan: the message of what failed", replayed=False
+        ).metadata,
     )
     margins: Margins | Mapping[str, float] = field(
-        default_factory=dict, metadata=margins_metadata(Margins)
+        default_factory=dict, metadata=MarginsField("", "continuous slack", of=Margins).metadata
     )
     confidence: float | None = field(
         default=None,
-        metadata=number_metadata(
+        metadata=NumberField(
             DIMENSIONLESS,
             "probability that the same grasp, slightly perturbed, is held again or lost again",
-        ),
+        ).metadata,
     )
     displacements: Mapping[str, float] = field(
         default_factory=dict,
-        metadata=instances_metadata(
-            "moved_", "m", "largest displacement of an object, of the point that moved farthest"
-        ),
+        metadata=InstancesField(
+            "m",
+            "largest displacement of an object, of the point that moved farthest",
+            prefix="moved_",
+        ).metadata,
     )
     turned: Mapping[str, float] = field(
         default_factory=dict,
-        metadata=instances_metadata(
-            "turned_", "rad", "largest rotation of an object from how it stood"
-        ),
+        metadata=InstancesField(
+            "rad", "largest rotation of an object from how it stood", prefix="turned_"
+        ).metadata,
     )
     toppled: str = field(
         default="",
-        metadata=text_metadata(
-            "the other objects that lie at the end and stood before, as NAME, NAME", part="measured"
-        ),
+        metadata=TextField(
+            "",
+            "the other objects that lie at the end and stood before, as NAME, NAME",
+            part="measured",
+        ).metadata,
     )
     pushed: Mapping[str, float] = field(
         default_factory=dict,
-        metadata=instances_metadata(
-            "pushed_",
+        metadata=InstancesField(
             "m",
             "displacement of an object before the hand closed, of the point that moved farthest",
+            prefix="pushed_",
             mode="approach",
-        ),
+        ).metadata,
     )
     touched: str = field(
         default="",
-        metadata=text_metadata(
+        metadata=TextField(
+            "",
             "first unplanned contact of the arm or hand, as LINK vs BODY",
             mode="approach",
             part="measured",
-        ),
+        ).metadata,
     )
 
     def of_trial(self) -> dict[str, Any]:
@@ -254,18 +260,20 @@ class Findings(TrialFindings):
         q_grasp, q_pregrasp: positions of the arm's joints [rad]; empty if none were found.
     """
 
-    margins: Mapping[str, float] = field(default_factory=dict, metadata=margins_metadata(Margins))
+    margins: Mapping[str, float] = field(
+        default_factory=dict, metadata=MarginsField("", "continuous slack", of=Margins).metadata
+    )
     q_grasp: tuple[float, ...] = field(
         default=(),
-        metadata=joints_metadata(
-            "q_grasp_", "rad", "position of a joint of the arm at the grasp, from 1"
-        ),
+        metadata=JointsField(
+            "rad", "position of a joint of the arm at the grasp, from 1", prefix="q_grasp_"
+        ).metadata,
     )
     q_pregrasp: tuple[float, ...] = field(
         default=(),
-        metadata=joints_metadata(
-            "q_pregrasp_", "rad", "position of a joint of the arm at the pregrasp, from 1"
-        ),
+        metadata=JointsField(
+            "rad", "position of a joint of the arm at the pregrasp, from 1", prefix="q_pregrasp_"
+        ).metadata,
     )
 
 
@@ -301,26 +309,30 @@ class Verdict(Findings):
             another try may give an answer.
     """
 
-    outcome: Outcome = field(metadata=text_metadata("how the grasp ended", of=Outcome))
+    outcome: Outcome = field(metadata=TextField("", "how the grasp ended", of=Outcome).metadata)
     stage: Stage = field(
-        metadata=text_metadata("the stage that decided the outcome", of=Stage, replayed=False)
+        metadata=TextField(
+            "", "the stage that decided the outcome", of=Stage, replayed=False
+        ).metadata
     )
     judged_again: str = field(
         default="",
-        metadata=text_metadata(
-            "the engine that gave the verdict, if not the run's", replayed=False
-        ),
+        metadata=TextField(
+            "", "the engine that gave the verdict, if not the run's", replayed=False
+        ).metadata,
         kw_only=True,
     )
     outcome_before: str = field(
         default="",
-        metadata=text_metadata(
-            "the outcome by the run's engine, where another judged", replayed=False
-        ),
+        metadata=TextField(
+            "", "the outcome by the run's engine, where another judged", replayed=False
+        ).metadata,
         kw_only=True,
     )
     cpu: Mapping[Stage, float] = field(
-        default_factory=dict, metadata=stages_metadata(CPU_TIME_COLUMNS), kw_only=True
+        default_factory=dict,
+        metadata=StagesField("s", "CPU time of a stage", times=CPU_TIME_COLUMNS).metadata,
+        kw_only=True,
     )
     interrupted: bool = field(default=False, kw_only=True)
 
@@ -344,7 +356,7 @@ class Verdict(Findings):
 
 
 class RecordedFields:
-    """Recorded fields."""
+    """Fields of a verdict that are written, by who finds them."""
 
     trial = verdict_fields(TrialFindings)  # Findings of a trial.
     stages = verdict_fields(Findings)  # Findings of the stages of a judge.
@@ -355,7 +367,7 @@ class RecordedFields:
 
 
 class MarginNames:
-    """Margin names."""
+    """Names of the margins, by what they have in common."""
 
     all = tuple(one.name for one in fields(Margins))  # In the order of tables.
     # Names of the margins of which a smaller one is better.
@@ -396,8 +408,7 @@ def display_order(
 
 
 def merge_findings(stages: Sequence[Findings]) -> dict[str, Any]:
-    """What several stages found together, by field; see `VerdictField.joined`."""
+    """What several stages found together, by field; see `VerdictField.merge`."""
     return {
-        one.name: one.joined([getattr(s, one.name) for s in stages])
-        for one in RecordedFields.stages
+        one.name: one.merge([getattr(s, one.name) for s in stages]) for one in RecordedFields.stages
     }

@@ -44,9 +44,7 @@ def is_local_host(name: str, served: str) -> bool:
         name: the header.
         served: the address that is listened on.
     """
-    match = re.compile(r"(?P<name>[^\s@/?#\[\]:]+|\[[0-9a-fA-F:.]+\])(:[0-9]{1,5})?").fullmatch(
-        name
-    )
+    match = re.fullmatch(r"(?P<name>[^\s@/?#\[\]:]+|\[[0-9a-fA-F:.]+\])(:[0-9]{1,5})?", name)
     if match is None:
         return False
     host = match["name"].strip("[]").lower()

@@ -79,7 +79,7 @@ class Session:
         limit: what building may take; any time if None.
         attempts: so many workers in a row that die while they build it end the session.
         error: why it cannot be built; its tasks fail then.
-        false_starts: workers in a row that died while they built it.
+        failed_builds: workers in a row that died while they built it.
         pickled: `build`.
     """
 
@@ -88,7 +88,7 @@ class Session:
     limit: TimeLimit | None = None
     attempts: int = 2
     error: BaseException | None = field(default=None, init=False)
-    false_starts: int = field(default=0, init=False)
+    failed_builds: int = field(default=0, init=False)
     pickled: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -81,29 +81,29 @@ class Worker:
 
     Attributes:
         number: of the worker in its pool.
-        kept: sessions that it keeps at most.
+        max_sessions: sessions that it keeps at most.
         own_group: whether the process leads a group of processes, so that what it starts ends
             with it.
         process, connection: the process and our end of the pipe, if there is one.
         sessions: keys of those that it has built; used last comes last.
         opening: what it builds.
         tasks: what it is at, and has waiting.
-        suspect: a task that ended the process before this one, to be tried again alone.
-        own: work for this worker alone.
+        retry_task: a task that ended the process before this one, to be tried again alone.
+        own_batches: work for this worker alone.
         reason: why the process is about to end, in its words.
         is_fresh: whether the process was given nothing yet.
     """
 
     number: int
-    kept: int
+    max_sessions: int
     own_group: bool
     process: subprocess.Popen[bytes] | None = None
     connection: Connection | None = None
     sessions: dict[str, None] = field(default_factory=dict)
     opening: Session | None = None
     tasks: Batch = field(default_factory=deque)
-    suspect: PendingTask | None = None
-    own: deque[Batch] = field(default_factory=deque)
+    retry_task: PendingTask | None = None
+    own_batches: deque[Batch] = field(default_factory=deque)
     reason: str = ""
     is_fresh: bool = True
 
@@ -114,8 +114,8 @@ class Worker:
 
     def started(self) -> list[PendingTask]:
         """Tasks that were given to this worker, in the order in which it does them."""
-        suspect = [] if self.suspect is None else [self.suspect]
-        return [*self.tasks, *suspect, *itertools.chain.from_iterable(self.own)]
+        suspect = [] if self.retry_task is None else [self.retry_task]
+        return [*self.tasks, *suspect, *itertools.chain.from_iterable(self.own_batches)]
 
     def start(self) -> None:
         """Starts the process if there is none.
@@ -123,9 +123,8 @@ class Worker:
         Raises:
             OSError: it cannot be started.
         """
-        worker_module = "burg_drake.core.worker"
         if self.process is None:
-            self.process, self.connection = start_worker(worker_module, self.own_group)
+            self.process, self.connection = start_worker("burg_drake.core.worker", self.own_group)
 
     def give(self, batch: Batch, calls: tuple[TaskCall, ...]) -> bool:
         """Sends it tasks; it has to be started and idle.
@@ -150,7 +149,7 @@ class Worker:
         return True
 
     def _opening(self, session: Session) -> OpenSession:
-        drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - self.kept)]
+        drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - self.max_sessions)]
         for key in drop:
             del self.sessions[key]
         return OpenSession(session.key, session.pickled, drop, session.limit)
@@ -182,7 +181,7 @@ class Worker:
             cause = _time_limit_message(limit, -self.process.wait())
         return WorkerDied(cause, was_ended_from_outside(self.process)), overdue
 
-    def forget(self) -> Batch:
+    def clear_process(self) -> Batch:
         """Lets go of the process, which has ended; returns what it was at."""
         assert self.process is not None and self.connection is not None
         self.process.wait()
@@ -262,8 +261,8 @@ class Dispatcher:
         self.workers = workers
         self._shared = SharedQueue()
         self._lock = threading.Lock()
-        self._asked: deque[Callable[[], None]] = deque()
-        self._alarm, self._bell = Pipe(duplex=False)
+        self._requests: deque[Callable[[], None]] = deque()
+        self._wake_receiver, self._wake_sender = Pipe(duplex=False)
         self._signalled = self._closed = self._killed = self._ended = False
         self._thread = threading.Thread(target=self._run, name="worker-pool", daemon=True)
         self._thread.start()
@@ -276,52 +275,55 @@ class Dispatcher:
             if worker is None:
                 self._shared.put(batch)
             else:
-                self.workers[worker].own.append(batch)
-        self._ring()
+                self.workers[worker].own_batches.append(batch)
+        self._wake()
 
     def end_task(self, future: object, force: bool) -> None:
         """Ends a task that runs; see `WorkerFuture.interrupt` and `terminate`."""
         with self._lock:
-            self._asked.append(lambda: self._end_task(future, force))
-        self._ring()
+            self._requests.append(lambda: self._end_task(future, force))
+        self._wake()
 
     def cancel_waiting(self) -> None:
         """Gives up what no worker has."""
         with self._lock:
-            batches = [*self._shared, *(batch for worker in self.workers for batch in worker.own)]
+            batches = [
+                *self._shared,
+                *(batch for worker in self.workers for batch in worker.own_batches),
+            ]
         for task in itertools.chain.from_iterable(batches):
             task.future.cancel()
 
     def close(self) -> None:
         """Ends the processes when all work is done."""
         self._closed = True
-        self._ring()
+        self._wake()
 
     def kill(self) -> None:
         """Ends the processes at once."""
         self._killed = True
         for worker in self.workers:
             worker.kill()
-        self._ring()
+        self._wake()
 
     def join(self, timeout: float | None = None) -> None:
         """Waits until all is ended; nothing in the dispatcher's own thread."""
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout)
 
-    def _ring(self) -> None:
+    def _wake(self) -> None:
         with self._lock:
             if self._signalled:
                 return
             self._signalled = True
             with suppress(OSError):  # the thread has ended
-                self._bell.send_bytes(b"!")
+                self._wake_sender.send_bytes(b"!")
 
     def _run(self) -> None:
         try:
             while not self._killed:
-                self._hand_out()
-                if self._closed and not self._any_left():
+                self._assign_tasks()
+                if self._closed and not self._has_work():
                     break
                 self._listen()
         finally:
@@ -329,22 +331,22 @@ class Dispatcher:
 
     def _listen(self) -> None:
         by_connection = {w.connection: w for w in self.workers if w.connection is not None}
-        for ready in wait([self._alarm, *by_connection]):
-            if ready is not self._alarm:
+        for ready in wait([self._wake_receiver, *by_connection]):
+            if ready is not self._wake_receiver:
                 self._receive(by_connection[ready])  # type: ignore[index]
                 continue
             with self._lock:
-                self._alarm.recv_bytes()
+                self._wake_receiver.recv_bytes()
                 self._signalled = False
-                asked, self._asked = self._asked, deque()
+                asked, self._requests = self._requests, deque()
             for request in asked:
                 request()
 
-    def _any_left(self) -> bool:
+    def _has_work(self) -> bool:
         with self._lock:
             return bool(self._shared) or any(worker.started() for worker in self.workers)
 
-    def _hand_out(self) -> None:
+    def _assign_tasks(self) -> None:
         """Gives idle workers something to do: first what is theirs, then the oldest work."""
         for take in (self._take_own, self._take_any):
             for worker in sorted(self.workers, key=lambda worker: worker.process is None):
@@ -352,12 +354,12 @@ class Dispatcher:
                     self._give(worker, batch)
 
     def _take_own(self, worker: Worker) -> Batch | None:
-        if worker.suspect is not None:
-            suspect, worker.suspect = worker.suspect, None
+        if worker.retry_task is not None:
+            suspect, worker.retry_task = worker.retry_task, None
             return deque([suspect])
         with self._lock:
-            if worker.own:
-                return worker.own.popleft()
+            if worker.own_batches:
+                return worker.own_batches.popleft()
             return self._shared.take(reversed(worker.sessions))
 
     def _take_any(self, worker: Worker) -> Batch | None:
@@ -373,7 +375,7 @@ class Dispatcher:
             worker.start()
             while not worker.give(tasks, tuple(call for _, call in calls)):
                 worker.kill()
-                worker.forget()
+                worker.clear_process()
                 worker.start()
         except OSError as error:
             for task in tasks:
@@ -408,7 +410,7 @@ class Dispatcher:
         session, worker.opening = worker.opening, None
         assert session is not None
         if message.error is None:
-            session.false_starts = 0
+            session.failed_builds = 0
             worker.sessions[session.key] = None
             return
         session.error = _with_worker_traceback(message.error, message.where)
@@ -421,22 +423,22 @@ class Dispatcher:
         if self._killed:  # it is cleaned up at the end
             return
         (error, overdue), session = worker.exit_error(), worker.opening
-        tasks = worker.forget()
+        tasks = worker.clear_process()
         cancelled = bool(tasks) and tasks[0].cancelled
         if session is not None and not cancelled:
-            session.false_starts += 1
-            if session.false_starts >= session.attempts:
+            session.failed_builds += 1
+            if session.failed_builds >= session.attempts:
                 session.error = error
         suspect = tasks.popleft() if tasks and (session is None or cancelled) else None
         if tasks:
-            worker.own.appendleft(tasks)
+            worker.own_batches.appendleft(tasks)
         if suspect is None:
             return
         if suspect.cancelled:
             suspect.future.set_exception(TaskCancelled("this task was cancelled"))
         elif suspect.tries > 1 and not overdue:
             suspect.tries -= 1
-            worker.suspect = suspect
+            worker.retry_task = suspect
         else:
             suspect.future.set_exception(error)
 
@@ -455,7 +457,6 @@ class Dispatcher:
 
     def _end(self) -> None:
         """Lets idle workers end by themselves, ends the others, and all work that is left."""
-        shutdown_timeout = 5.0  # Seconds for an idle worker to end by itself.
         left: list[PendingTask] = []
         for worker in self.workers:
             if worker.process is not None and not (worker.busy or self._killed):
@@ -463,18 +464,18 @@ class Dispatcher:
             else:
                 worker.kill()
             left += worker.started()
-            worker.tasks, worker.suspect, worker.own = deque(), None, deque()
+            worker.tasks, worker.retry_task, worker.own_batches = deque(), None, deque()
         for worker in self.workers:
             if worker.process is not None:
                 with suppress(subprocess.TimeoutExpired):
-                    worker.process.wait(shutdown_timeout)
+                    worker.process.wait(5.0)
                 worker.kill()
-                worker.forget()
+                worker.clear_process()
         with self._lock:
             left += itertools.chain.from_iterable(self._shared.clear())
             self._ended = True
-            self._alarm.close()
-            self._bell.close()
+            self._wake_receiver.close()
+            self._wake_sender.close()
         for task in left:
             if task.started or task.future.set_running_or_notify_cancel():
                 task.future.set_exception(TaskCancelled("the worker processes were stopped"))

@@ -47,7 +47,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
-from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from burg_drake.core.errors import InvalidInputError
@@ -194,12 +193,7 @@ class WorkerPool(Executor):
             dispatcher.kill()
             dispatcher.join(timeout)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         if error is None:
             self.shutdown()
         else:
@@ -221,18 +215,18 @@ def _iterate_results(futures: deque[WorkerFuture[T]], end: float | None) -> Iter
             future.cancel()
 
 
-PrefetchedWork = TypeVar("PrefetchedWork")
-PrefetchedResult = TypeVar("PrefetchedResult")
+Work = TypeVar("Work")
+Result = TypeVar("Result")
 
 
-class Prefetcher(Generic[PrefetchedWork, PrefetchedResult]):
+class Prefetcher(Generic[Work, Result]):
     """Results of work in its order, a few of them ahead."""
 
     def __init__(
         self,
         pool: WorkerPool,
-        work: Iterable[PrefetchedWork],
-        task: Callable[[PrefetchedWork], Task[PrefetchedResult]],
+        work: Iterable[Work],
+        task: Callable[[Work], Task[Result]],
     ) -> None:
         """Begins nothing yet.
 
@@ -242,14 +236,14 @@ class Prefetcher(Generic[PrefetchedWork, PrefetchedResult]):
             task: what is to be done about a piece of work.
         """
         self._pool, self._work, self._task = pool, iter(work), task
-        self._ahead: deque[tuple[PrefetchedWork, WorkerFuture[PrefetchedResult]]] = deque()
+        self._ahead: deque[tuple[Work, WorkerFuture[Result]]] = deque()
 
     def ready(self) -> bool:
         """Whether `take` returns at once."""
         self._fill()
         return not self._ahead or self._ahead[0][1].done()
 
-    def take(self) -> tuple[PrefetchedWork, PrefetchedResult | BaseException] | None:
+    def take(self) -> tuple[Work, Result | BaseException] | None:
         """The next work and its result, or the error; None when there is no more. Waits for it."""
         self._fill()
         if not self._ahead:
@@ -260,17 +254,9 @@ class Prefetcher(Generic[PrefetchedWork, PrefetchedResult]):
         return work, future.result() if error is None else error
 
     def _fill(self) -> None:
-        per_worker = 2  # Results per worker that are ready or being computed.
-        while len(self._ahead) < per_worker * self._pool.workers:
-            for work in self._work:
-                self._ahead.append((work, self._pool.submit_task(self._task(work))))
-                break
-            else:
-                return
-
-
-Work = TypeVar("Work")
-Result = TypeVar("Result")
+        n_missing = 2 * self._pool.workers - len(self._ahead)
+        for work in itertools.islice(self._work, max(0, n_missing)):
+            self._ahead.append((work, self._pool.submit_task(self._task(work))))
 
 
 def map_unordered(

@@ -25,7 +25,7 @@ from burg_drake.core.errors import InvalidInputError
 
 
 class AllocatorSettings:
-    """Allocator settings."""
+    """Where allocators are found, and the environment variables that choose and preload one."""
 
     variable = "BURG_DRAKE_ALLOCATOR"  # Path of a library, or `none`.
     preload_variable = "LD_PRELOAD"
@@ -39,8 +39,6 @@ class AllocatorSettings:
     )
 
 
-ELF_MACHINE = slice(16, 20)
-"""Bytes of an ELF header: file type and machine."""
 ALLOCATOR_PROBE = """\
 import ctypes
 
@@ -74,7 +72,7 @@ def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str
     for path in [Path(os.path.expanduser(given)).absolute()] if given else installed_allocators():
         preload = f"{before}:{path}" if before else str(path)
         tried = tuple(sorted({**environment, AllocatorSettings.preload_variable: preload}.items()))
-        if _can_be_preloaded(path) and _replaces_malloc(path, _modification_time(path), tried):
+        if path.is_file() and _replaces_malloc(path, path.stat().st_mtime_ns, tried):
             _log.debug("workers start with the allocator %s", path)
             return {AllocatorSettings.preload_variable: preload}
     if given:
@@ -125,42 +123,6 @@ def _address_space_is_limited() -> bool:
     return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
 
 
-def _can_be_preloaded(path: Path) -> bool:
-    """Whether a file is a shared library for this interpreter, and can be named to the linker."""
-    identity = slice(4, 6)  # Bytes of an ELF header: word size and byte order.
-    shared_library = 3  # ELF file type.
-    if not path.is_absolute() or any(separator in str(path) for separator in " :"):
-        return False
-    ours, found = _elf_header(Path("/proc/self/exe")), _elf_header(path)
-    if (
-        ours is None
-        or found is None
-        or int.from_bytes(found[ELF_MACHINE][:2], sys.byteorder) != shared_library
-    ):
-        return False
-    return (found[identity], found[ELF_MACHINE][2:]) == (ours[identity], ours[ELF_MACHINE][2:])
-
-
-def _elf_header(path: Path) -> bytes | None:
-    """The beginning of an ELF file; None if it is none."""
-    try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
-            header = file.read(ELF_MACHINE.stop)
-    except OSError:
-        return None
-    return header if header[:4] == b"\x7fELF" and len(header) == ELF_MACHINE.stop else None
-
-
-def _modification_time(path: Path) -> int:
-    """When a file was changed [ns]."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return 0
-
-
 @functools.lru_cache(maxsize=16)
 def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str], ...]) -> bool:
     """Whether a process that is started with it works, has its malloc, and complains of nothing.
@@ -170,14 +132,13 @@ def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str
         changed: when [ns]; another one is tried again.
         environment: of the process, with the library in `LD_PRELOAD`.
     """
-    probe_timeout = 10.0  # Seconds for a library to show that it works.
     try:
         tried = subprocess.run(
             [sys.executable, "-I", "-S", "-c", ALLOCATOR_PROBE],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             env=dict(environment),
-            timeout=probe_timeout,
+            timeout=10.0,
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired):
@@ -233,7 +194,7 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
     blocked: the parent alone decides what it means. They end when their parent does, also while
     they are at work and do not look at their pipe: a parent that is killed cannot end them.
 
-    They have a faster allocator where there is one (`allocator`); what they start does not.
+    They have a faster allocator where there is one, see `worker_preload`; what they start does not.
 
     Args:
         module: has a function `main(handle: int)`, called with the file descriptor of its end of
@@ -271,11 +232,9 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
 def end_with_parent(parent: int) -> None:
     """Has this process end as soon as its parent, a process identifier, is another one."""
 
-    poll_interval = 1.0  # Seconds between checks that the parent is alive.
-
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(poll_interval)
+            time.sleep(1.0)
         os._exit(1)
 
     threading.Thread(target=watch, name="parent-watch", daemon=True).start()
@@ -297,7 +256,8 @@ def exit_cause(process: subprocess.Popen[bytes], reason: str = "") -> str:
 
 
 def was_ended_from_outside(process: subprocess.Popen[bytes]) -> bool:
-    """Whether a worker process was ended by one of `FROM_OUTSIDE`; waits for its end."""
-    # Out of memory, a batch system, a user. Other signals (SIGSEGV) would recur.
-    external_signals = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
-    return -process.wait() in external_signals
+    """Whether memory ran out, or a batch system or a user ended a worker; waits for its end.
+
+    Other signals, such as SIGSEGV, would recur.
+    """
+    return -process.wait() in (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)

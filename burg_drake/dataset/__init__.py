@@ -1,6 +1,7 @@
 """Training data: views of scenes as images with labels, in the formats that people train on.
 
-Read `rendering` first, then `samples` and `generating`.
+Read `scene_renderer` first, then `sample_files` and `shards`, which write samples and read them,
+and `dataset_generation`.
 """
 
 import lazy_loader

@@ -52,7 +52,7 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
 
     Returns:
         The renderer's name, for `RenderCameraCore`. Its images need `fill_background`, then
-        `photometric`.
+        `apply_photometry`.
 
     Raises:
         MissingDependencyError, InvalidInputError: see `add_renderer`.

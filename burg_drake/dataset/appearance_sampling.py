@@ -54,23 +54,20 @@ class FreeTable:
 
     def place(self, radius: float, rng: np.random.Generator) -> Array | None:
         """(2,) middle of a circle that is free, which is taken then; None if none is found."""
-        max_attempts = 40  # Positions tried for each distractor.
-        min_gap = 0.01  # Metres between a distractor and anything else.
         room = self.half - radius
         if (room <= 0.0).any():
             return None
-        for _ in range(max_attempts):
+        for _ in range(40):
             p_T = np.array([*rng.uniform(-room, room), 0.0])
             p = transform_points(self.X_ST, p_T[None])[0, :2]
-            if self._is_free(p, radius + min_gap):
+            if self._is_free(p, radius + 0.01):
                 self.circles.append(np.array([*p, radius]))
                 return np.asarray(p)
         return None
 
     def _is_free(self, p: Array, radius: float) -> bool:
-        for lower, upper in self.rectangles:
-            if np.linalg.norm(p - np.clip(p, lower, upper)) < radius:
-                return False
+        if any(np.linalg.norm(p - np.clip(p, *box)) < radius for box in self.rectangles):
+            return False
         return all(np.hypot(*(p - one[:2])) >= radius + one[2] for one in self.circles)
 
 
@@ -137,7 +134,6 @@ def distractor_library(reference: str) -> ObjectLibrary:
 
 def free_table(scene: Scene, station: Station, on_board: bool) -> FreeTable:
     """The table as a scene leaves it."""
-    base_radius = 0.20  # Metres around the axis of the arm's base; the Panda's base reaches 0.14.
     document = station.document
     X_SW = inverse(document.X_WS.matrix())
     boxes = [corners[:, :2] for corners in obstacle_corners(station)]
@@ -150,7 +146,7 @@ def free_table(scene: Scene, station: Station, on_board: bool) -> FreeTable:
         circles.append(np.array([*middle, radius]))
     if document.arm is not None:
         p_SA = transform_points(X_SW, document.arm.X_WA.matrix()[:3, 3][None])[0]
-        circles.append(np.array([*p_SA[:2], base_radius]))
+        circles.append(np.array([*p_SA[:2], 0.2]))  # the base of a Panda reaches 0.14 m
     X_ST = X_SW @ make_pose(p_AB=(*document.table.center, 0.0))
     return FreeTable(X_ST, np.array(document.table.size[:2]) / 2, rectangles, circles)
 
@@ -182,20 +178,17 @@ def draw_appearance(
         UnknownNameError: there is no such library of distractors.
         InvalidInputError: no object of it can stand.
     """
-    # Irradiance of the table by all lights; at 1 a white surface is white.
-    irradiance_range = (0.75, 1.0)
-    # Share of the irradiance that the room gives, if it lights the scene.
-    room_share_range = (0.3, 0.7)
     scene, station = as_scene(scene), as_station(station)
     objects = len(scene.instances) + len(scene.background)
     room = int(rng.integers(1 << 32)) if rng.random() < settings.room else None
     by_room = room is not None and rng.random() < settings.room_light
-    total = float(rng.uniform(*irradiance_range))
-    share = float(rng.uniform(*room_share_range)) if by_room else 0.0
+    # of the table by all lights, where a white surface is white at 1, and the room's share of it
+    irradiance = float(rng.uniform(0.75, 1.0))
+    share = float(rng.uniform(0.3, 0.7)) if by_room else 0.0
     return Appearance(
-        lights=_draw_lights(settings, total * (1.0 - share), not by_room, rng),
+        lights=_draw_lights(settings, irradiance * (1.0 - share), not by_room, rng),
         room=room,
-        room_light=total * share if settings.lights is not None else float(by_room),
+        room_light=irradiance * share if settings.lights is not None else float(by_room),
         table=_draw_table_surface(settings, rng),
         board=bool(rng.random() < settings.board),
         photometry=_draw_photometry(settings, rng),
@@ -210,20 +203,16 @@ def _draw_lights(
 ) -> tuple[DirectedLight, ...]:
     """Lights that give the table so much irradiance together, by the settings; with one that goes
     with the camera if wanted."""
-    # Share of a light at the camera, which replaces scattered light.
-    camera_share_range = (0.12, 0.3)
-    other_weight_range = (0.2, 0.7)  # Irradiance by each other light, relative to the first one.
-    other_elevation_range_deg = (25.0, 75.0)  # Elevation of the other lights in degrees.
-    min_sine = 0.4  # Lights below this sine of the elevation are not made brighter.
     if settings.lights is None:
         return ()
     low, high = settings.lights
     count = int(rng.integers(low, high + 1))
-    elevation = np.deg2rad(rng.uniform(*other_elevation_range_deg, count))
+    elevation = np.deg2rad(rng.uniform(25.0, 75.0, count))
     elevation[0] = np.deg2rad(rng.uniform(*settings.light_elevation_deg))
     azimuth = rng.uniform(-np.pi, np.pi, count)
-    camera_share = float(rng.uniform(*camera_share_range)) if camera_light else 0.0
-    shares = rng.uniform(*other_weight_range, count)
+    # of a light at the camera, which replaces scattered light
+    camera_share = float(rng.uniform(0.12, 0.3)) if camera_light else 0.0
+    shares = rng.uniform(0.2, 0.7, count)
     shares[0] = 1.0
     shares *= (1.0 - camera_share) / shares.sum()
     shadows = bool(rng.random() < settings.shadows)
@@ -234,7 +223,7 @@ def _draw_lights(
         found.append(
             DirectedLight(
                 direction=(x, y, z),
-                irradiance=float(total * shares[k] / max(up, min_sine)),
+                irradiance=float(total * shares[k] / max(up, 0.4)),
                 color=_draw_light_color(settings, rng),
                 shadows=k == 0 and shadows,
             )
@@ -256,16 +245,15 @@ def _draw_light_color(settings: AppearanceSettings, rng: np.random.Generator) ->
 
 
 def color_of_temperature(kelvin: float) -> Vector3:
-    """Linear red, green, blue of a black body, relative to one of `NEUTRAL`, with green at 1; half
+    """Linear red, green, blue of a black body, relative to one of 6500 K, with green at 1; half
     of the difference, as cameras balance most of it.
 
     By Planck's law at the wavelengths of sRGB's primaries, which is as good as needed here.
     """
-    white_temperature = 6500.0  # Kelvin; light of this temperature is white in sRGB.
     wavelength = np.array([612e-9, 549e-9, 464e-9])  # dominant ones of sRGB's primaries [m]
     hc_k = 1.438777e-2  # second radiation constant [m K], CODATA 2018
     radiance = 1.0 / np.expm1(hc_k / (wavelength * kelvin))
-    neutral = 1.0 / np.expm1(hc_k / (wavelength * white_temperature))
+    neutral = 1.0 / np.expm1(hc_k / (wavelength * 6500.0))  # white in sRGB
     ratio = np.sqrt(radiance / neutral)
     r, g, b = (ratio / ratio[1]).tolist()
     return (r, g, b)

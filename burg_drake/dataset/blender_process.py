@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -53,7 +54,8 @@ def blender_command() -> list[str]:
     found = shutil.which(given)
     if found is None:
         raise MissingDependencyError(
-            f"{BLENDER_ENVIRONMENT_VARIABLE} is {given!r}, which is not an executable: {BLENDER_INSTALL_ADVICE}"
+            f"{BLENDER_ENVIRONMENT_VARIABLE} is {given!r}, which is not an executable:"
+            f" {BLENDER_INSTALL_ADVICE}"
         )
     told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
     if told.stdout.startswith("Blender"):
@@ -80,10 +82,10 @@ class Blender:
     """
 
     def __init__(self, command: list[str]) -> None:
-        # Settings of this Python that another Python must not inherit.
-        python_variables = ("PYTHONPATH", "PYTHONHOME")
-        self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
-        foreign = python_variables if os.environ.get(BLENDER_ENVIRONMENT_VARIABLE) else ()
+        self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115, closed in `close`
+        foreign: tuple[str, ...] = ()
+        if os.environ.get(BLENDER_ENVIRONMENT_VARIABLE):
+            foreign = ("PYTHONPATH", "PYTHONHOME")  # which another Python must not inherit
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -94,7 +96,7 @@ class Blender:
         self._lock = RLock()
         self._shown: BlenderScene | None = None
         self._program = command[0]
-        self.version = str(self._answer("starting")["version"])
+        self.version = str(self._read_response("starting")["version"])
 
     @property
     def alive(self) -> bool:
@@ -130,10 +132,10 @@ class Blender:
             if self._shown is not scene:
                 self._shown = None
                 scene.write(folder, _thread_count())
-                self._ask("loading a scene", do="load", folder=name)
+                self._send_request("loading a scene", do="load", folder=name)
                 self._shown = scene
             path = folder / "view.png"
-            self._ask(
+            self._send_request(
                 "rendering",
                 do="render",
                 width=intrinsics.width,
@@ -147,7 +149,7 @@ class Blender:
             )
             image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         if image is None or image.shape != (intrinsics.height, intrinsics.width, 4):
-            raise SimulationError(f"Blender wrote no image; {self._last_words()}")
+            raise SimulationError(f"Blender wrote no image; {self._last_output()}")
         return np.ascontiguousarray(image[..., [2, 1, 0, 3]])
 
     def close(self) -> None:
@@ -156,22 +158,20 @@ class Blender:
         self._process.communicate()
         self._log.close()
 
-    def _ask(self, when: str, **task: Any) -> None:
+    def _send_request(self, when: str, **task: Any) -> None:
         assert self._process.stdin is not None
-        try:
+        with contextlib.suppress(BrokenPipeError):  # it has ended, which the answer tells
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
-        except BrokenPipeError:
-            pass  # it has ended, which the answer tells
         try:
-            error = self._answer(when).get("error")
+            error = self._read_response(when).get("error")
         except BaseException:
             self._process.kill()  # an answer that nobody waits for must not be taken for the next
             raise
         if error is not None:
             raise SimulationError(f"Blender failed while {when}: {error}")
 
-    def _answer(self, when: str) -> dict[str, Any]:
+    def _read_response(self, when: str) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         while line.endswith(b"\n") and not line.startswith(b"{"):  # what Blender says of itself
@@ -179,7 +179,7 @@ class Blender:
         if not line.endswith(b"\n"):
             code = self._process.wait()
             how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-            raise SimulationError(f"Blender ended {how} while {when}; {self._last_words()}")
+            raise SimulationError(f"Blender ended {how} while {when}; {self._last_output()}")
         found: dict[str, Any] = json.loads(line)
         if "missing" in found:
             self.close()
@@ -188,11 +188,10 @@ class Blender:
             )
         return found
 
-    def _last_words(self) -> str:
-        max_lines = 5  # Lines of Blender's output that the message repeats.
+    def _last_output(self) -> str:
         self._log.seek(0)
         lines = self._log.read().decode(errors="replace").split("\n")
-        said = [line.strip() for line in lines if line.strip()][-max_lines:]
+        said = [line.strip() for line in lines if line.strip()][-5:]
         return f"its last lines: {' | '.join(said)}" if said else "it printed nothing"
 
 

@@ -18,8 +18,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from burg_drake.core import Array, Indices, Vector3, transform_points
 from burg_drake.dataset.appearance import Appearance, DirectedLight
 from burg_drake.dataset.appearance_rendering import environment_file
-from burg_drake.dataset.photometry import linear_from_srgb
 from burg_drake.station import DEFAULT_LIGHTS, StationDiagram, shape_triangles
+from burg_drake.visualization import linear_light
 
 DEFAULT_SURFACE_COLOR = (0.9, 0.7, 0.2, 1.0)
 """RGBA of surfaces without a colour, as in Drake's renderer."""
@@ -139,7 +139,7 @@ class _Painter:
 
     def _plain(self, color: Color, texture: bytes = b"") -> Material:
         if not self.linear:
-            r, g, b = linear_from_srgb(np.array(color[:3])).tolist()
+            r, g, b = linear_light(np.array(color[:3])).tolist()
             color = (r, g, b, color[3])
         return Material(color=color, texture=texture)
 
@@ -237,7 +237,7 @@ class BlenderScene:
         parts = [
             {
                 "body": one.body,
-                "material": _material_values(one, names.get(one.material.texture, "")),
+                "material": asdict(one.material) | {"texture": names.get(one.material.texture, "")},
             }
             for one in self.surfaces
         ]
@@ -251,8 +251,7 @@ class BlenderScene:
         }
         files["scene.json"] = json.dumps(described).encode()
         arrays = io.BytesIO()
-        named: dict[str, Any] = dict(self._arrays())
-        np.savez(arrays, **named)
+        np.savez(arrays, **dict(self._arrays()))  # type: ignore[arg-type]
         files["meshes.npz"] = arrays.getvalue()
         for name, content in files.items():
             (folder / name).write_bytes(content)
@@ -265,10 +264,6 @@ class BlenderScene:
                 yield f"part_{k}.normals", one.normals.astype(np.float32)
             if one.uv is not None:
                 yield f"part_{k}.uv", one.uv.astype(np.float32)
-
-
-def _material_values(surface: PaintedSurface, texture: str) -> dict[str, Any]:
-    return asdict(surface.material) | {"texture": texture}
 
 
 def make_blender_scene(built: StationDiagram, appearance: Appearance | None = None) -> BlenderScene:
@@ -301,12 +296,11 @@ def _default_lights() -> list[DirectedLight]:
 
 
 def _lamp_of_light(light: DirectedLight) -> Lamp:
-    lamp_angle = np.deg2rad(4.0)  # Radians; a lamp of 20 cm seen from 3 m.
     return Lamp(
         direction=light.direction,
         frame=light.frame,
         irradiance=light.irradiance * np.pi,  # a white surface reflects the pi-th part
         color=light.color,
         shadows=light.shadows or light.frame == "world",
-        angle=float(lamp_angle),
+        angle=float(np.deg2rad(4.0)),  # a lamp of 20 cm seen from 3 m
     )

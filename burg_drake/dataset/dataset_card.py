@@ -138,16 +138,12 @@ def bars_of_counts(values: Sequence[int], title: str, unit: str) -> str:
 
 
 def _bin_edges(data: Array, limits: tuple[float, float] | None) -> Array:
-    bin_count = 20  # Bars of the histogram.
-    if limits is not None:
-        lower, upper = limits
-    elif data.size:
+    lower, upper = limits or (0.0, 1.0)
+    if limits is None and data.size:
         lower, upper = float(data.min()), float(data.max())
-    else:
-        lower, upper = 0.0, 1.0
     if upper - lower < 1e-9:
         lower, upper = lower - 0.5, upper + 0.5
-    return np.linspace(lower, upper, bin_count + 1)
+    return np.linspace(lower, upper, 20 + 1)
 
 
 def _axis_ticks(lower: float, upper: float, most: int = 6) -> list[float]:
@@ -167,19 +163,16 @@ def _bar_chart(counts: Indices, title: str, unit: str, ticks: list[tuple[float, 
     right = 14  # Pixels between the bars and the right edge.
     top = 30  # Pixels above the bars.
     bottom = 40  # Pixels below the bars.
-    paper_color = "#ffffff"  # Background of the chart.
-    title_color = "#1d2328"  # Colour of the title.
-    bar_color = "#31688e"  # Colour of the bars.
     inner, tall = width - left - right, height - top - bottom
     most = max(1, int(counts.max(initial=0)))
-    parts: list[Child] = [element("rect", width=width, height=height, fill=paper_color)]
-    parts.append(_chart_text(left, 18, title, size=13, color=title_color, weight="bold"))
+    parts: list[Child] = [element("rect", width=width, height=height, fill="#ffffff")]
+    parts.append(_chart_text(left, 18, title, size=13, color="#1d2328", weight="bold"))
     for k, count in enumerate(counts.tolist()):
         high = tall * count / most
         x = left + inner * k / len(counts)
         box = {"x": round(x + 0.5, 2), "y": round(top + tall - high, 2)}
         size = {"width": round(inner / len(counts) - 1.0, 2), "height": round(high, 2)}
-        parts.append(element("rect", **box, **size, fill=bar_color))
+        parts.append(element("rect", **box, **size, fill="#31688e"))
     base = top + tall
     ends = {"x1": left, "x2": left + inner, "y1": base, "y2": base}
     parts.append(element("line", **ends, stroke=CHART_TEXT_COLOR))
@@ -252,7 +245,6 @@ def write_card(
             written to.
         UnknownNameError: a licence is of no object of the data set.
     """
-    example_count = 4  # Samples that the card shows.
     folder = Path(folder)
     _require_own_card(folder / CARD_FILE)
     for name in licences or {}:
@@ -264,7 +256,7 @@ def write_card(
     if not len(samples):
         raise InvalidInputError(f"cannot write {folder / CARD_FILE}: the data set has no samples")
     counted = count_dataset(samples)
-    chosen = [samples[k] for k in evenly_spaced_indices(len(samples), example_count)]
+    chosen = [samples[k] for k in evenly_spaced_indices(len(samples), 4)]
     charts = _chart_files(counted)
     pictures: dict[str, str | bytes] = {**charts, "examples.png": sheet_png(chosen, 1)}
     made = {**(facts or {}), **software_versions(with_platform=False)}
@@ -279,7 +271,7 @@ def write_card(
             _object_table(samples, counted, licences or {}),
             "## Distributions",
             "\n".join(f"![{Path(name).stem}](card/{name})" for name in charts),
-            *(["## Grasps", _count_table("outcome", counted.outcomes)] if counted.outcomes else []),
+            *(["## Grasps", _outcome_table(counted)] if counted.outcomes else []),
             "## How it was made",
             _markdown_table(("", ""), list(made.items())),
         ]
@@ -349,9 +341,10 @@ def _object_table(samples: Samples, counted: DatasetCounts, licences: Mapping[st
     return f"Object library `{samples.library.name}`.\n\n{_markdown_table(header, rows)}"
 
 
-def _count_table(name: str, counts: Counter[str]) -> str:
-    rows = [(key or "clear, or not judged", f"{n:,}") for key, n in counts.most_common()]
-    return _markdown_table((name, "number"), rows)
+def _outcome_table(counted: DatasetCounts) -> str:
+    counts = counted.outcomes.most_common()
+    rows = [(outcome or "clear, or not judged", f"{n:,}") for outcome, n in counts]
+    return _markdown_table(("outcome", "number"), rows)
 
 
 def _markdown_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

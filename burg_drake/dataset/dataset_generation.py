@@ -40,7 +40,6 @@ from burg_drake.dataset.scene_grasps import grasps_of_run
 from burg_drake.dataset.scene_samples import (
     DatasetInputs,
     SampleTask,
-    SampleTaskResult,
     SceneSamples,
     SceneWork,
     appearance_of,
@@ -139,10 +138,17 @@ def _make_on_cluster(
 
     with closing(map_on_cluster(executor, run_sample_task, able, world, pack)) as answers:
         for one, made in answers:
-            yield (
-                one,
-                made if isinstance(made, BaseException) else _store_made_scene(one, library, made),
-            )
+            if isinstance(made, BaseException):
+                yield one, made
+                continue
+            folder = one.inputs.folder
+            scene = Scene(made.document, library, folder)
+            try:
+                entry = write_made_scene(folder, one.number, scene, made.shard, made.entry)
+            except BurgError as error:
+                yield one, error
+            else:
+                yield one, entry
 
 
 def catalogue_scene(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
@@ -153,18 +159,6 @@ def catalogue_scene(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
     objects = [Instance(object=name) for name in library.objects if name in used or not scenes]
     document = SceneDocument(name="objects", library="", background=tuple(objects))
     return Scene(document, library, library.root)
-
-
-def _store_made_scene(
-    work: SceneWork, library: ObjectLibrary, made: SampleTaskResult
-) -> ShardEntry | BaseException:
-    """Writes what a worker has made."""
-    folder = work.inputs.folder
-    scene = Scene(made.document, library, folder)
-    try:
-        return write_made_scene(folder, work.number, scene, made.shard, made.entry)
-    except BurgError as error:
-        return error
 
 
 @dataclass(frozen=True)
@@ -265,7 +259,7 @@ def generate_dataset(
                         str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
                     )
                 else:
-                    writer.added(outcome)
+                    writer.add_entry(outcome)
                 if progress is not None:
                     progress(one.number, failed.get(one.number, ""))
         writer.finish()
@@ -406,7 +400,7 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
             appearance = appearance_of(sample)
             samples = SceneSamples(scene, sample.scene, station, recipe, folder, appearance)
             last[:] = [(key, samples)]
-        return last[0][1].redrawn(sample.view)
+        return last[0][1].render_again(sample.view)
 
     return check_dataset(folder, redraw)
 

@@ -66,12 +66,13 @@ class DatasetDocument:
 
     def differences(self, other: DatasetDocument) -> list[str]:
         """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`; the
+        its content counts, not where it is, and of the versions those that decide; the
         name does not count."""
         max_shown = 6  # Differences in a message.
         mine, theirs = _deciding_values(self), _deciding_values(other)
         found = [
-            f"{name} is {_format_value(mine.get(name))} there, {_format_value(theirs.get(name))} here"
+            f"{name} is {_format_value(mine.get(name))} there,"
+            f" {_format_value(theirs.get(name))} here"
             for name in dict.fromkeys([*mine, *theirs])
             if mine.get(name) != theirs.get(name)
         ]
@@ -107,7 +108,6 @@ def load_dataset_document(path: str | Path) -> DatasetDocument:
 
 def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
     """Writes `dataset.yaml`, whole or not at all."""
-    # Comment at the top of the file.
     header = "What the samples of this data set are of, and what they were made with."
     recipe = None if document.recipe is None else plain_data(dict(document.recipe))
     save_document(dataclasses.replace(document, recipe=recipe), path, header)
@@ -205,33 +205,33 @@ def read_index(folder: Path) -> list[ShardEntry]:
         DocumentError: it is damaged, or of another version.
         InvalidInputError: it is missing.
     """
-    # Bytes and values; a shard takes 150 bytes and 6 values.
-    limits = Limits(size=256 << 20, values=10_000_000)
-    entry_keys = ("url", "nsamples", "filesize", "md5sum")  # Keys of the entry of a shard.
+    limits = Limits(size=256 << 20, values=10_000_000)  # a shard takes 150 bytes and 6 values
+    entry_keys = ("url", "nsamples", "filesize", "md5sum")
     path = folder / SHARD_INDEX_FILE
     if not path.exists():
         raise InvalidInputError(
-            f"{folder} has no {SHARD_INDEX_FILE}, so the data set is not finished; run the command that makes"
-            " it again, or call burg_drake.dataset.write_index on the folder to use the"
+            f"{folder} has no {SHARD_INDEX_FILE}, so the data set is not finished; run the command"
+            " that makes it again, or call burg_drake.dataset.write_index on the folder to use the"
             " samples that are there"
         )
     fields = PlainFields(load_json(path, limits), ("wids_version", "name", "shardlist"), str(path))
-    fields.whole("wids_version", WIDS_VERSION, WIDS_VERSION)
+    fields.integer("wids_version", WIDS_VERSION, WIDS_VERSION)
     entries = [
         ShardEntry(
             line.text("url"),
-            line.whole("nsamples"),
-            line.whole("filesize"),
+            line.integer("nsamples"),
+            line.integer("filesize"),
             line.text("md5sum"),
         )
-        for line in fields.each("shardlist", entry_keys)
+        for line in fields.nested_list("shardlist", entry_keys)
     ]
     urls = [entry.url for entry in entries]
     for url in urls:
         place, _, name = url.rpartition("/")
         if place != SHARD_FOLDER or not SHARD_NAME.fullmatch(name):
             raise DocumentError(
-                f"{path}: shardlist: url is {url!r}; expected a value such as {SHARD_FOLDER}/000012.tar"
+                f"{path}: shardlist: url is {url!r}; expected a value such as"
+                f" {SHARD_FOLDER}/000012.tar"
             )
     if urls != sorted(set(urls), key=_scene_number):
         raise DocumentError(f"{path}: shardlist: shards are repeated or not in ascending order")

@@ -59,8 +59,7 @@ class GraspRectangles:
         along = np.stack([np.cos(self.angle), np.sin(self.angle)], axis=-1)
         across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
         a, b = 0.5 * self.opening[:, None] * along, 0.5 * self.height[:, None] * across
-        corners: Array = self.center[:, None] + np.stack([-a - b, a - b, a + b, b - a], axis=1)
-        return corners
+        return np.asarray(self.center[:, None] + np.stack([-a - b, a - b, a + b, b - a], axis=1))
 
 
 def grasp_rectangles(
@@ -133,14 +132,12 @@ def _are_in_view(X_CG: Array, intrinsics: Intrinsics, most_angle: float) -> Bool
 
 def _image_span(intrinsics: Intrinsics, p_CQ: Array, half: Array) -> Array:
     """(K, 2) from the images of points moved back by some vectors to those of points moved on."""
-    span: Array = intrinsics.project(p_CQ + half) - intrinsics.project(p_CQ - half)
-    return span
+    return np.asarray(intrinsics.project(p_CQ + half) - intrinsics.project(p_CQ - half))
 
 
 def _wrap_line_angle(angle: Array) -> Array:
     """Directions of lines, in (-pi/2, pi/2]."""
-    turned: Array = np.pi / 2 - (np.pi / 2 - angle) % np.pi
-    return turned
+    return np.asarray(np.pi / 2 - (np.pi / 2 - angle) % np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +167,7 @@ class GraspVolume:
         width: (K,) distance of the pads in voxels; nan if not known.
         success: (K,) whether the grasp held: `Outcome.held`, also if another object was moved
             (`lifted_disturbed`), or it turned or slid beyond the limits (`lifted_turned`).
-        untried: (L,) rows of grasps whose outcome does not tell: `UNKNOWN_END`.
+        untried: (L,) rows of grasps whose outcome does not tell whether it holds.
         outside: (M,) rows of the others whose centre is not in the volume.
         voxels: along each edge of the volume.
     """
@@ -229,13 +226,11 @@ def volume_grasps(
     Raises:
         InvalidInputError: a number does not make sense, or `X_CV` is no pose.
     """
-    # Outcomes that do not tell whether the grasp holds.
-    undecided_outcomes = (*UNTRIED_OUTCOMES, Outcome.SIMULATION_FAILED.value)
     voxel, _ = voxel_size_and_truncation(size, voxels, None)
     X_VG = inverse(check_pose(X_CV, "X_CV")) @ grasps.X_CG
     index = np.floor(X_VG[:, :3, 3] / voxel).astype(np.intp)
     inside = ((index >= 0) & (index < voxels)).all(axis=1)
-    ended = ~np.isin(grasps.outcome, undecided_outcomes)
+    ended = ~np.isin(grasps.outcome, (*UNTRIED_OUTCOMES, Outcome.SIMULATION_FAILED.value))
     row = np.flatnonzero(ended & inside)
     R_VG = np.stack([X_VG[row], swap_fingers(X_VG[row])], axis=1)[..., :3, :3]
     return GraspVolume(

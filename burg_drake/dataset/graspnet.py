@@ -54,19 +54,15 @@ def grasp_scores(grasps: LabelledGrasps) -> Array:
         (N,) scores; nan where nothing is known: grasps that were not judged, that are reachable
         and were not tried, or whose simulation failed.
     """
-    best_score = 1.0  # Score of a grasp that lifted without slip.
-    disturbed_score = 0.7  # Score of a grasp that moved or turned objects.
-    max_slip_cost = 0.3  # Score that is subtracted at the largest slip.
-    max_slip = 0.02  # Metres of slip, from which on the cost is constant.
     unknown = ("", Outcome.REACHABLE.value, Outcome.SIMULATION_FAILED.value)
     slip = np.nan_to_num(grasps.margins.get("slip", np.zeros(len(grasps))), nan=0.0)
-    cost = max_slip_cost * np.clip(slip / max_slip, 0.0, 1.0)
+    cost = 0.3 * np.clip(slip / 0.02, 0.0, 1.0)
     scores = np.zeros(len(grasps))
     scores[np.isin(grasps.outcome, unknown)] = np.nan
     for outcome, best in (
-        (Outcome.LIFTED, best_score),
-        (Outcome.LIFTED_DISTURBED, disturbed_score),
-        (Outcome.LIFTED_TURNED, disturbed_score),
+        (Outcome.LIFTED, 1.0),
+        (Outcome.LIFTED_DISTURBED, 0.7),
+        (Outcome.LIFTED_TURNED, 0.7),
     ):
         held = grasps.outcome == outcome.value
         scores[held] = best - cost[held]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +55,9 @@ def visual_model(library: ObjectLibrary, name: str) -> VisualModel:
     model = VisualModel(np.concatenate(vertices), normals, np.concatenate(faces))
     image = getattr(_part_material(parts[0]), "image", None) if len(parts) == 1 else None
     if image is not None:
-        uv = np.asarray(parts[0].visual.uv, dtype=float)[:, :2]
-        return VisualModel(model.vertices, normals, model.faces, uv=uv, image=image)
-    colors = np.concatenate([np.tile(_main_color(part), (len(part.vertices), 1)) for part in parts])
-    return VisualModel(model.vertices, normals, model.faces, colors=colors)
+        return replace(model, uv=np.asarray(parts[0].visual.uv, dtype=float)[:, :2], image=image)
+    colors = [np.tile(_main_color(part), (len(part.vertices), 1)) for part in parts]
+    return replace(model, colors=np.concatenate(colors))
 
 
 def uncolored_model(surface: trimesh.Trimesh) -> VisualModel:
@@ -144,7 +143,8 @@ def find_symmetries(model: VisualModel, diameter: float) -> dict[str, Any]:
             {"axis": _rounded_values(axis), "offset": _rounded_values(1e3 * p_OC)} for axis in axes
         ]
     if turns:
-        info["symmetries_discrete"] = [_rotation_about_point(R, p_OC) for R in turns]
+        motions = [make_pose(R, 1e3 * (p_OC - R @ p_OC)) for R in turns]
+        info["symmetries_discrete"] = [_rounded_values(X.reshape(-1)) for X in motions]
     return info
 
 
@@ -160,11 +160,6 @@ def _colored_parts(model: VisualModel) -> list[trimesh.Trimesh]:
         trimesh.Trimesh(model.vertices, model.faces[color == k], process=False)
         for k in range(int(color.max()) + 1)
     ]
-
-
-def _rotation_about_point(R: Array, p_OC: Array) -> list[float]:
-    """A rotation about the model's middle, in the object frame."""
-    return _rounded_values(make_pose(R, 1e3 * (p_OC - R @ p_OC)).reshape(-1))
 
 
 def _rounded_values(values: Array) -> list[float]:

@@ -8,15 +8,10 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Bytes, InvalidInputError, Single
 from burg_drake.dataset.appearance import Appearance
+from burg_drake.visualization import linear_light
 
 LINEAR_LEVELS = 1 << 14
 """Levels of linear light in the encoding table; the first sRGB steps span 5 of them."""
-
-
-def linear_from_srgb(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Linear light of sRGB values, both from 0 to 1."""
-    low = values <= 0.04045
-    return np.where(low, values / 12.92, ((np.maximum(values, 0.0) + 0.055) / 1.055) ** 2.4)
 
 
 def srgb_from_linear(values: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -62,8 +57,7 @@ def apply_photometry(
         spread = np.sqrt(light / made.electrons + (read_noise / made.electrons) ** 2)
         light += spread * rng.standard_normal(light.shape, dtype=np.float32)
     steps = np.clip(light * np.float32(LINEAR_LEVELS - 1) + np.float32(0.5), 0, LINEAR_LEVELS - 1)
-    encoded: Bytes = _srgb_encoding_table(made.gamma)[steps.astype(np.uint16)]
-    return encoded
+    return np.asarray(_srgb_encoding_table(made.gamma)[steps.astype(np.uint16)])
 
 
 def _pixel_gains(
@@ -81,15 +75,14 @@ def _pixel_gains(
         raise InvalidInputError(
             f"label {most} has no gain; the appearance is for a scene of {len(gains) - 1} objects"
         )
-    of_pixels: Single = gains[labels]
-    return of_pixels
+    return np.asarray(gains[labels])
 
 
 def _srgb_encoding_table(gamma: float) -> Bytes:
-    """(LEVELS,) sRGB of linear light."""
+    """(LINEAR_LEVELS,) sRGB of linear light."""
     light = np.linspace(0.0, 1.0, LINEAR_LEVELS) ** (1.0 / gamma)
     return np.asarray(srgb_from_linear(light) * 255.0 + 0.5, dtype=np.uint8)
 
 
-_LINEAR_OF_SRGB: Single = linear_from_srgb(np.arange(256) / 255.0).astype(np.float32)
+_LINEAR_OF_SRGB: Single = linear_light(np.arange(256) / 255.0).astype(np.float32)
 """Linear light of each of the 256 values of a channel."""

@@ -22,7 +22,7 @@ PixelBox = tuple[int, int, int, int]
 def normalized_coordinates(intrinsics: Intrinsics) -> tuple[Single, Single]:
     """x / z and y / z of the rays through the pixels' centres: (1, W) and (H, 1) of a camera
     without distortion, else (H, W) each."""
-    return _RayGrid.of(intrinsics).flat
+    return _ray_grid(intrinsics).flat
 
 
 def unit_directions(intrinsics: Intrinsics, pixels: PixelBox) -> Single:
@@ -30,7 +30,7 @@ def unit_directions(intrinsics: Intrinsics, pixels: PixelBox) -> Single:
     a camera without distortion."""
     left, top, right, bottom = pixels
     if not intrinsics.is_pinhole:
-        unit = _RayGrid.of(intrinsics).unit[top:bottom, left:right]
+        unit = _ray_grid(intrinsics).unit[top:bottom, left:right]
         return np.ascontiguousarray(unit).reshape(-1, 3)
     (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
     x = (np.arange(left, right, dtype=float) - cx) / fx
@@ -61,7 +61,7 @@ def pixels_around(
     flat = p_CQ[:, :2] / p_CQ[:, 2:]
     lower, upper = flat.min(axis=0), flat.max(axis=0)
     if not intrinsics.is_pinhole:
-        return _RayGrid.of(intrinsics).within(lower, upper)
+        return _ray_grid(intrinsics).pixel_box(lower, upper)
     size = np.array([intrinsics.width, intrinsics.height])
     reach = size if beyond else 0
     low = np.maximum(-reach, np.floor(lower * intrinsics.focal + intrinsics.center))
@@ -76,8 +76,7 @@ def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Arra
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     a, b = p_CQ[edges[before[edges[:, 0]] != before[edges[:, 1]]].T]
     share = (NEAR_DISTANCE - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
-    points: Array = np.concatenate([p_CQ[before], a + share * (b - a)])
-    return points
+    return np.asarray(np.concatenate([p_CQ[before], a + share * (b - a)]))
 
 
 def _unit_vectors(x: Array, y: Array) -> Single:
@@ -101,12 +100,7 @@ class _RayGrid:
         self.flat = x.astype(np.float32), y.astype(np.float32)
         self.unit = _unit_vectors(x, y)
 
-    @staticmethod
-    def of(intrinsics: Intrinsics) -> _RayGrid:
-        one = intrinsics
-        return _ray_grid(one.width, one.height, one.focal, one.center, one.distortion)
-
-    def within(self, lower: Array, upper: Array) -> PixelBox | None:
+    def pixel_box(self, lower: Array, upper: Array) -> PixelBox | None:
         """The pixels that look between bounds of x / z and y / z."""
         x, y = self.flat
         inside = (x >= lower[0]) & (x <= upper[0]) & (y >= lower[1]) & (y <= upper[1])
@@ -117,16 +111,8 @@ class _RayGrid:
 
 
 @lru_cache(maxsize=8)
-def _ray_grid(
-    width: int,
-    height: int,
-    focal: tuple[float, float],
-    center: tuple[float, float],
-    distortion: tuple[float, ...],
-) -> _RayGrid:
-    return _RayGrid(
-        Intrinsics(width=width, height=height, focal=focal, center=center, distortion=distortion)
-    )
+def _ray_grid(intrinsics: Intrinsics) -> _RayGrid:
+    return _RayGrid(intrinsics)
 
 
 BOX_NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
@@ -154,7 +140,6 @@ class RayBox:
             vertices: (V, 3) [m].
             faces: (F, 3).
         """
-        area_tolerance = 1e-6  # Relative difference between the surface's area and that of a box.
         lower, upper = vertices.min(axis=0), vertices.max(axis=0)
         size = upper - lower
         sides = np.minimum(np.abs(vertices - lower), np.abs(vertices - upper)) <= SURFACE_TOLERANCE
@@ -163,11 +148,11 @@ class RayBox:
             area = 2.0 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0])
         a, b, c = vertices[faces].transpose(1, 0, 2)
         found = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-        if not sides.any(axis=1).all() or abs(found - area) > area_tolerance * area:
+        if not sides.any(axis=1).all() or abs(found - area) > 1e-6 * area:
             return None
         return cls(lower, upper)
 
-    def nearness(self, intrinsics: Intrinsics, X_CB: Array) -> Single | None:
+    def inverse_depth(self, intrinsics: Intrinsics, X_CB: Array) -> Single | None:
         """(H, W) 1 / z [1/m] of where a camera's rays meet it, 0 where they do not; None if the
         camera is within it or in one of its planes.
 
@@ -259,7 +244,7 @@ class RaySurface:
         self._vertices, self._faces = vertices, faces
         self.box = RayBox.of_surface(vertices, faces)
 
-    def met(
+    def cast_rays(
         self, intrinsics: Intrinsics, X_CB: Array, *, beyond: bool = False
     ) -> SurfaceHits | None:
         """What a camera's rays meet; None if there are no pixels that could show it.
@@ -300,8 +285,7 @@ class RaySurface:
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         unit = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
-        single: Single = unit.astype(np.float32)
-        return single
+        return np.asarray(unit.astype(np.float32))
 
 
 def surfaces_of_body(label: int, parts: Sequence[tuple[Array, Indices]]) -> list[RaySurface]:
@@ -347,7 +331,7 @@ class Silhouette:
     top: int
     mask: NDArray[np.bool_]
 
-    def within(self, width: int, height: int) -> NDArray[np.bool_]:
+    def mask_in_image(self, width: int, height: int) -> NDArray[np.bool_]:
         """(height, width) the part that lies in an image of that size."""
         image = np.zeros((height, width), bool)
         rows, columns = self.mask.shape
@@ -375,11 +359,11 @@ class RayScene:
 
     def images(self, view: View, *, normals: bool = False) -> Images:
         """Depth and labels of a view; its normals as well if asked for."""
-        depth, directions, meshes = self._boxes_seen(view, normals)
+        depth, directions, meshes = self._render_boxes(view, normals)
         labels = np.full(depth.shape, SURROUNDINGS_LABEL, np.uint16)
         self._last = view, {}
         for surface, X_CB in meshes:
-            met = surface.met(view.intrinsics, X_CB)
+            met = surface.cast_rays(view.intrinsics, X_CB)
             self._last[1][surface.label] = met
             if met is None:
                 continue
@@ -396,7 +380,7 @@ class RayScene:
 
     def silhouette(self, number: int, view: View) -> Silhouette:
         """As `SceneRenderer.silhouette`."""
-        met = self._met_whole(number, view)
+        met = self._cast_whole_surface(number, view)
         mask = np.zeros((0, 0), bool) if met is None else met.face != NO_FACE
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if met is None or not len(rows):
@@ -405,7 +389,7 @@ class RayScene:
         left, top, _, _ = met.pixels
         return Silhouette(left + int(columns[0]), top + int(rows[0]), cut)
 
-    def _boxes_seen(
+    def _render_boxes(
         self, view: View, normals: bool
     ) -> tuple[Single, Single | None, list[tuple[RaySurface, Array]]]:
         """Depth and normals of what is seen of boxes alone, and what rays have to be cast at."""
@@ -416,7 +400,7 @@ class RayScene:
         for surface, X_SB in self._placed:
             X_CB, box, seen = X_CS @ X_SB, surface.box, None
             if box is not None and surface.label == SURROUNDINGS_LABEL:
-                seen = box.nearness(view.intrinsics, X_CB)
+                seen = box.inverse_depth(view.intrinsics, X_CB)
             if box is None or seen is None:
                 meshes.append((surface, X_CB))
                 continue
@@ -430,7 +414,7 @@ class RayScene:
             depth = np.divide(1.0, nearness, out=nearness)
         return depth, np.take(of_plane, plane, axis=0) if normals else None, meshes
 
-    def _met_whole(self, number: int, view: View) -> SurfaceHits | None:
+    def _cast_whole_surface(self, number: int, view: View) -> SurfaceHits | None:
         """What rays in the image and beyond it meet of an object; what the last image found of it
         if that is all."""
         last, found = self._last
@@ -441,4 +425,4 @@ class RayScene:
             if left > 0 and top > 0 and right < width and bottom < height:
                 return known
         surface, X_SB = self._of_label[number]
-        return surface.met(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)
+        return surface.cast_rays(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)

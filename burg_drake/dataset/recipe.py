@@ -74,9 +74,7 @@ class DatasetRecipe:
     views: int = setting(20, "images of each scene and camera", metavar="K", low=1)
     viewpoints: ViewpointSettings = ViewpointSettings()
     sensor: str = setting(
-        "",
-        "depth camera to imitate: d435, d455, azure_kinect, zivid_two, kinect",
-        metavar="NAME",
+        "", "depth camera to imitate: d435, d455, azure_kinect, zivid_two, kinect", metavar="NAME"
     )
     size: tuple[int, int] | None = None
     looks: AppearanceSettings | None = AppearanceSettings()
@@ -97,7 +95,8 @@ class DatasetRecipe:
             depth_noise(self.sensor)
         if self.renderer not in RENDERERS:
             raise FieldError(
-                f"renderer {self.renderer!r} does not exist; {suggest_names(self.renderer, RENDERERS)}",
+                f"renderer {self.renderer!r} does not exist;"
+                f" {suggest_names(self.renderer, RENDERERS)}",
                 "renderer",
             )
         if self.run and self.grasps_per_object:

@@ -1,7 +1,7 @@
 """A room around the table: its environment map, and the background that it gives to images.
 
-The room has walls with windows and furniture, a ceiling with lamps, and a floor. It is drawn once as
-an image of all directions, infinitely far from the camera.
+The room has walls with windows and furniture, a ceiling with lamps, and a floor. It is drawn once
+as an image of all directions, infinitely far from the camera.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import numpy as np
 from burg_drake.cameras import FieldOfView, Intrinsics
 from burg_drake.core import Array, Booleans, Bytes, Single, rng_from
 from burg_drake.dataset.appearance import Appearance
-from burg_drake.dataset.photometry import linear_from_srgb, srgb_from_linear
+from burg_drake.dataset.photometry import srgb_from_linear
 from burg_drake.dataset.textures import layered_noise
+from burg_drake.visualization import linear_light
 
 ENVIRONMENT_ROWS = 512
 """Rows of the environment map, which has twice as many columns."""
@@ -58,12 +59,11 @@ def environment_map(seed: int) -> Bytes:
     Returns:
         (ROWS, 2 ROWS, 3) sRGB; see `environment_directions` for where its pixels look.
     """
-    table_height = 0.75  # Metres; usual height of tables.
     rng = rng_from("room", seed)
     d_W = environment_directions()
     half = np.array([rng.uniform(2.0, 4.5), rng.uniform(2.0, 4.5)])
     height = rng.uniform(2.5, 3.3)
-    p_W = np.array([*(rng.uniform(-0.5, 0.5, 2) * half), table_height])
+    p_W = np.array([*(rng.uniform(-0.5, 0.5, 2) * half), 0.75])  # on the table
     upper = np.array([*half, height])
     lower = np.array([*-half, 0.0])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -102,11 +102,9 @@ def room_radiance(seed: int, irradiance: float) -> Single:
         (RADIANCE_ROWS, 2 RADIANCE_ROWS, 3) linear, arranged as `environment_map`.
     """
     radiance_rows = 64  # Rows of the image that lights the scene.
-    lamp_threshold = 0.98  # Pixels brighter than this (0 to 1) show lamps or windows.
-    lamp_gain = 8.0  # Radiance of lamps and windows relative to their brightness in the image.
     seen = environment_map(seed) / 255.0
-    light = linear_from_srgb(seen)
-    light[np.all(seen > lamp_threshold, axis=2)] *= lamp_gain
+    light = linear_light(seen)
+    light[np.all(seen > 0.98, axis=2)] *= 8.0  # lamps and windows
     size = (2 * radiance_rows, radiance_rows)
     small = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA))
     up = environment_directions(radiance_rows)[..., 2]
@@ -276,8 +274,8 @@ def blend_over_background(
     if mixed.any():
         behind = _background_colors(mixed, X_WC, intrinsics, look)[mixed]
         part = share[mixed, None] / 255.0
-        before = linear_from_srgb(found[mixed] / 255.0)
-        light = part * before + (1.0 - part) * linear_from_srgb(behind / 255.0)
+        before = linear_light(found[mixed] / 255.0)
+        light = part * before + (1.0 - part) * linear_light(behind / 255.0)
         found[mixed] = srgb_from_linear(light) * 255.0 + 0.5
     return found
 
@@ -295,11 +293,11 @@ def _background_colors(
 
 
 def _blend_edge_pixels(color: Bytes, nothing: Booleans, edge: Booleans, behind: Bytes) -> Bytes:
-    """(N, 3) pixels of edges, which the renderer has mixed with `NO_SURFACE_COLOR`, mixed with what is
-    behind instead.
+    """(N, 3) pixels of edges, which the renderer has mixed with `NO_SURFACE_COLOR`, mixed with what
+    is behind instead.
 
-    The share of `NO_SURFACE_COLOR` in a pixel follows from how much more red and blue it has than green,
-    compared with pixels around it that are not mixed.
+    The share of `NO_SURFACE_COLOR` in a pixel follows from how much more red and blue it has than
+    green, compared with pixels around it that are not mixed.
     """
     solid = (~nothing & ~edge).astype(np.float32)
     excess = color[..., [0, 2]].astype(np.float32).mean(axis=2) - color[..., 1]
@@ -329,5 +327,4 @@ def _sample_environment_map(room: Bytes, pixels: Array) -> Bytes:
 def _pixel_directions(intrinsics: Intrinsics) -> Array:
     """(H, W, 3) unit vectors in the camera's frame."""
     along = FieldOfView(intrinsics).directions
-    unit: Array = along / np.linalg.norm(along, axis=2, keepdims=True)
-    return unit
+    return np.asarray(along / np.linalg.norm(along, axis=2, keepdims=True))

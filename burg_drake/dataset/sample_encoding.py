@@ -53,21 +53,16 @@ class PngKind:
     filter: int
 
 
+_RLE, _UP = cv2.IMWRITE_PNG_STRATEGY_RLE, cv2.IMWRITE_PNG_FILTER_UP
+_FILTERED, _NONE = cv2.IMWRITE_PNG_STRATEGY_FILTERED, cv2.IMWRITE_PNG_FILTER_NONE
+_DEFAULT = cv2.IMWRITE_PNG_STRATEGY_DEFAULT
+
 PNG_KINDS = {
-    "color": PngKind((np.uint8,), 3, cv2.IMWRITE_PNG_STRATEGY_RLE, cv2.IMWRITE_PNG_FILTER_UP),
-    "depth": PngKind((np.uint16,), 1, cv2.IMWRITE_PNG_STRATEGY_DEFAULT, cv2.IMWRITE_PNG_FILTER_UP),
-    "labels": PngKind(
-        (np.uint8, np.uint16),
-        1,
-        cv2.IMWRITE_PNG_STRATEGY_FILTERED,
-        cv2.IMWRITE_PNG_FILTER_NONE,
-    ),
-    "normals": PngKind(
-        (np.uint16,), 3, cv2.IMWRITE_PNG_STRATEGY_DEFAULT, cv2.IMWRITE_PNG_FILTER_UP
-    ),
-    "sensor_depth": PngKind(
-        (np.uint16,), 1, cv2.IMWRITE_PNG_STRATEGY_RLE, cv2.IMWRITE_PNG_FILTER_UP
-    ),
+    "color": PngKind((np.uint8,), 3, _RLE, _UP),
+    "depth": PngKind((np.uint16,), 1, _DEFAULT, _UP),
+    "labels": PngKind((np.uint8, np.uint16), 1, _FILTERED, _NONE),
+    "normals": PngKind((np.uint16,), 3, _DEFAULT, _UP),
+    "sensor_depth": PngKind((np.uint16,), 1, _RLE, _UP),
 }
 """Kinds of images by their names in a sample and in file names."""
 
@@ -370,7 +365,7 @@ def decode_grasps(data: bytes, where: str) -> LabelledGrasps:
     ):
         file = NpzFile(Path(where), archive)
         poses = file.array("X_CG")
-        n = poses.rows(4, 4)
+        n = poses.require_rows(4, 4)
         grasps = LabelledGrasps(
             X_CG=check_pose(poses.read("f"), "X_CG"),
             width=file.array("width").read("f", (n,)).astype(float),

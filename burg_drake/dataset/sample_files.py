@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -15,7 +16,6 @@ from burg_drake.cameras import Intrinsics
 from burg_drake.core import (
     Array,
     DocumentError,
-    FileLimits,
     InvalidInputError,
     UnknownNameError,
     check_pose,
@@ -27,8 +27,6 @@ from burg_drake.core import (
 from burg_drake.dataset.sample import Box, Images, InstanceLabel, Sample
 from burg_drake.dataset.sample_encoding import (
     PNG_KINDS,
-    decode_grasps,
-    decode_image_of,
     decode_mask,
     depth_unit_of,
     encode_grasps,
@@ -69,11 +67,11 @@ class PlainFields:
                 raise DocumentError(f"{where}: key {name!r} is missing")
         self._values = values
 
-    def within(self, name: str, names: Iterable[str]) -> PlainFields:
+    def nested(self, name: str, names: Iterable[str]) -> PlainFields:
         """A mapping in this one."""
         return PlainFields(self._values[name], names, f"{self.where}: {name}")
 
-    def each(self, name: str, names: Iterable[str]) -> list[PlainFields]:
+    def nested_list(self, name: str, names: Iterable[str]) -> list[PlainFields]:
         """The mappings of a list."""
         names, where = list(names), f"{self.where}: {name}"
         return [
@@ -84,24 +82,24 @@ class PlainFields:
         """A text."""
         value = self._values[name]
         if not isinstance(value, str) or "\0" in value:
-            raise self.wrong(name, "a text")
+            raise self._unexpected(name, "a text")
         return value
 
     def texts(self, name: str) -> list[str]:
         """A list of texts."""
         values = self._list(name)
         if not all(isinstance(value, str) for value in values):
-            raise self.wrong(name, "a list of texts")
+            raise self._unexpected(name, "a list of texts")
         return values
 
-    def whole(self, name: str, low: int = 0, high: int = MAX_EXACT_INTEGER) -> int:
+    def integer(self, name: str, low: int = 0, high: int = MAX_EXACT_INTEGER) -> int:
         """A whole number in this range."""
         value = self._values[name]
         if type(value) is not int or not low <= value <= high:
-            raise self.wrong(name, f"a whole number from {low} to {high}")
+            raise self._unexpected(name, f"a whole number from {low} to {high}")
         return value
 
-    def wholes(self, name: str, count: int) -> tuple[int, ...] | None:
+    def integers(self, name: str, count: int) -> tuple[int, ...] | None:
         """So many whole numbers, or None for null."""
         values = self._values[name]
         if values is None:
@@ -110,7 +108,7 @@ class PlainFields:
         if not good or any(
             type(value) is not int or abs(value) > MAX_EXACT_INTEGER for value in values
         ):
-            raise self.wrong(name, f"{count} whole numbers, or null")
+            raise self._unexpected(name, f"{count} whole numbers, or null")
         return tuple(values)
 
     def number(self, name: str, low: float = -math.inf, high: float = math.inf) -> float:
@@ -118,7 +116,7 @@ class PlainFields:
         value = self._values[name]
         if not _is_number(value) or not low <= value <= high:
             among = "" if low == -math.inf else f" from {low:g} to {high:g}"
-            raise self.wrong(name, f"a finite number{among}")
+            raise self._unexpected(name, f"a finite number{among}")
         return float(value)
 
     def numbers(self, name: str, count: int | None = None) -> tuple[float, ...]:
@@ -127,14 +125,14 @@ class PlainFields:
         if len(values) != (len(values) if count is None else count) or not all(
             map(_is_number, values)
         ):
-            raise self.wrong(name, f"a list of {'' if count is None else f'{count} '}numbers")
+            raise self._unexpected(name, f"a list of {'' if count is None else f'{count} '}numbers")
         return tuple(map(float, values))
 
     def pose(self, name: str) -> Array:
         """A (4, 4) pose, as four lists of four numbers."""
         rows = self._list(name)
         if not all(isinstance(row, list) and all(map(_is_number, row)) for row in rows):
-            raise self.wrong(name, "a pose, four lists of four numbers")
+            raise self._unexpected(name, "a pose, four lists of four numbers")
         try:
             return check_pose(rows, name)
         except ValueError as error:  # rows of different lengths, too
@@ -144,26 +142,32 @@ class PlainFields:
         """A mapping, with whatever it holds."""
         value = self._values[name]
         if not isinstance(value, dict):
-            raise self.wrong(name, "a mapping")
+            raise self._unexpected(name, "a mapping")
         return value
 
     def is_null(self, name: str) -> bool:
         """There is nothing under this name."""
         return self._values[name] is None
 
-    def wrong(self, name: str, expected: str) -> DocumentError:
+    def _unexpected(self, name: str, expected: str) -> DocumentError:
         """The error about a value that is not what is expected."""
         value = quote_value(self._values[name])
         return DocumentError(f"{self.where}: {name} is {value}; expected {expected}")
 
-    def refused(self, error: InvalidInputError) -> DocumentError:
-        """An error about what was made of the values, with the place."""
-        return DocumentError(f"{self.where}: {error}")
+    @contextmanager
+    def locate_errors(self) -> Iterator[None]:
+        """Puts this mapping's place before errors that do not name it."""
+        try:
+            yield
+        except DocumentError:
+            raise
+        except InvalidInputError as error:
+            raise DocumentError(f"{self.where}: {error}") from error
 
     def _list(self, name: str) -> list[Any]:
         value = self._values[name]
         if not isinstance(value, list):
-            raise self.wrong(name, "a list")
+            raise self._unexpected(name, "a list")
         return value
 
 
@@ -185,7 +189,7 @@ INSTANCE_KEYS = (
 
 
 class SampleLimits:
-    """Sample limits."""
+    """Limits of samples that are written and read."""
 
     image_pixels = 1 << 26  # Pixels of an image: 8192 x 8192.
     mask_pixels = 1 << 30  # Pixels of all masks of a sample: 3,400 objects at 640 x 480.
@@ -232,8 +236,8 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
     ):
         raise InvalidInputError(
             f"sample {sample.key} is too large with {width} x {height} pixels and {count}"
-            f" instances: an image may have {SampleLimits.image_pixels:,} pixels, and all masks together"
-            f" {SampleLimits.mask_pixels:,}"
+            f" instances: an image may have {SampleLimits.image_pixels:,} pixels, and all masks"
+            f" together {SampleLimits.mask_pixels:,}"
         )
     values = {
         "version": RECORD_VERSION,
@@ -274,12 +278,13 @@ def parse_record(text: str, where: str) -> SampleRecord:
     version = values.get("version") if isinstance(values, dict) else None
     if version != RECORD_VERSION:
         raise DocumentError(
-            f"{where}: the sample has version {version!r}; this release reads version {RECORD_VERSION}"
+            f"{where}: the sample has version {version!r}; this release reads version"
+            f" {RECORD_VERSION}"
         )
     fields = PlainFields(values, record_keys, where)
-    view = _read_view(fields.within("view", view_keys))
+    view = _read_view(fields.nested("view", view_keys))
     width, height = view.intrinsics.width, view.intrinsics.height
-    instances = fields.each("instances", INSTANCE_KEYS)
+    instances = fields.nested_list("instances", INSTANCE_KEYS)
     if (
         len(instances) > SampleLimits.instances
         or len(instances) * width * height > SampleLimits.mask_pixels
@@ -288,8 +293,8 @@ def parse_record(text: str, where: str) -> SampleRecord:
             f"{where}: {len(instances)} instances are too many for images of this size"
         )
     sample = Sample(
-        scene=fields.whole("scene"),
-        number=fields.whole("number"),
+        scene=fields.integer("scene"),
+        number=fields.integer("number"),
         view=view,
         X_WS=fields.pose("X_WS"),
         images=Images(),
@@ -322,32 +327,28 @@ def _write_instance(instance: InstanceLabel) -> dict[str, Any]:
 
 
 def _read_view(fields: PlainFields) -> View:
-    intrinsics = _read_intrinsics(fields.within("intrinsics", INTRINSICS_KEYS))
+    intrinsics = _read_intrinsics(fields.nested("intrinsics", INTRINSICS_KEYS))
     near, far = fields.numbers("depth_range", 2)
-    try:
+    with fields.locate_errors():
         view = View(
             camera=fields.text("camera"),
             intrinsics=intrinsics,
             X_SC=fields.pose("X_SC"),
             depth_range=(near, far),
         )
-    except DocumentError:
-        raise
-    except InvalidInputError as error:
-        raise fields.refused(error) from error
     return view if fields.is_null("posture") else replace(view, posture=fields.numbers("posture"))
 
 
 def _read_intrinsics(fields: PlainFields) -> Intrinsics:
     max_side = 1 << 15  # Pixels.
-    width, height = (fields.whole(name, 1, max_side) for name in ("width", "height"))
+    width, height = (fields.integer(name, 1, max_side) for name in ("width", "height"))
     if width * height > SampleLimits.image_pixels:
         raise DocumentError(
             f"{fields.where}: {width} x {height} pixels are too many; an image may have"
             f" {SampleLimits.image_pixels:,}"
         )
     focal, center = fields.numbers("focal", 2), fields.numbers("center", 2)
-    try:
+    with fields.locate_errors():
         return Intrinsics(
             camera=fields.text("camera"),
             width=width,
@@ -357,29 +358,21 @@ def _read_intrinsics(fields: PlainFields) -> Intrinsics:
             distortion=fields.numbers("distortion"),
             residual=None if fields.is_null("residual") else fields.number("residual"),
         )
-    except DocumentError:
-        raise
-    except InvalidInputError as error:
-        raise fields.refused(error) from error
 
 
 def _read_instance(fields: PlainFields, height: int, width: int) -> InstanceLabel:
-    try:
+    with fields.locate_errors():
         amodal = decode_mask(fields.text("amodal"), height, width)
-    except DocumentError:
-        raise
-    except InvalidInputError as error:
-        raise fields.refused(error) from error
     return InstanceLabel(
         name=fields.text("name"),
         object=fields.text("object"),
-        number=fields.whole("number", 1, SampleLimits.instances),
+        number=fields.integer("number", 1, SampleLimits.instances),
         X_CO=fields.pose("X_CO"),
-        visible_pixels=fields.whole("visible_pixels"),
-        silhouette_pixels=fields.whole("silhouette_pixels"),
+        visible_pixels=fields.integer("visible_pixels"),
+        silhouette_pixels=fields.integer("silhouette_pixels"),
         visibility=fields.number("visibility", 0.0, 1.0),
-        visible_box=cast(Box | None, fields.wholes("visible_box", 4)),
-        amodal_box=cast(Box | None, fields.wholes("amodal_box", 4)),
+        visible_box=cast(Box | None, fields.integers("visible_box", 4)),
+        amodal_box=cast(Box | None, fields.integers("amodal_box", 4)),
         amodal=amodal,
     )
 
@@ -475,58 +468,6 @@ def check_part_names(parts: Iterable[str]) -> frozenset[str]:
                 f"samples have no part {name!r}; {suggest_names(name, READABLE_PARTS)}"
             )
     return asked
-
-
-def read_record(key: str, read: Callable[[str, int], bytes], where: str) -> SampleRecord:
-    """The record of a sample.
-
-    Args:
-        key: of the sample.
-        read: content of a file by its kind, with the most bytes that it may have.
-        where: shard, for messages.
-
-    Raises:
-        DocumentError: it is damaged, of another version, or of another sample.
-    """
-    where = f"{where}: {key}.{FILE_SUFFIXES[RECORD_KIND]}"
-    try:
-        text = read(RECORD_KIND, FileLimits.document.size).decode()
-    except UnicodeDecodeError as error:
-        raise DocumentError(f"{where} is not text") from error
-    record = parse_record(text, where)
-    if record.sample.key != key:
-        raise DocumentError(f"{where} belongs to sample {record.sample.key}")
-    return record
-
-
-def read_parts(
-    record: SampleRecord, asked: Iterable[str], read: Callable[[str, int], bytes], where: str
-) -> Sample:
-    """A sample with those of its images and grasps that are asked for.
-
-    Args:
-        record: of the sample.
-        asked: of `READABLE_PARTS`; what the sample does not have stays None.
-        read, where: see `read_record`.
-
-    Raises:
-        InvalidInputError: a file is missing, damaged, or does not fit.
-    """
-    max_size = 256 << 20  # Bytes of a file other than the record.
-    sample, found = record.sample, {}
-    for name in asked:
-        if name not in record.files:
-            continue
-        place = f"{where}: {sample.key}.{FILE_SUFFIXES[name]}"
-        data = read(name, max_size)
-        if name == GRASPS_KIND:
-            grasps = decode_grasps(data, place)
-            require_fitting(grasps, len(sample.instances), place)
-            sample = replace(sample, grasps=grasps)
-        else:
-            found[name] = decode_image_of(name, data, record.size, record.depth_unit, place)
-    sensor_depth = found.pop("sensor_depth", None)
-    return replace(sample, images=Images(**found), sensor_depth=sensor_depth)
 
 
 def _available_images(sample: Sample) -> dict[str, Any]:

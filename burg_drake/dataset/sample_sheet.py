@@ -28,17 +28,12 @@ LUMA_WEIGHTS = (0.299, 0.587, 0.114)
 
 
 class SheetStyle:
-    """Sheet style."""
+    """Sizes [pixel] and colours (sRGB) of a contact sheet."""
 
-    panel_width = 320  # Pixels.
-    gap = 6  # Pixels between panels.
-    caption_height = 20  # Pixels.
-    background_color = (255, 255, 255)  # sRGB.
-    text_color = (29, 35, 40)  # sRGB.
-    no_depth_color = (70, 70, 70)  # sRGB of pixels without depth.
-    no_labels_color = (225, 229, 233)  # sRGB of the panel of a sample without labels.
-    label_opacity = 0.5  # Opacity of the labels on the picture, 0 to 1.
-    font_size = 12  # Pixels.
+    panel_width = 320
+    gap = 6  # Between panels.
+    background_color = (255, 255, 255)
+    font_size = 12
 
 
 SMALL_PNG_OPTIONS = (cv2.IMWRITE_PNG_COMPRESSION, 9)
@@ -70,7 +65,7 @@ def contact_sheet(
     Raises:
         InvalidInputError: another suffix, no samples, or the file cannot be written.
     """
-    suffixes = (".png", ".html")  # Formats of a contact sheet.
+    suffixes = (".png", ".html")
     path = Path(path)
     if path.suffix not in suffixes:
         raise InvalidInputError(f"{path} must end in {' or '.join(suffixes)}")
@@ -98,17 +93,11 @@ def sheet_png(samples: Sequence[Sample], columns: int) -> bytes:
     tall, wide = (max(cell.shape[k] for cell in cells) for k in (0, 1))
     columns = min(columns, len(cells))
     rows = -(-len(cells) // columns)
-    size = (
-        rows * (tall + SheetStyle.gap) + SheetStyle.gap,
-        columns * (wide + SheetStyle.gap) + SheetStyle.gap,
-        3,
-    )
+    gap = SheetStyle.gap
+    size = (rows * (tall + gap) + gap, columns * (wide + gap) + gap, 3)
     sheet = np.full(size, SheetStyle.background_color, dtype=np.uint8)
     for k, cell in enumerate(cells):
-        y, x = (
-            SheetStyle.gap + k // columns * (tall + SheetStyle.gap),
-            SheetStyle.gap + k % columns * (wide + SheetStyle.gap),
-        )
+        y, x = gap + k // columns * (tall + gap), gap + k % columns * (wide + gap)
         sheet[y : y + cell.shape[0], x : x + cell.shape[1]] = cell
     return encode_png(sheet, SMALL_PNG_OPTIONS)
 
@@ -133,7 +122,7 @@ def depth_colors(depth: Single, limits: tuple[float, float]) -> Bytes:
     lower, upper = limits
     share = np.clip(1.0 - (depth - lower) / max(upper - lower, 1e-6), 0.0, 1.0)
     colors = np.rint(255.0 * map_colors(share)).astype(np.uint8)
-    colors[depth <= 0.0] = SheetStyle.no_depth_color
+    colors[depth <= 0.0] = (70, 70, 70)
     return colors
 
 
@@ -164,18 +153,14 @@ def _draw_labels(sample: Sample, height: int) -> Bytes:
     """Labels over the picture in grey, with names and boxes."""
     labels, color = sample.images.labels, sample.images.color
     if labels is None:
-        return np.full(
-            (height, SheetStyle.panel_width, 3), SheetStyle.no_labels_color, dtype=np.uint8
-        )
+        return np.full((height, SheetStyle.panel_width, 3), (225, 229, 233), dtype=np.uint8)
     grey = np.full((*labels.shape, 3), 128.0)
     if color is not None:
         grey[:] = (color @ np.array(LUMA_WEIGHTS))[..., None]
     tints = _instance_colors(sample.instances)
     for label in sample.instances:
         mask = labels == label.number
-        grey[mask] = (1.0 - SheetStyle.label_opacity) * grey[
-            mask
-        ] + SheetStyle.label_opacity * np.array(tints[label.number])
+        grey[mask] = 0.5 * grey[mask] + 0.5 * np.array(tints[label.number])
     picture = Image.fromarray(_resize_to_panel(grey.astype(np.uint8), height))
     draw = ImageDraw.Draw(picture)
     scale = picture.width / labels.shape[1]
@@ -248,13 +233,9 @@ def _resize_to_panel(image: Bytes, height: int) -> Bytes:
 
 def _captioned_picture(sample: Sample) -> Bytes:
     picture = sample_picture(sample)
-    strip = Image.new(
-        "RGB", (picture.shape[1], SheetStyle.caption_height), SheetStyle.background_color
-    )
+    strip = Image.new("RGB", (picture.shape[1], 20), SheetStyle.background_color)
     font = ImageFont.load_default(size=SheetStyle.font_size)
-    ImageDraw.Draw(strip).text(
-        (1, 2), sample_caption(sample), fill=SheetStyle.text_color, font=font
-    )
+    ImageDraw.Draw(strip).text((1, 2), sample_caption(sample), fill=(29, 35, 40), font=font)
     return np.vstack([np.asarray(strip), picture])
 
 

@@ -37,7 +37,7 @@ from burg_drake.visualization import (
 
 
 class SamplePaths:
-    """Sample paths."""
+    """Meshcat paths of a sample."""
 
     cloud = "/drake/cloud"  # Meshcat path of the exact depth.
     sensor = "/drake/sensor"  # Meshcat path of the sensor's depth.
@@ -67,16 +67,12 @@ def show_sample(
     Raises:
         InvalidInputError: the view's posture is of another arm.
     """
-    models_path = "/drake/visualizer"  # Meshcat path of the models.
-    names_path = "/drake/labels"  # Meshcat path of the models' names.
-    picture_depth = 0.15  # Metres from the camera at which its image is drawn.
-    models_color = "#9aa3ad"  # Colour of the models in the legend.
     view = sample.view
     X_WC = sample.X_WS @ view.X_SC
     built = show_scene(scene, station, meshcat, robot="none" if view.posture is None else "arm")
     if view.posture is not None:
         _publish_posture(built, view.posture)
-    legend = [LegendEntry("models", models_color, (models_path, names_path))]
+    legend = [LegendEntry("models", "#9aa3ad", ("/drake/visualizer", "/drake/labels"))]
     for path in (SamplePaths.cloud, SamplePaths.sensor, SamplePaths.camera, GRASPS_PATH):
         meshcat.Delete(path)  # of a sample that was shown before
     for depth, path in (
@@ -85,7 +81,7 @@ def show_sample(
     ):
         if depth is not None:
             legend.append(_draw_depth(meshcat, path, depth, sample, X_WC))
-    corners = picture_corners(view.intrinsics, picture_depth)
+    corners = picture_corners(view.intrinsics, depth=0.15)
     _draw_camera(meshcat, corners, sample.images.color, X_WC)
     legend.append(LegendEntry("camera with its image", VIEW_CAMERA_COLOR, (SamplePaths.camera,)))
     if sample.grasps is not None:
@@ -126,11 +122,6 @@ def _draw_depth(
     max_points = 80_000  # Points of a cloud (3 MB of a page); larger images are thinned out.
     # Point size by spacing of far points; three.js draws them 2.4 times too small.
     size_factor = 3.5
-    near_share = 0.9  # Share of the points that are nearer than far ones.
-    # Name and colour of the cloud, and the share of this colour in its points.
-    exact_style = "depth", (0.19, 0.41, 0.56), 0.0
-    # The same for the cloud of the sensor.
-    sensor_style = "depth of the sensor", (0.84, 0.14, 0.62), 0.4
     there = np.count_nonzero(depth)
     step = max(1, int(np.ceil(np.sqrt(there / max_points))))
     shown = np.zeros_like(depth)
@@ -138,17 +129,16 @@ def _draw_depth(
     intrinsics = sample.view.intrinsics
     cloud = depth_cloud(shown, intrinsics, color=sample.images.color)
     exact = path == SamplePaths.cloud
-    name, rgb, tint = exact_style if exact else sensor_style
+    # name and colour of the cloud, and the share of this colour in its points
+    name, rgb, tint = "depth of the sensor", (0.84, 0.14, 0.62), 0.4
+    if exact:
+        name, rgb, tint = "depth", (0.19, 0.41, 0.56), 0.0
     colors = np.tile(rgb, (len(cloud), 1))
     if cloud.color is not None:
         colors = (1.0 - tint) * cloud.color / 255.0 + tint * colors
     if len(cloud):
-        side = (
-            size_factor
-            * step
-            * float(np.quantile(cloud.points[:, 2], near_share))
-            / intrinsics.focal[0]
-        )
+        far = float(np.quantile(cloud.points[:, 2], 0.9))
+        side = size_factor * step * far / intrinsics.focal[0]
         _draw_points(meshcat, path, cloud.points, colors, side)
         meshcat.SetTransform(path, RigidTransform(X_WC))
         meshcat.SetProperty(path, "visible", exact)
@@ -191,11 +181,8 @@ def _draw_grasps(meshcat: Meshcat, grasps: LabelledGrasps, X_WC: Array) -> list[
 
 def _viewing_direction(X_WC: Array) -> Array:
     """(3,) where the eye looks: from the camera's side, which is somewhere if it looks down."""
-    azimuth_offset_deg = 50.0  # Degrees about the vertical from the camera's direction.
-    downward_slope = 0.45  # Downward slope of the direction of view.
     ahead = X_WC[:3, 2] * (1.0, 1.0, 0.0)
     if np.linalg.norm(ahead) < 1e-3:
         ahead = -X_WC[:3, 1] * (1.0, 1.0, 0.0)
-    level = rot_z(np.deg2rad(azimuth_offset_deg)) @ (ahead / np.linalg.norm(ahead))
-    forward: Array = level - np.array([0.0, 0.0, downward_slope])
-    return forward
+    level = rot_z(np.deg2rad(50.0)) @ (ahead / np.linalg.norm(ahead))
+    return np.asarray(level - np.array([0.0, 0.0, 0.45]))

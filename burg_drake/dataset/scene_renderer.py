@@ -5,10 +5,10 @@ Drake or Blender renders the colours; `ray_casting` gives depth, labels and norm
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property, lru_cache, partial
-from typing import Any, Literal
+from functools import cached_property, lru_cache
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -51,131 +51,33 @@ from burg_drake.station import (
     visible_surfaces,
 )
 
-CLIPPING_FACTOR = 0.5
-"""Ratio of nearest rendered to nearest measured depth; its inverse for the farthest."""
-
-
-Fill = Callable[[Bytes, Array, Intrinsics], Bytes]
-"""From colours (H, W, 3), camera's optical frame in the world and intrinsics to colours."""
-
-
-class DrakeColors:
-    """Renders colours from any place.
-
-    Args:
-        query: of the diagram's scene graph, in a context.
-        world: its world frame.
-        renderer: name of the render engine.
-        fill: puts what is behind everything into its images, if anything.
-    """
-
-    def __init__(
-        self, query: QueryObject, world: Any, renderer: str, fill: Fill | None = None
-    ) -> None:
-        self._query, self._world, self._renderer, self._fill = query, world, renderer, fill
-
-    def image(self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]) -> Bytes:
-        """(H, W, 3) what a camera at `X_WC` sees. A lens with distortion is a pinhole camera that
-        sees all that it sees, with pixels as fine, looked up where its pixels look.
-
-        Raises:
-            InvalidInputError: it sees nearly to its sides.
-        """
-        if intrinsics.is_pinhole:
-            return self._pinhole(intrinsics, X_WC, depth_range)
-        wide, at = covering_pinhole(intrinsics)
-        image = self._pinhole(wide, X_WC, depth_range)
-        return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
-
-    def _pinhole(
-        self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
-    ) -> Bytes:
-        near, far = depth_range
-        core = RenderCameraCore(
-            self._renderer,
-            camera_info(intrinsics),
-            ClippingRange(CLIPPING_FACTOR * near, far / CLIPPING_FACTOR),
-            RigidTransform(),
-        )
-        camera = ColorRenderCamera(core, False)
-        image = self._query.RenderColorImage(camera, self._world, RigidTransform(X_WC))
-        colors = np.asarray(cv2.cvtColor(image.data, cv2.COLOR_RGBA2RGB), np.uint8)
-        return colors if self._fill is None else self._fill(colors, X_WC, intrinsics)
-
 
 @lru_cache(maxsize=8)
-def _covering_pinhole_of(key: tuple[Any, ...]) -> tuple[Intrinsics, Single]:
+def covering_pinhole(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
+    """A pinhole camera that sees all that one with distortion sees, and (H, W, 2) where the pixels
+    of that one are in its image.
+
+    Raises:
+        InvalidInputError: it sees nearly to its sides.
+    """
     max_tangent = 4.0  # Tangent of the largest angle to the optical axis: 76 degrees.
-    width, height, focal, center, distortion = key
-    intrinsics = Intrinsics(
-        width=width, height=height, focal=focal, center=center, distortion=distortion
-    )
     flat = FieldOfView(intrinsics).directions[..., :2]
     low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
     if max(np.abs(low).max(), np.abs(high).max()) > max_tangent:
         raise InvalidInputError(
-            f"the lens sees more than {np.degrees(np.arctan(max_tangent)):.0f} degrees from its axis;"
-            " colour images of this camera cannot be rendered"
+            f"the lens sees more than {np.degrees(np.arctan(max_tangent)):.0f} degrees from its"
+            " axis; colour images of this camera cannot be rendered"
         )
-    start = np.floor(low * focal) - 1.0
-    size = (np.ceil(high * focal) + 1.0 - start).astype(int) + 1
+    start = np.floor(low * intrinsics.focal) - 1.0
+    width, height = (np.ceil(high * intrinsics.focal) + 1.0 - start).astype(int).tolist()
     wide = replace(
         intrinsics,
-        width=int(size[0]),
-        height=int(size[1]),
+        width=width + 1,
+        height=height + 1,
         center=(-start[0], -start[1]),
         distortion=(),
     )
-    return wide, (flat * focal - start).astype(np.float32)
-
-
-def covering_pinhole(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
-    """A pinhole camera that sees all that one with distortion sees, and (H, W, 2) where the pixels
-    of that one are in its image."""
-    one = intrinsics
-    return _covering_pinhole_of((one.width, one.height, one.focal, one.center, one.distortion))
-
-
-class BlenderColors:
-    """Renders colours from any place.
-
-    Args:
-        scene: what there is.
-        poses: gives `X_WB` (4, 4) of its bodies, as they are now.
-        look: has what is behind everything.
-    """
-
-    def __init__(
-        self,
-        scene: BlenderScene,
-        poses: Callable[[], Mapping[str, Array]],
-        look: Appearance | None = None,
-    ) -> None:
-        self._scene, self._poses, self._look = scene, poses, look
-
-    def image(self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]) -> Bytes:
-        """(H, W, 3) what a camera at `X_WC` sees; a lens with distortion as `DrakeColors` has it.
-
-        Raises:
-            InvalidInputError: it sees nearly to its sides.
-            MissingDependencyError: there is no Blender.
-            SimulationError: Blender failed.
-        """
-        if intrinsics.is_pinhole:
-            return self._pinhole(intrinsics, X_WC, depth_range)
-        import cv2
-
-        wide, at = covering_pinhole(intrinsics)
-        image = self._pinhole(wide, X_WC, depth_range)
-        return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
-
-    def _pinhole(
-        self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
-    ) -> Bytes:
-        near, far = depth_range
-        clip = (CLIPPING_FACTOR * near, far / CLIPPING_FACTOR)
-        image = running_blender().image(self._scene, self._poses(), intrinsics, X_WC, clip)
-        return blend_over_background(image, X_WC, intrinsics, self._look)
+    return wide, (flat * intrinsics.focal - start).astype(np.float32)
 
 
 ImageKind = Literal["color", "depth", "labels", "normals"]
@@ -273,7 +175,7 @@ class SceneRenderer:
         color = None
         if "color" in kinds:
             X_WC = self.station.document.X_WS.matrix() @ view.X_SC
-            color = self._colors.image(view.intrinsics, X_WC, view.depth_range)
+            color = self._color_image(view.intrinsics, X_WC, view.depth_range)
             if self._appearance is not None:
                 color = apply_photometry(
                     color, by_rays.labels, self._appearance, rng or np.random.default_rng(0)
@@ -296,22 +198,52 @@ class SceneRenderer:
         self._place_arm(view)
         return self._ray_scene.silhouette(number, view)
 
-    @cached_property
-    def _colors(self) -> DrakeColors | BlenderColors:
+    def _color_image(
+        self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
+    ) -> Bytes:
+        """(H, W, 3) what a camera at `X_WC` sees.
+
+        A camera whose lens distorts is rendered as a pinhole camera that sees all that it sees, in
+        whose image its pixels are looked up.
+
+        Raises:
+            InvalidInputError: it sees nearly to its sides.
+        """
         if self._renderer is None:
             raise InvalidInputError(
                 "this scene was built without colours, so colour images cannot be rendered"
             )
+        if not intrinsics.is_pinhole:
+            wide, places = covering_pinhole(intrinsics)
+            image = self._color_image(wide, X_WC, depth_range)
+            return np.asarray(cv2.remap(image, places, None, cv2.INTER_LINEAR), np.uint8)
+        near, far = depth_range
+        clip = (0.5 * near, 2.0 * far)  # wider than the measured depths
         if self._in_blender:
-            scene = make_blender_scene(self._built, self._appearance)
-            return BlenderColors(scene, self._poses, self._appearance)
+            poses = {str(int(body)): self._X_WB(body) for body, _ in self._surfaces}
+            image = running_blender().image(self._blender_scene, poses, intrinsics, X_WC, clip)
+            return blend_over_background(image, X_WC, intrinsics, self._appearance)
+        core = RenderCameraCore(
+            self._renderer, camera_info(intrinsics), ClippingRange(*clip), RigidTransform()
+        )
+        world = self._built.scene_graph.world_frame_id()
+        rendered = self._query.RenderColorImage(
+            ColorRenderCamera(core, False), world, RigidTransform(X_WC)
+        )
+        colors = np.asarray(cv2.cvtColor(rendered.data, cv2.COLOR_RGBA2RGB), np.uint8)
+        if self._appearance is None:
+            return colors
+        return fill_background(colors, X_WC, intrinsics, self._appearance)
+
+    @cached_property
+    def _query(self) -> QueryObject:
         scene_graph = self._built.scene_graph
         context = scene_graph.GetMyContextFromRoot(self._context)
-        query = scene_graph.get_query_output_port().Eval(context)
-        fill = None
-        if self._appearance is not None:
-            fill = partial(fill_background, look=self._appearance)
-        return DrakeColors(query, scene_graph.world_frame_id(), self._renderer, fill)
+        return scene_graph.get_query_output_port().Eval(context)
+
+    @cached_property
+    def _blender_scene(self) -> BlenderScene:
+        return make_blender_scene(self._built, self._appearance)
 
     def _place_arm(self, view: View) -> None:
         joints = self._built.arm_joints
@@ -333,7 +265,7 @@ class SceneRenderer:
         self._posture, self._rays = view.posture, None
 
     @cached_property
-    def _seen(self) -> list[tuple[BodyIndex, RaySurface]]:
+    def _surfaces(self) -> list[tuple[BodyIndex, RaySurface]]:
         """The surfaces that rays meet, each in its body's frame."""
         placed = {**self._built.free, **self._built.fixed}
         owner = {placed[name]: number for name, number in self.numbers.items()}
@@ -349,18 +281,14 @@ class SceneRenderer:
     def _ray_scene(self) -> RayScene:
         if self._rays is None:
             X_SW = inverse(self.station.document.X_WS.matrix())
-            poses = [X_SW @ self._X_WB(body) for body, _ in self._seen]
-            self._rays = RayScene([surface for _, surface in self._seen], poses)
+            poses = [X_SW @ self._X_WB(body) for body, _ in self._surfaces]
+            self._rays = RayScene([surface for _, surface in self._surfaces], poses)
         return self._rays
-
-    def _poses(self) -> dict[str, Array]:
-        return {str(int(body)): self._X_WB(body) for body, _ in self._seen}
 
     def _X_WB(self, body: BodyIndex) -> Array:
         plant = self._built.plant
         pose = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
-        X_WB: Array = pose.GetAsMatrix4()
-        return X_WB
+        return np.asarray(pose.GetAsMatrix4())
 
 
 def render(
@@ -456,7 +384,7 @@ def label_instances(
     found = []
     for name, number in renderer.numbers.items():
         silhouette = renderer.silhouette(number, view)
-        amodal = silhouette.within(height_width[1], height_width[0])
+        amodal = silhouette.mask_in_image(height_width[1], height_width[0])
         visible = int(counts[number])
         size = int(np.count_nonzero(silhouette.mask))
         rows, columns = silhouette.mask.shape

@@ -115,13 +115,13 @@ class SceneSamples:
             view=view,
             X_WS=self._station.document.X_WS.matrix(),
             images=images if recipe.normals else replace(images, normals=None),
-            sensor_depth=self._measured(view, images, rng) if recipe.sensor else None,
+            sensor_depth=self._sensor_depth(view, images, rng) if recipe.sensor else None,
             instances=label_instances(renderer, view, images),
             grasps=None if grasps is None else label_grasps(grasps, self._scene, view.X_SC),
             appearance={} if self._stored is None else self._stored.plain(),
         )
 
-    def redrawn(self, view: View) -> Images:
+    def render_again(self, view: View) -> Images:
         """Depth and labels of a view, for checks."""
         return self._renderer(view, colors=False).images(view, ("depth", "labels"))
 
@@ -138,7 +138,7 @@ class SceneSamples:
             )
         return self._renderers[arm, colors]
 
-    def _measured(self, view: View, images: Images, rng: np.random.Generator) -> np.ndarray:
+    def _sensor_depth(self, view: View, images: Images, rng: np.random.Generator) -> np.ndarray:
         assert images.depth is not None
         return noisy_depth(
             images.depth,
@@ -332,7 +332,7 @@ def run_sample_task(sent: SampleTask, folder: Path) -> SampleTaskResult:
         folder: where its world is unpacked.
 
     Raises:
-        Exception: as `work.make_scene`; or the world is not the one that was sent.
+        Exception: as `make_scene`; or the world is not the one that was sent.
     """
     if sent.blender and (version := running_blender().version) != sent.blender:
         raise InvalidInputError(

@@ -9,33 +9,32 @@ import secrets
 import tarfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from burg_drake.core import (
     DocumentError,
+    FileLimits,
     InvalidInputError,
     copy_permissions,
     open_regular,
     shorten_text,
 )
-from burg_drake.dataset.sample import Sample
+from burg_drake.dataset.sample import Images, Sample
+from burg_drake.dataset.sample_encoding import decode_grasps, decode_image_of, require_fitting
 from burg_drake.dataset.sample_files import (
     FILE_SUFFIXES,
+    GRASPS_KIND,
+    RECORD_KIND,
     SampleRecord,
     encode_sample,
     member_kind,
-    read_parts,
-    read_record,
+    parse_record,
 )
 
 TAR_BLOCK = 512  # Bytes of a block.
 TAR_END = bytes(2 * TAR_BLOCK)  # Blocks of zeros that end an archive.
-NAME_FIELD, SIZE_FIELD, CHECKSUM_FIELD, KIND_FIELD, PREFIX_FIELD = (
-    *(slice(0, 100), slice(124, 136), slice(148, 156), slice(156, 157), slice(345, 500)),
-)
-"""Fields of a header."""
 
 
 @dataclass(frozen=True)
@@ -100,30 +99,20 @@ def read_member(path: Path, place: MemberPlace) -> bytes:
 
 def _parse_header(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]:
     """Name and place of the member whose header lies at this place."""
-    file_kinds = (b"0", b"\0")  # Kinds of members that are plain files.
-    blank = header[: CHECKSUM_FIELD.start] + b" " * 8 + header[CHECKSUM_FIELD.stop :]
     try:
-        if sum(blank) != _read_octal(header[CHECKSUM_FIELD]):
-            raise InvalidInputError(f"{where}: the checksum of a header is wrong")
-        size = _read_octal(header[SIZE_FIELD])
-        name = header[NAME_FIELD].split(b"\0", 1)[0].decode("ascii")
-    except ValueError as error:
-        if isinstance(error, InvalidInputError):
-            raise
+        info = tarfile.TarInfo.frombuf(header, "ascii", "strict")
+    except (tarfile.HeaderError, ValueError) as error:
+        if str(error) == "bad checksum":
+            raise InvalidInputError(f"{where}: the checksum of a header is wrong") from error
         raise InvalidInputError(f"{where}: the header is not that of a tar archive") from error
-    if header[KIND_FIELD] not in file_kinds or any(header[PREFIX_FIELD]) or not name:
+    is_file = info.type in (tarfile.REGTYPE, tarfile.AREGTYPE) and info.size >= 0
+    has_prefix = any(header[345:500])  # of a name of more than 100 characters
+    if not is_file or has_prefix or not info.name:
         raise InvalidInputError(
-            f"{where}: {shorten_text(name)!r} is not a regular file with a name of at most 100"
+            f"{where}: {shorten_text(info.name)!r} is not a regular file with a name of at most 100"
             " characters; only such files may be in a shard"
         )
-    return name, MemberPlace(at + TAR_BLOCK, size)
-
-
-def _read_octal(field: bytes) -> int:
-    text = field.split(b"\0", 1)[0].strip()
-    if not text.isdigit():  # not a sign, as `int` takes
-        raise ValueError("no octal number")
-    return int(text, 8)
+    return info.name, MemberPlace(at + TAR_BLOCK, info.size)
 
 
 SHARD_FOLDER = "shards"  # Folder of the shards in a data set.
@@ -220,11 +209,10 @@ def size_and_md5(path: Path) -> tuple[int, str]:
     Raises:
         InvalidInputError: it cannot be read.
     """
-    chunk_size = 1 << 20  # Bytes read at a time.
     digest, size = hashlib.md5(usedforsecurity=False), 0
     with open_regular(path) as stream:
         try:
-            while data := stream.read(chunk_size):
+            while data := stream.read(1 << 20):
                 digest.update(data)
                 size += len(data)
         except OSError as error:
@@ -263,20 +251,47 @@ class SampleShard:
         """The record of a sample.
 
         Raises:
-            InvalidInputError: see `read_record`.
+            InvalidInputError: it is missing, damaged, too large or of another version.
         """
-        return read_record(key, self._reader(key), str(self.path))
+        where = f"{self.path}: {key}.{FILE_SUFFIXES[RECORD_KIND]}"
+        try:
+            text = self._read_file(key, RECORD_KIND, FileLimits.document.size).decode()
+        except UnicodeDecodeError as error:
+            raise DocumentError(f"{where} is not text") from error
+        record = parse_record(text, where)
+        if record.sample.key != key:
+            raise DocumentError(f"{where} belongs to sample {record.sample.key}")
+        return record
 
     def sample(self, record: SampleRecord, parts: Iterable[str]) -> Sample:
-        """The sample of a record, with the parts that are asked for.
+        """The sample of a record, with those of the parts that it has.
 
         Raises:
-            InvalidInputError: see `read_parts`.
+            InvalidInputError: a file is missing, damaged, or does not fit the record.
         """
-        return read_parts(record, parts, self._reader(record.sample.key), str(self.path))
+        max_size = 256 << 20  # Bytes of a file other than the record.
+        sample, images = record.sample, {}
+        for name in parts:
+            if name not in record.files:
+                continue
+            place = f"{self.path}: {sample.key}.{FILE_SUFFIXES[name]}"
+            data = self._read_file(sample.key, name, max_size)
+            if name == GRASPS_KIND:
+                grasps = decode_grasps(data, place)
+                require_fitting(grasps, len(sample.instances), place)
+                sample = replace(sample, grasps=grasps)
+            else:
+                images[name] = decode_image_of(name, data, record.size, record.depth_unit, place)
+        sensor_depth = images.pop("sensor_depth", None)
+        return replace(sample, images=Images(**images), sensor_depth=sensor_depth)
 
-    def _reader(self, key: str) -> _MemberReader:
-        return _MemberReader(self.path, key, self.samples[key])
+    def _read_file(self, key: str, kind: str, max_size: int) -> bytes:
+        places, name = self.samples[key], f"{key}.{FILE_SUFFIXES[kind]}"
+        if kind not in places:
+            raise DocumentError(f"{self.path}: {name} is missing")
+        if places[kind].size > max_size:
+            raise DocumentError(f"{self.path}: {name} has more than the {max_size} bytes allowed")
+        return read_member(self.path, places[kind])
 
 
 def open_shard(path: Path) -> SampleShard:
@@ -298,23 +313,6 @@ def _open_unchanged_shard(path: Path, size: int, changed: int) -> SampleShard:
     """The shard as it was with this size and time of change."""
     del size, changed
     return SampleShard(path)
-
-
-@dataclass(frozen=True)
-class _MemberReader:
-    """Reads files of a sample by their kind."""
-
-    path: Path
-    key: str
-    places: dict[str, MemberPlace]
-
-    def __call__(self, kind: str, most: int) -> bytes:
-        name = f"{self.key}.{FILE_SUFFIXES[kind]}"
-        if kind not in self.places:
-            raise DocumentError(f"{self.path}: {name} is missing")
-        if self.places[kind].size > most:
-            raise DocumentError(f"{self.path}: {name} has more than the {most} bytes allowed")
-        return read_member(self.path, self.places[kind])
 
 
 @contextmanager
@@ -346,6 +344,6 @@ def _report_write_errors(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InvalidInputError(
-            f"cannot write {shorten_text(str(path), 500)}: {error.strerror or error}; all shards except"
-            " this one are kept: make room, and run the same command to continue"
+            f"cannot write {shorten_text(str(path), 500)}: {error.strerror or error}; all shards"
+            " except this one are kept: make room, and run the same command to continue"
         ).about("folder") from error

@@ -27,8 +27,7 @@ def smooth_noise(rng: np.random.Generator, size: int, rows: int, columns: int) -
     right, beside, u = _interpolation_weights(size, columns)
     upper = grid[down][:, right] * (1.0 - u) + grid[down][:, beside] * u
     lower = grid[below][:, right] * (1.0 - u) + grid[below][:, beside] * u
-    image: Array = upper * (1.0 - v[:, None]) + lower * v[:, None]
-    return image
+    return np.asarray(upper * (1.0 - v[:, None]) + lower * v[:, None])
 
 
 def layered_noise(
@@ -70,7 +69,7 @@ WOOD_TONES = (
 
 
 def table_texture(appearance: Appearance) -> bytes:
-    """The table's texture as a PNG of `TEXTURE_PIXELS` x `TEXTURE_PIXELS`, sRGB; opposite edges fit.
+    """The table's texture, a PNG of `TEXTURE_PIXELS` x `TEXTURE_PIXELS`, sRGB; opposite edges fit.
 
     Raises:
         InvalidInputError: the table has its own colour.
@@ -83,7 +82,7 @@ def table_texture(appearance: Appearance) -> bytes:
 
 
 def _texture_image(surface: TableSurface) -> Bytes:
-    """(PIXELS, PIXELS, 3) sRGB."""
+    """(TEXTURE_PIXELS, TEXTURE_PIXELS, 3) sRGB."""
     rng = rng_from("table texture", surface.pattern, surface.seed)
     make = {
         "wood": _wood_texture,
@@ -116,8 +115,7 @@ def _wood_texture(rng: np.random.Generator) -> Array:
         -np.arange(TEXTURE_PIXELS) * boards % TEXTURE_PIXELS,
     )
     seam = np.clip(edge / (1.5 * boards), 0.35, 1.0)
-    shaded: Array = image * seam[:, None, None]
-    return shaded
+    return np.asarray(image * seam[:, None, None])
 
 
 def _cloth_texture(rng: np.random.Generator) -> Array:
@@ -134,8 +132,7 @@ def _cloth_texture(rng: np.random.Generator) -> Array:
     weave = np.sin(x) * np.sin(y)
     wrinkles = layered_noise(rng, TEXTURE_PIXELS, 3, 3, 3) - 0.5
     threads = smooth_noise(rng, TEXTURE_PIXELS, 256, 24) - 0.5
-    woven: Array = image * (1.0 + 0.025 * weave + 0.12 * wrinkles + 0.05 * threads)[..., None]
-    return woven
+    return np.asarray(image * (1.0 + 0.025 * weave + 0.12 * wrinkles + 0.05 * threads)[..., None])
 
 
 def _stone_texture(rng: np.random.Generator) -> Array:
@@ -146,16 +143,14 @@ def _stone_texture(rng: np.random.Generator) -> Array:
     veins = np.abs(layered_noise(rng, TEXTURE_PIXELS, 3, 3, 5) - 0.5)
     vein = np.clip(1.0 - veins / 0.02, 0.0, 1.0) * rng.uniform(0.0, 0.25)
     tone = 1.0 + 0.5 * clouds + rng.uniform(0.1, 0.5) * grains
-    image: Array = ground * tone[..., None] + vein[..., None] * (0.95 - ground)
-    return image
+    return np.asarray(ground * tone[..., None] + vein[..., None] * (0.95 - ground))
 
 
 def _plain_texture(rng: np.random.Generator) -> Array:
     """A colour, somewhat worn."""
     ground = _random_color(rng, 0.4, (0.15, 0.95))
     worn = layered_noise(rng, TEXTURE_PIXELS, 4, 4, 6) - 0.5
-    image: Array = ground * (1.0 + 0.08 * worn)[..., None]
-    return image
+    return np.asarray(ground * (1.0 + 0.08 * worn)[..., None])
 
 
 def _random_color(rng: np.random.Generator, saturation: float, value: tuple[float, float]) -> Array:

@@ -60,11 +60,9 @@ class Tsdf:
     def values(self) -> Single:
         """(n, n, n) what VGN's network gets: from 0.01 inside over 0.5 at a surface to 0.99; 0 in
         free space, and where nothing is known."""
-        max_share = 0.98  # Share of the truncation, from which on Open3D leaves voxels out.
         share = self.distance / np.float32(self.truncation)
-        near = (share >= -max_share) & (share < max_share)  # nan is neither
-        values: Single = np.where(near, 0.5 * (share + 1.0), 0.0).astype(np.float32)
-        return values
+        near = (share >= -0.98) & (share < 0.98)  # as in Open3D; nan is neither
+        return np.asarray(np.where(near, 0.5 * (share + 1.0), 0.0).astype(np.float32))
 
 
 def fuse_tsdf(
@@ -86,7 +84,7 @@ def fuse_tsdf(
         X_SV: (4, 4) lower corner of the cube in the scene frame.
         size: its edge [m].
         voxels: along each edge.
-        truncation: [m]; `TRUNCATION` voxels if None.
+        truncation: [m]; 4 voxels if None.
 
     Raises:
         InvalidInputError: there is no image, images, poses and intrinsics are not as many or do
@@ -130,7 +128,6 @@ def voxel_size_and_truncation(
     Raises:
         InvalidInputError: a number does not make sense.
     """
-    truncation_voxels = 4.0  # Voxels, as in VGN.
     max_voxels = 512  # Voxels along an edge; larger grids do not fit into usual memory.
     if not 0.0 < size < np.inf:
         raise InvalidInputError(f"the size of a volume is {size:g} m; give more than 0")
@@ -138,7 +135,7 @@ def voxel_size_and_truncation(
         raise InvalidInputError(f"a volume has {voxels} voxels per edge; give 1 to {max_voxels}")
     voxel = size / voxels
     if truncation is None:
-        return voxel, truncation_voxels * voxel
+        return voxel, 4.0 * voxel  # as in VGN
     if not 0.0 < truncation < np.inf:
         raise InvalidInputError(f"truncation of a volume is {truncation:g} m; give more than 0")
     return voxel, truncation
@@ -230,8 +227,7 @@ def box_distance(corner: Array, points: Array) -> Array:
     below 0 inside [m]."""
     beyond = np.abs(points) - corner
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-    distance: Array = outside + np.minimum(beyond.max(axis=1), 0.0)
-    return distance
+    return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))
 
 
 def _station_boxes(station: Station) -> list[tuple[Array, Array]]:
@@ -246,7 +242,7 @@ def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
 
     Args:
         mesh: closed, wound outward; of an open one the sign is that of the side which is seen by
-            most of `INSIDE_TEST_DIRECTIONS`.
+            most of three directions.
         points: (N, 3) in its frame [m].
         reach: distances above are this, and those below its negative are that [m].
 
@@ -286,14 +282,11 @@ class _FaceIndex:
     @classmethod
     def of(cls, mesh: trimesh.Trimesh) -> _FaceIndex:
         """Cuts the faces of a mesh."""
-        # Metres; shorter edges of faces leave fewer candidates for the nearest face.
-        min_edge = 0.01
-        # Edges along the diagonal of an object, so that large ones are cut coarsely.
-        max_edges = 100
         from scipy.spatial import cKDTree
         from trimesh.remesh import subdivide_to_size
 
-        edge = max(min_edge, float(np.linalg.norm(mesh.extents)) / max_edges)
+        # Shorter edges leave fewer candidates for the nearest face; large objects are cut coarsely.
+        edge = max(0.01, float(np.linalg.norm(mesh.extents)) / 100)
         vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, edge, max_iter=20)
         triangles = np.asarray(vertices)[np.asarray(faces)]
         middle = triangles.mean(axis=1)
@@ -309,12 +302,10 @@ class _FaceIndex:
         Those to the faces of the nearest middles are a bound; all faces are measured whose disks
         are nearer.
         """
-        first_count = 4  # Faces that give a first bound of the distance.
         batch_points = 4096  # Points whose candidate faces are looked up at a time.
         largest = float(self.radius.max())
-        bound, first = self.tree.query(
-            points, k=[*range(1, 1 + min(first_count, len(self.middle)))]
-        )
+        nearest = [*range(1, 1 + min(4, len(self.middle)))]  # faces that give a first bound
+        bound, first = self.tree.query(points, k=nearest)
         distance: Array = bound[:, 0].copy()
         close = np.flatnonzero(distance <= reach + largest)
         self._measure(distance, points, np.repeat(close, first.shape[1]), first[close].reshape(-1))
@@ -335,8 +326,7 @@ class _FaceIndex:
         height = np.einsum("ij,ij->i", offset, self.normal[face])
         along = np.einsum("ij,ij->i", offset, offset) - height**2
         beside = np.maximum(np.sqrt(np.maximum(along, 0.0)) - self.radius[face], 0.0)
-        bound: Array = np.hypot(height, beside)
-        return bound
+        return np.asarray(np.hypot(height, beside))
 
     def _measure(self, distance: Array, points: Array, point: Indices, face: Indices) -> None:
         """Lowers distances of points (N,) to those of some points to one face each."""
@@ -362,8 +352,7 @@ def _distances_to_triangles(points: Array, triangles: Array) -> Array:
         nearest = np.minimum(nearest, np.einsum("ij,ij->i", apart, apart))
     offset = points - triangles[:, 0]
     height = np.abs(np.einsum("ij,ij->i", offset, normal)) / np.maximum(length, 1e-300)
-    distance: Array = np.where(above, height, np.sqrt(nearest))
-    return distance
+    return np.asarray(np.where(above, height, np.sqrt(nearest)))
 
 
 def _are_inside(mesh: trimesh.Trimesh, points: Array) -> Booleans:

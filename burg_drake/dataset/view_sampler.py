@@ -1,15 +1,15 @@
-"""Samples camera views that show objects: on a sphere, near cameras of the station, on the wrist."""
+"""Samples views of cameras on a sphere, near those of the station, or on the wrist."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from burg_drake.cameras import FieldOfView, Intrinsics, camera_intrinsics
+from burg_drake.cameras import Intrinsics, camera_intrinsics
 from burg_drake.core import (
     Array,
     Booleans,
@@ -20,6 +20,7 @@ from burg_drake.core import (
     suggest_names,
     transform_points,
 )
+from burg_drake.dataset.point_clouds import field_of_view
 from burg_drake.dataset.views import (
     DEFAULT_DEPTH_RANGE,
     SPHERE_CAMERA,
@@ -107,7 +108,10 @@ class ViewedScene:
     @cached_property
     def objects(self) -> tuple[PlacedBox, ...]:
         """The boxes around all instances, along the axes of each: free ones, then background."""
-        return tuple(self._around(name) for name in (*self.scene.instances, *self.scene.background))
+        return tuple(
+            box_around(name, self.scene.entry(name), self.scene.X_SO(name))
+            for name in (*self.scene.instances, *self.scene.background)
+        )
 
     @cached_property
     def p_SO(self) -> Array:
@@ -115,9 +119,6 @@ class ViewedScene:
         are none."""
         seen = self.objects[: len(self.scene.instances)] or self.objects
         return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
-
-    def _around(self, name: str) -> PlacedBox:
-        return box_around(name, self.scene.entry(name), self.scene.X_SO(name))
 
 
 def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
@@ -130,9 +131,8 @@ def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
 
 def default_X_HC(hand: Hand) -> Array:
     """(4, 4) a camera beside a hand that looks along its fingers."""
-    # Metres in G: beside the hand, with the fingertips at the image's lower edge.
-    camera_position = (0.0, -0.07, -0.09)
-    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=camera_position))
+    # beside the hand, with the fingertips at the image's lower edge
+    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=(0.0, -0.07, -0.09)))
 
 
 class WristCamera:
@@ -171,7 +171,6 @@ class WristCamera:
     def posture(self, X_SC: Array) -> Array | str:
         """Joint positions (n,) that bring the camera to a pose (4, 4) while nothing collides, as
         near to home as there are; or why there are none."""
-        max_postures = 12  # Postures checked for collisions, the nearest to home first.
         X_AH = self._X_AS @ X_SC @ inverse(self.X_HC)
         found = [
             self._solutions.solve(X_AH[None], turn)[1] for turn in range(self._solutions.rounds)
@@ -187,7 +186,7 @@ class WristCamera:
         if not len(q):
             return "are out of the arm's reach"
         far = np.abs(q - self._home).max(axis=1)
-        for one in q[np.argsort(far, kind="stable")[:max_postures]]:
+        for one in q[np.argsort(far, kind="stable")[:12]]:  # nearest first
             if self._collision.is_free(one):
                 return np.asarray(one)
         return "have the arm collide"
@@ -218,8 +217,8 @@ class ViewSampler:
             settings: how views are drawn.
             intrinsics: of all cameras; if None those of the station have their own, and those on
                 sphere and wrist have them from the first camera of the station.
-            depth_range: nearest and farthest depth [m]; that of the same camera, or `DEFAULT_DEPTH_RANGE`
-                with given intrinsics, if None.
+            depth_range: nearest and farthest depth [m]; that of the same camera, or
+                `DEFAULT_DEPTH_RANGE` with given intrinsics, if None.
             besides: boxes in the scene frame around what belongs to neither: cameras on sphere and
                 wrist are not in them, and see past them. Those of the station stand where they do.
 
@@ -233,7 +232,6 @@ class ViewSampler:
         self._seen = ViewedScene(self._scene, self._station)
         self._given, self._depth_range = intrinsics, depth_range
         self._besides = tuple(besides)
-        self._fields: dict[Intrinsics, FieldOfView] = {}
         require_cameras(self.settings, self._station)
         known = self._station.document.cameras
         if intrinsics is None and not known:
@@ -291,19 +289,16 @@ class ViewSampler:
             X_SC = jitter_camera(X_SW @ known[camera].X_WC.matrix(), self.settings, rng)
         else:
             X_SC = draw_camera_on_sphere(self.settings, self._seen.p_SO.mean(axis=0), rng)
-        broken = self._broken_rule(X_SC, intrinsics, depth_range, solids)
+        view = View(camera=camera, intrinsics=intrinsics, X_SC=X_SC, depth_range=depth_range)
+        broken = self._broken_rule(view, solids)
         if broken:
             return broken
-        posture = self._wrist.posture(X_SC) if camera == WRIST_CAMERA else None
+        if camera != WRIST_CAMERA:
+            return view
+        posture = self._wrist.posture(X_SC)
         if isinstance(posture, str):
             return posture
-        return View(
-            camera=camera,
-            intrinsics=intrinsics,
-            X_SC=X_SC,
-            depth_range=depth_range,
-            posture=None if posture is None else tuple(posture.tolist()),
-        )
+        return replace(view, posture=tuple(posture.tolist()))
 
     def _optics(self, camera: str) -> tuple[Intrinsics, tuple[float, float]]:
         """Intrinsics and range of depths of a camera."""
@@ -313,44 +308,31 @@ class ViewSampler:
         document = known.get(camera) or next(iter(known.values()))
         return camera_intrinsics(document), self._depth_range or document.depth_range
 
-    def _broken_rule(
-        self,
-        X_SC: Array,
-        intrinsics: Intrinsics,
-        depth_range: tuple[float, float],
-        solids: Sequence[PlacedBox],
-    ) -> str:
+    def _broken_rule(self, view: View, solids: Sequence[PlacedBox]) -> str:
         """Which rule of what is seen a camera breaks, in words; empty if none."""
-        p_SC = X_SC[:3, 3]
+        p_SC = view.X_SC[:3, 3]
         for box in (*solids, *self._seen.objects):
             if box.contains(p_SC):
                 return f"have the camera in {box.name!r}"
         wanted = max(1, int(np.ceil(self.settings.in_view * len(self._seen.p_SO) - 1e-9)))
-        if self._shown(X_SC, intrinsics, depth_range, solids) < wanted:
+        if self._count_visible(view, solids) < wanted:
             return f"show fewer than {wanted} of {len(self._seen.p_SO)} objects"
         return ""
 
-    def _shown(
-        self,
-        X_SC: Array,
-        intrinsics: Intrinsics,
-        depth_range: tuple[float, float],
-        solids: Sequence[PlacedBox],
-    ) -> int:
+    def _count_visible(self, view: View, solids: Sequence[PlacedBox]) -> int:
         """How many objects have their centres in the image and the range of depths, with none of
         the solids before them."""
-        p_SO = self._seen.p_SO
-        p_CO = transform_points(inverse(X_SC), p_SO)
-        near, far = depth_range
+        p_SO, intrinsics = self._seen.p_SO, view.intrinsics
+        p_CO = transform_points(inverse(view.X_SC), p_SO)
+        near, far = view.depth_range
         seen = (p_CO[:, 2] >= near) & (p_CO[:, 2] <= far)
-        field = self._fields.setdefault(intrinsics, FieldOfView(intrinsics))
-        seen &= field.sees(p_CO)
+        seen &= field_of_view(intrinsics).sees(p_CO)
         pixel = np.full((len(p_CO), 2), -1.0)
         pixel[seen] = intrinsics.project(p_CO[seen])
         size = np.array((intrinsics.width, intrinsics.height))
         seen &= ((pixel >= -0.5) & (pixel <= size - 0.5)).all(axis=1)
         for box in solids:
-            seen &= ~box.hides(X_SC[:3, 3], p_SO)
+            seen &= ~box.hides(view.X_SC[:3, 3], p_SO)
         return int(seen.sum())
 
     @cached_property

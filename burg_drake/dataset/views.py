@@ -129,7 +129,8 @@ class ViewpointSettings:
     def __post_init__(self) -> None:
         if not self.cameras:
             raise FieldError(
-                f"cameras is empty; give {SPHERE_CAMERA!r}, {WRIST_CAMERA!r} or cameras of the station",
+                f"cameras is empty; give {SPHERE_CAMERA!r}, {WRIST_CAMERA!r} or cameras of the"
+                " station",
                 "cameras",
             )
         require_ranges(self)
@@ -192,5 +193,4 @@ def draw_in_ball(radius: float, rng: np.random.Generator) -> Array:
 def _draw_direction(rng: np.random.Generator) -> Array:
     """(3,) a random direction."""
     v = rng.standard_normal(3)
-    unit: Array = v / np.linalg.norm(v)
-    return unit
+    return np.asarray(v / np.linalg.norm(v))

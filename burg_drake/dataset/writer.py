@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -55,15 +55,14 @@ def write_scene(
         samples: of the scene; they may be made as they are asked for.
 
     Returns:
-        The shard's line of the index, for `DatasetWriter.added`.
+        The shard's line of the index, for `DatasetWriter.add_entry`.
 
     Raises:
         InvalidInputError: the scene is there already; or the disk is full or cannot be written to,
             which is `about` the folder; and see `write_shard`. Nothing of the scene stays then.
     """
-    return _write_scene_files(
-        Path(folder), number, scene, lambda shard: write_shard(shard, samples)
-    )
+    with _add_scene_document(Path(folder), number, scene) as shard:
+        return write_shard(shard, samples)
 
 
 def write_made_scene(
@@ -82,17 +81,18 @@ def write_made_scene(
     Raises:
         InvalidInputError: as `write_scene`.
     """
-
-    def write(path: Path) -> ShardEntry:
+    with _add_scene_document(Path(folder), number, scene) as path:
         write_made_shard(path, shard)
         return entry
 
-    return _write_scene_files(Path(folder), number, scene, write)
 
+@contextmanager
+def _add_scene_document(folder: Path, number: int, scene: Scene) -> Iterator[Path]:
+    """Writes the document of a scene, and removes it if the block fails to write the shard.
 
-def _write_scene_files(
-    folder: Path, number: int, scene: Scene, write: Callable[[Path], ShardEntry]
-) -> ShardEntry:
+    Yields:
+        The path of the shard.
+    """
     shard, document = folder / shard_name(number), folder / scene_name(number)
     if shard.exists():
         raise InvalidInputError(f"{shard} exists already; a scene can be added only once")
@@ -103,7 +103,7 @@ def _write_scene_files(
         error.about("folder")
         raise
     try:
-        return write(shard)
+        yield shard
     except BaseException:
         document.unlink(missing_ok=True)
         raise
@@ -195,9 +195,9 @@ class DatasetWriter:
 
     def add(self, number: int, scene: SceneLike, samples: Iterable[Sample]) -> None:
         """Writes a scene and its samples; see `write_scene`."""
-        self.added(write_scene(self.folder, number, as_scene(scene), samples))
+        self.add_entry(write_scene(self.folder, number, as_scene(scene), samples))
 
-    def added(self, entry: ShardEntry) -> None:
+    def add_entry(self, entry: ShardEntry) -> None:
         """Takes note of what another process has written with `write_scene`, so that its check sum
         need not be made again."""
         self._known[entry.url] = entry

@@ -1,7 +1,9 @@
 """The main job: grasps on a station are judged stage by stage, and all of it is recorded.
 
-Read `cascade` first; `candidates` go through the `stages` of a judge, `workers` or a `cluster` do
-the work, and `store` has the folder of a run. `report`, `robustness` and `merge` build on runs.
+Read `cascade` first: it prepares a run, and gives its candidates to an executor, whose workers send
+each grasp through the stages of a `judge`. `run_folder` and `campaign_folder` read runs of one
+scene and of many. The folders have grasps from samplers and files (`grasp_sets`), executors on
+other machines (`cluster`) and the pages of results (`report`).
 """
 
 import lazy_loader

@@ -1,11 +1,7 @@
-from .campaign_document import (
-    CampaignDocument as CampaignDocument,
-    Ledger as Ledger,
-    SceneEntry as SceneEntry,
-    SceneState as SceneState,
-)
 from .campaign_folder import (
     Campaign as Campaign,
+    SceneState as SceneState,
+    SceneStates as SceneStates,
     is_campaign as is_campaign,
     load_campaign as load_campaign,
     load_runs as load_runs,
@@ -34,7 +30,7 @@ from .cluster.dask_executor import (
     connect_cluster as connect_cluster,
     map_on_cluster as map_on_cluster,
 )
-from .cluster.dispatch import deliver_bundle as deliver_bundle, send_bundle as send_bundle
+from .cluster.dispatch import send_bundle as send_bundle
 from .cluster.document import (
     ClusterDocument as ClusterDocument,
     jobqueue_parameters as jobqueue_parameters,
@@ -44,7 +40,6 @@ from .cluster.document import (
 from .cluster.members import (
     ChunkSettings as ChunkSettings,
     ClusterWorkers as ClusterWorkers,
-    SentJob as SentJob,
     code_hash as code_hash,
     deciding_versions as deciding_versions,
     require_same_versions as require_same_versions,
@@ -172,7 +167,7 @@ from .judge import (
     screen_grasps as screen_grasps,
     trial_verdict as trial_verdict,
 )
-from .many_scenes import _campaign_document as _campaign_document, read_scenes as read_scenes
+from .many_scenes import campaign_document as campaign_document, read_scenes as read_scenes
 from .outcome_counts import (
     MIN_PUSH as MIN_PUSH,
     OutcomeCounts as OutcomeCounts,
@@ -201,9 +196,8 @@ from .replay import (
     rerun as rerun,
 )
 from .report.charts import (
+    HistogramSeries as HistogramSeries,
     Limit as Limit,
-    Series as Series,
-    histogram as histogram,
     interval_mark as interval_mark,
     mirrored_histogram as mirrored_histogram,
     nice_step as nice_step,
@@ -272,16 +266,15 @@ from .robustness_shares import (
 )
 from .run_document import (
     HASH_DIGITS as HASH_DIGITS,
+    CampaignDocument as CampaignDocument,
     Grasps as Grasps,
     Input as Input,
     Library as Library,
     RunDocument as RunDocument,
+    SceneEntry as SceneEntry,
     WorkSession as WorkSession,
     input_of as input_of,
     origin_of as origin_of,
-    request_differences as request_differences,
-    require_same_run as require_same_run,
-    run_hash as run_hash,
     settings_numbers as settings_numbers,
 )
 from .run_folder import (
@@ -293,10 +286,15 @@ from .run_folder import (
     require_run_folder as require_run_folder,
     save_run as save_run,
 )
+from .run_identity import (
+    request_differences as request_differences,
+    require_same_run as require_same_run,
+    run_hash as run_hash,
+)
 from .run_merging import merge_folders as merge_folders, merge_runs as merge_runs
 from .run_preparation import (
     GraspsLike as GraspsLike,
-    Request as Request,
+    RunRequest as RunRequest,
     given_content as given_content,
     given_correction as given_correction,
     sample_requested as sample_requested,
@@ -307,6 +305,14 @@ from .run_summary import (
     summarize as summarize,
     unclear_notes as unclear_notes,
     unmoved_notes as unmoved_notes,
+)
+from .scene_tasks import (
+    FinishTask as FinishTask,
+    Preparer as Preparer,
+    PrepareTask as PrepareTask,
+    SceneOutputs as SceneOutputs,
+    SceneProcesses as SceneProcesses,
+    SceneResultsWriter as SceneResultsWriter,
 )
 from .second_opinion import (
     judge_again as judge_again,

@@ -1,12 +1,14 @@
-"""The folder of a run over many scenes, and how to read the results in a folder of either kind."""
+"""The folder of a run over many scenes, states of its scenes, and results of either kind of run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -15,13 +17,20 @@ from burg_drake.core import (
     UnknownNameError,
     ensure_writable_folder,
     load_document,
+    open_regular,
     save_document,
     suggest_names,
 )
-from burg_drake.evaluation.campaign_document import CampaignDocument, Ledger, SceneState
 from burg_drake.evaluation.part_store import PARTS_FOLDER, StoredRun, read_rows
 from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
-from burg_drake.evaluation.run_folder import REPORT_FILE, RUN_FILE, Run, load_run
+from burg_drake.evaluation.run_document import CampaignDocument
+from burg_drake.evaluation.run_folder import (
+    REPORT_FILE,
+    RUN_FILE,
+    Run,
+    load_run,
+    refuse_other_files,
+)
 from burg_drake.evaluation.settings import select_share
 from burg_drake.evaluation.table_parts import StoredRows, frame_of_rows
 
@@ -31,6 +40,7 @@ if TYPE_CHECKING:
 CAMPAIGN_FILE = "campaign.yaml"
 SCENES_FOLDER = "scenes"
 CAMPAIGN_LOCK_FILE = ".lock"
+LEDGER_FILE = "scenes.jsonl"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +67,7 @@ class Campaign:
     @cached_property
     def states(self) -> dict[str, SceneState]:
         """How far scenes are, by name; nothing is known of one that has not been begun."""
-        return Ledger(self.path).states
+        return SceneStates(self.path).states
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
@@ -129,10 +139,15 @@ class Campaign:
         return {n: s.why for n in self.names if (s := self.states.get(n)) and s.state == "failed"}
 
     @property
+    def open_scenes(self) -> list[str]:
+        """Scenes that have not ended: neither judged, nor without grasps, nor failed."""
+        ended = {name for name, state in self.states.items() if state.state != "open"}
+        return [name for name in self.names if name not in ended]
+
+    @property
     def complete(self) -> bool:
         """Whether every grasp of every scene that is judged here is judged."""
-        states = [self.states.get(name) for name in self.names]
-        return all(state is not None and state.state in ("done", "empty") for state in states)
+        return not self.open_scenes and not self.failed
 
     @property
     def report_path(self) -> Path:
@@ -209,11 +224,7 @@ def require_campaign_folder(folder: Path) -> None:
             f"{folder} holds a run of one scene, but several scenes are given; choose"
             " another folder"
         ).about("out")
-    foreign = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
-    if foreign:
-        raise InvalidInputError(
-            f"{folder} is not empty and not a run: it has {foreign[0]} in it; choose another folder"
-        ).about("out")
+    refuse_other_files(folder)
 
 
 def open_results(path: str | Path) -> Run | Campaign:
@@ -267,3 +278,126 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
     count = len(table["id"])
     missing = {name: np.full(count, "" if name in TEXT_COLUMNS else np.nan) for name in names or ()}
     return table if names is None else {name: {**missing, **table}[name] for name in names}
+
+
+LedgerState = Literal["open", "done", "failed", "empty"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneState:
+    """How far a scene is.
+
+    Attributes:
+        scene: its name in the run.
+        state: `open` from when its grasps are known, `done` when all that is judged here is,
+            `failed` if it cannot be judged, `empty` if there are no grasps for it.
+        run: hash of its run.
+        grasps: how many it has.
+        mine: how many of them are judged here.
+        sampling: CPU time of the sampling [s].
+        size: of its journal when it was done [bytes].
+        failed, interrupted: grasps that could not be simulated, and those of them whose worker was
+            ended from outside.
+        why: it failed.
+        missing: what is said of instances with fewer grasps than asked; see `run_notes`.
+    """
+
+    scene: str
+    state: LedgerState
+    run: str = ""
+    grasps: int = 0
+    mine: int = 0
+    sampling: float = 0.0
+    size: int = 0
+    failed: int = 0
+    interrupted: int = 0
+    why: str = ""
+    missing: str = ""
+
+
+SCENE_STATE_TYPES = dict.fromkeys(("scene", "state", "run", "why", "missing"), str) | {
+    "sampling": float
+}
+"""Types of fields; the others are whole numbers."""
+
+
+class SceneStates:
+    """The states of scenes, kept in a file."""
+
+    def __init__(self, folder: Path) -> None:
+        """Reads the file of a run, if it is there.
+
+        Raises:
+            InvalidInputError: it cannot be read.
+        """
+        self._path = folder / LEDGER_FILE
+        self.states: dict[str, SceneState] = {}
+        self._offset = 0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Reads what others have appended since."""
+        if not self._path.exists():
+            self.states, self._offset = {}, 0
+            return
+        with open_regular(self._path) as stream:
+            if os.fstat(stream.fileno()).st_size < self._offset:
+                self.states, self._offset = {}, 0
+            stream.seek(self._offset)
+            while (line := stream.readline(1 << 16)).endswith(b"\n"):
+                self._offset += len(line)
+                state = _read_state(line)
+                if state is not None:
+                    self.states[state.scene] = state
+
+    def note(self, state: SceneState) -> None:
+        """Appends a state.
+
+        Raises:
+            InvalidInputError: the file cannot be written.
+        """
+        if self.states.get(state.scene) == state:
+            return
+        torn = self._path.exists() and not _ends_with_newline(self._path)
+        line = ("\n" if torn else "") + _state_line(state)
+        try:
+            with self._path.open("a", encoding="utf-8") as stream:
+                stream.write(line)
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {self._path}: {error.strerror}") from error
+        self.states[state.scene] = state
+
+
+def ledger_text(states: Iterable[SceneState]) -> str:
+    """The text of a file with these states."""
+    return "".join(_state_line(state) for state in states)
+
+
+def _state_line(state: SceneState) -> str:
+    """Fields at their default are left out."""
+    plain = asdict(SceneState(scene="", state="open"))
+    fields = {
+        name: value
+        for name, value in asdict(replace(state, why=state.why[:4000])).items()
+        if value != plain[name] or name in ("scene", "state")
+    }
+    return json.dumps(fields, separators=(",", ":")) + "\n"
+
+
+def _read_state(line: bytes) -> SceneState | None:
+    """None if the line is something else."""
+    try:
+        stored: Any = json.loads(line)
+        state = SceneState(**stored)
+    except (ValueError, RecursionError, TypeError):
+        return None
+    known = state.state in get_args(LedgerState)
+    typed = all(type(v) is SCENE_STATE_TYPES.get(k, int) for k, v in stored.items())
+    return state if known and typed else None
+
+
+def _ends_with_newline(path: Path) -> bool:
+    with open_regular(path) as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - 1))
+        return size == 0 or stream.read(1) == b"\n"

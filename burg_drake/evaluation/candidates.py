@@ -1,4 +1,4 @@
-"""The grasps that a run judges: grasp, instance of the scene, id; and selection of instances by name."""
+"""The grasps that a run judges, with instance and id; and selection of instances by name."""
 
 from __future__ import annotations
 
@@ -95,10 +95,9 @@ class Candidates:
         grasps = GraspSet.load(path)
         if INSTANCE_COLUMN not in grasps.columns:
             raise InvalidInputError(f"{path} does not say on which instance each grasp is")
-        columns = {
-            name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN
-        }
-        return cls(dataclasses.replace(grasps, columns=columns), grasps.columns[INSTANCE_COLUMN])
+        columns = dict(grasps.columns)
+        instance = columns.pop(INSTANCE_COLUMN)
+        return cls(dataclasses.replace(grasps, columns=columns), instance)
 
 
 def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates:
@@ -140,8 +139,9 @@ def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> Non
     """
     for name in names:
         if name not in scene.instances:
+            where = f"{path}: " if path else ""
             raise UnknownNameError(
-                f"{path}{': ' if path else ''}grasps are given for {quote_value(name)}, which is not a"
+                f"{where}grasps are given for {quote_value(name)}, which is not a"
                 f" free instance of scene {scene.name!r}; {suggest_names(name, scene.instances)}"
             )
 
@@ -202,7 +202,7 @@ class InstanceNames:
                 " say which of them is which of the scene, as THEIRS=OURS"
             ).about("objects")
 
-    def of_object(self, foreign: str) -> list[str]:
+    def instances_of(self, foreign: str) -> list[str]:
         """The free instances that grasps of an object of the file are for.
 
         Raises:
@@ -211,7 +211,7 @@ class InstanceNames:
         """
         meant = self.given.get(foreign, self.given.get(""))
         if meant is not None:
-            return self.called(meant)
+            return instances_by_name(self.scene, meant)
         known = {instance.object for instance in self.scene.instances.values()}
         if not foreign:
             how = "" if self.is_file else " (GraspSet.create(..., object=NAME))"
@@ -220,22 +220,13 @@ class InstanceNames:
                 f" scene {self.scene.name!r} has {list_names(sorted(known))}"
             ).about("objects")
         if foreign not in known:
-            how = (
-                f"say which of the scene's objects it is, {foreign}=NAME; " if self.is_file else ""
-            )
+            how = f"say which of the scene's objects it is, {foreign}=NAME; "
+            how = how if self.is_file else ""
             raise UnknownNameError(
                 f"{self.path} has grasps of object {foreign!r}, which is not in scene"
                 f" {self.scene.name!r}; {how}{suggest_names(foreign, known)}"
             ).about("objects")
-        return self.called(foreign)
-
-    def called(self, name: str) -> list[str]:
-        """All free instances of an object, or else the one of that name.
-
-        Raises:
-            UnknownNameError: there are none.
-        """
-        return instances_by_name(self.scene, name)
+        return instances_by_name(self.scene, foreign)
 
 
 def instances_by_name(scene: Scene, name: str) -> list[str]:

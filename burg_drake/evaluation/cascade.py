@@ -33,11 +33,11 @@ from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
 from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.many_scenes import evaluate_scenes
 from burg_drake.evaluation.part_store import keep_parts
-from burg_drake.evaluation.run_document import begin_session
+from burg_drake.evaluation.run_document import add_session, begin_session
 from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, save_run
 from burg_drake.evaluation.run_preparation import (
     GraspsLike,
-    Request,
+    RunRequest,
     extend_run,
     finish_run,
     next_round,
@@ -153,7 +153,7 @@ def evaluate(
         raise InvalidInputError(
             "until_balanced samples more grasps, but grasps are given; leave out one of the two"
         ).about("until_balanced", "grasps")
-    request = Request.of(station, settings, grasps, retry_failed=retry_failed)
+    request = RunRequest.of(station, settings, grasps, retry_failed=retry_failed)
     require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
@@ -167,15 +167,15 @@ def evaluate(
 
 def _evaluate_one(
     scene: SceneLike,
-    request: Request,
+    request: RunRequest,
     folder: Path,
     executor: Executor,
     progress: bool | Listener,
 ) -> Run:
     scene = as_scene(scene)
     station, mode = request.station, request.mode
-    request.requested(scene)
-    given = request.given(scene)
+    request.describe_grasps(scene)
+    given = request.given_grasps(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         require_sound(scene, station, mode, request.engine)
@@ -217,9 +217,8 @@ def _judge_open_grasps(
     pace = ProgressMeter(
         reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
     )
-    sessions = run.document.stretches
     session = begin_session(executor.workers, len(run.verdicts))
-    save_run(replace(run, document=replace(run.document, stretches=(*sessions, session))))
+    save_run(Run(run.path, add_session(run.document, session)))
     begun = time.monotonic()
     judged = 0
     try:
@@ -229,8 +228,5 @@ def _judge_open_grasps(
                 judged += 1
                 pace.step(outcome=verdict.outcome)
     finally:
-        seconds = round(time.monotonic() - begun, 3)
-        session = replace(session, judged=judged, seconds=seconds)
-        document = replace(run.document, stretches=(*sessions, session))
-        run = save_run(Run(run.path, document))
+        run = save_run(Run(run.path, add_session(run.document, session.finish(judged, begun))))
     return run

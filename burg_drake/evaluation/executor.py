@@ -1,4 +1,4 @@
-"""Executors take jobs of grasps and return verdicts in any order; here on processes of this machine.
+"""Executors take jobs of grasps and return verdicts in any order; here on this machine.
 
 A job is what one judge can judge, such as the grasps of one scene. Workers build the judge of a job
 when they first need it, so many jobs go through the same workers.
@@ -7,9 +7,9 @@ A grasp that ends its worker (a crash inside Drake, or a time limit) is tried on
 fresh process. If that dies too, the outcome is `simulation_failed` and the other grasps go on. The
 verdict tells whether the last worker was ended from outside; then a later call may ask again.
 
-Screens are asked about many grasps at once, which costs a fraction of asking about each. Only grasps
-that pass are handed out one by one. If a worker ends while it screens, its grasps go through the
-remaining stages one by one, so that the one to blame is found.
+Screens are asked about many grasps at once, which costs a fraction of asking about each. Only
+grasps that pass are handed out one by one. If a worker ends while it screens, its grasps go through
+the remaining stages one by one, so that the one to blame is found.
 
 A worker stays with a job while grasps wait, as its judge is built. Then it begins the next job, or
 helps with one that other workers are at.
@@ -38,7 +38,6 @@ from burg_drake.core import (
     WorkerFuture,
     WorkerPool,
     one_line,
-    report_progress,
     worker_count,
 )
 from burg_drake.evaluation.candidates import Candidate
@@ -51,7 +50,7 @@ class Job:
 
     Attributes:
         key: names it among the jobs of a call.
-        make_judge: builds the judge; pickled by reference, see `single_job.judge_all`.
+        make_judge: builds the judge; pickled by reference, see `judge_all`.
         candidates: the grasps.
     """
 
@@ -97,16 +96,6 @@ class WorkerLimits:
     hopeless: int = 50
     false_starts: int = 2
 
-    @property
-    def of_task(self) -> TimeLimit:
-        """Limit of one grasp, or one screening."""
-        return TimeLimit(self.cpu, self.wall)
-
-    @property
-    def of_build(self) -> TimeLimit:
-        """Limit of building a judge."""
-        return TimeLimit(self.build, self.wall)
-
 
 Grasp = tuple[Candidate, ScreenAnswers]
 """A grasp with the answers of the screens that have been asked."""
@@ -126,43 +115,13 @@ def build_judge(make_judge: Callable[[], Judge]) -> Judge:
         raise SimulationError(f"cannot build the simulation: {one_line(error)}") from error
 
 
-def screen_sizes(judge: Judge) -> tuple[int, ...]:
+def _screen_batches(judge: Judge) -> tuple[int, ...]:
     """How many grasps to screen at a time, by screen."""
     return tuple(screen.batch for screen in judge.screens)
 
 
-def screen_batch(judge: Judge, grasps: Sequence[Grasp]) -> list[ScreenAnswers]:
-    """The next screen of many grasps: all answers so far, in their order."""
-    return list(screen_grasps(judge, grasps))
-
-
-def judge_one(judge: Judge, candidate: Candidate, answers: ScreenAnswers) -> Verdict:
-    """Asks all that is left to ask about a grasp; reports each stage that begins.
-
-    Args:
-        judge: the stages.
-        candidate: the grasp.
-        answers: of the screens that have been asked.
-    """
-    return judge_grasp(judge, candidate, report_progress, answers)
-
-
 GRASPS_PER_TASK = 4
 """Grasps handed out at a time: few, so that workers finish together."""
-
-
-@dataclass(frozen=True)
-class ScreeningWork:
-    """Grasps for the next screen; all have been through the same ones."""
-
-    grasps: tuple[Grasp, ...]
-
-
-@dataclass(frozen=True)
-class JudgingWork:
-    """Grasps to be judged one by one."""
-
-    grasps: tuple[Grasp, ...]
 
 
 class OpenJob:
@@ -181,7 +140,10 @@ class OpenJob:
     def __init__(self, job: Job, limits: WorkerLimits) -> None:
         self.job = job
         self.session = Session(
-            job.key, partial(build_judge, job.make_judge), limits.of_build, limits.false_starts
+            job.key,
+            partial(build_judge, job.make_judge),
+            TimeLimit(limits.build, limits.wall),
+            limits.false_starts,
         )
         self.open: deque[Grasp] = deque(
             (candidate, ScreenAnswers()) for candidate in job.candidates
@@ -190,11 +152,6 @@ class OpenJob:
         self.unscreened: list[deque[Grasp]] = []
         self.crashes_in_a_row = 0
         self.failed = False
-
-    @property
-    def key(self) -> str:
-        """Name of its judge."""
-        return self.job.key
 
     @property
     def waiting(self) -> int:
@@ -208,23 +165,26 @@ class OpenJob:
             self.unscreened = [self.open, *(deque() for _ in batches[1:])]
             self.open = deque()
 
-    def next_work(self) -> JudgingWork | ScreeningWork:
-        """Grasps to judge; when there are few of them left, grasps to screen, of which the last
-        screen comes first, unless too few have come to it. So they take turns, and the pace of
-        judging tells how long the rest takes."""
+    def next_work(self) -> tuple[tuple[Grasp, ...], bool]:
+        """Grasps to work on, and whether they are screened: all have been through the same screens.
+
+        Grasps are screened when few are left to judge. The last screen comes first, unless too few
+        grasps have come to it. So they take turns, and the pace of judging tells how long the rest
+        takes.
+        """
         if len(self.open) < GRASPS_PER_TASK:
             for k in reversed(range(len(self.batches))):
                 waiting = self.unscreened[k]
                 if len(waiting) >= self.batches[k] or (waiting and not any(self.unscreened[:k])):
-                    return ScreeningWork(_take_first(waiting, self.batches[k]))
-        return JudgingWork(_take_first(self.open, GRASPS_PER_TASK))
+                    return _take_first(waiting, self.batches[k]), True
+        return _take_first(self.open, GRASPS_PER_TASK), False
 
-    def sort(
-        self, candidates: Sequence[Candidate], screened: Sequence[ScreenAnswers]
+    def take_screen_answers(
+        self, grasps: Sequence[Grasp], answers: Sequence[ScreenAnswers]
     ) -> list[tuple[Candidate, Verdict]]:
         """Takes the answers of a screen; returns the verdicts that are among them."""
         verdicts = []
-        for candidate, answer in zip(candidates, screened, strict=True):
+        for (candidate, _), answer in zip(grasps, answers, strict=True):
             if answer.outcome is not None:
                 verdicts.append((candidate, answer.verdict()))
                 continue
@@ -265,8 +225,8 @@ class GivenWork:
     future: WorkerFuture[Any] | None = None
     stage: Stage = Stage.CLEAR
 
-    def begins(self, stage: Stage) -> None:
-        """A stage begins."""
+    def begin_stage(self, stage: Stage) -> None:
+        """Notes that a stage begins."""
         self.stage = stage
 
 
@@ -285,11 +245,6 @@ class WorkerSlot:
     job: OpenJob | None = None
     given: list[GivenWork] = field(default_factory=list)
     started: bool = False
-
-    @property
-    def busy(self) -> bool:
-        """Whether it has something to do."""
-        return bool(self.given)
 
 
 Answer = tuple[Job, Candidate, Verdict]
@@ -325,14 +280,14 @@ class JudgePool:
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[Answer, None, None]:
-        """Judges all grasps of all jobs; see `executor.Executor.judge`. Workers that are idle at
+        """Judges all grasps of all jobs; see `Executor.judge`. Workers that are idle at
         the end stay, for another call; whatever else ends it, ends them."""
         self._coming, self._on_failure = iter(jobs), on_failure
         self.open()
         try:
             while not self.stopped:
                 self.assign_work()
-                if not any(slot.busy for slot in self.slots):
+                if not any(slot.given for slot in self.slots):
                     break
                 given = self._done.get()
                 if self.stopped:
@@ -346,30 +301,26 @@ class JudgePool:
 
     def open(self) -> None:
         """Makes the workers' pool if there is none; a process is started when there is work."""
-        kept_judges = 2  # Judges that a worker keeps; more would take memory.
         if self._workers is None:
-            self._workers = WorkerPool(self.count, kept_sessions=kept_judges)
+            self._workers = WorkerPool(self.count, kept_sessions=2)  # more would take memory
             self._done = SimpleQueue()
             self.slots = [WorkerSlot(k) for k in range(self.count)]
 
     def assign_work(self) -> None:
         """Gives idle workers something to do, those first that are there already."""
         for slot in sorted(self.slots, key=lambda slot: not slot.started):
-            if not slot.busy and (job := self.choose(slot)) is not None:
-                self.give(slot, job)
-        self.jobs = [job for job in self.jobs if self.is_under_way(job)]
+            if not slot.given and (job := self.choose_job(slot)) is not None:
+                self.give_work(slot, job)
+        open_jobs = [job for job in self.jobs if not job.failed]
+        self.jobs = [job for job in open_jobs if job.waiting or self.worker_count_of(job)]
 
-    def is_under_way(self, job: OpenJob) -> bool:
-        """Whether it has any grasp left."""
-        return not job.failed and (job.waiting > 0 or self.engaged(job) > 0)
-
-    def engaged(self, job: OpenJob) -> int:
+    def worker_count_of(self, job: OpenJob) -> int:
         """Number of workers that are at a job."""
-        return sum(slot.busy and slot.job is job for slot in self.slots)
+        return sum(bool(slot.given) and slot.job is job for slot in self.slots)
 
-    def choose(self, slot: WorkerSlot) -> OpenJob | None:
+    def choose_job(self, slot: WorkerSlot) -> OpenJob | None:
         """What an idle worker is to work on."""
-        built = self.built(slot)
+        built = self.judges_of(slot)
         if slot.job is not None and slot.job.waiting:
             return slot.job
         for job in self._coming:
@@ -379,39 +330,39 @@ class JudgePool:
                 self.jobs.append(OpenJob(job, self.limits))
                 return self.jobs[-1]
         share = {
-            job: (job.key in built, job.waiting / (1 + self.engaged(job)))
+            job: (job.job.key in built, job.waiting / (1 + self.worker_count_of(job)))
             for job in self.jobs
-            if job.waiting > (0 if job.key in built else GRASPS_PER_TASK * self.engaged(job))
+            if job.waiting
+            > (0 if job.job.key in built else GRASPS_PER_TASK * self.worker_count_of(job))
         }
         return max(share, key=share.__getitem__) if share else None
 
-    def built(self, slot: WorkerSlot) -> tuple[str, ...]:
+    def judges_of(self, slot: WorkerSlot) -> tuple[str, ...]:
         """Keys of the judges that a worker has."""
         assert self._workers is not None
         return self._workers.sessions(slot.number)
 
-    def give(self, slot: WorkerSlot, job: OpenJob) -> None:
+    def give_work(self, slot: WorkerSlot, job: OpenJob) -> None:
         """Hands a worker work of a job, or has it build the judge first."""
         slot.job, slot.started = job, True
-        if job.key not in self.built(slot) or job.key not in self._screens:
-            build: Task[Any] = Task(screen_sizes, session=job.session)
+        if job.job.key not in self.judges_of(slot) or job.job.key not in self._screens:
+            build: Task[Any] = Task(_screen_batches, session=job.session)
             self.submit(slot, [(GivenWork(slot, job, ()), build)])
             return
-        job.set_screens(self._screens[job.key])
-        work, limit = job.next_work(), self.limits.of_task
-        if isinstance(work, ScreeningWork):
-            given = GivenWork(slot, job, work.grasps, screening=True)
-            task: Task[Any] = Task(screen_batch, (work.grasps,), {}, job.session, limit, retries=0)
+        job.set_screens(self._screens[job.job.key])
+        grasps, are_screened = job.next_work()
+        limit = TimeLimit(self.limits.cpu, self.limits.wall)
+        if are_screened:
+            given = GivenWork(slot, job, grasps, screening=True)
+            task: Task[Any] = Task(screen_grasps, (grasps,), {}, job.session, limit, retries=0)
             self.submit(slot, [(given, task)])
             return
-        each = [GivenWork(slot, job, (grasp,)) for grasp in work.grasps]
-        self.submit(
-            slot,
-            [
-                (one, Task(judge_one, one.grasps[0], {}, job.session, limit, one.begins))
-                for one in each
-            ],
-        )
+        each = [GivenWork(slot, job, (grasp,)) for grasp in grasps]
+        tasks = [
+            Task(judge_grasp, one.grasps[0], {}, job.session, limit, one.begin_stage)
+            for one in each
+        ]
+        self.submit(slot, list(zip(each, tasks, strict=True)))
 
     def submit(self, slot: WorkerSlot, work: list[tuple[GivenWork, Task[Any]]]) -> None:
         """Sends a worker tasks; what becomes of each comes to `run`."""
@@ -422,7 +373,10 @@ class JudgePool:
             given.future = future
             slot.given.append(given)
         for (given, _), future in zip(work, futures, strict=True):
-            future.add_done_callback(partial(_put_done, self._done, given))
+            future.add_done_callback(partial(self._note_done, given))
+
+    def _note_done(self, given: GivenWork, future: object) -> None:
+        self._done.put(given)
 
     def take_result(self, given: GivenWork) -> Iterator[Answer]:
         """Deals with what became of work."""
@@ -430,50 +384,42 @@ class JudgePool:
         assert future is not None
         error = future.exception()
         if error is not None and error is job.session.error:
-            self.fail(job, _build_error(error))
+            self.fail_job(job, _build_error(error))
         elif not given.grasps:
             if error is None:
-                self._screens[job.key] = future.result()
+                self._screens[job.job.key] = future.result()
                 job.set_screens(future.result())
         elif given.screening:
-            if (
-                error is not None
-            ):  # each goes through what is left, so that the one to blame is found
+            if error is not None:  # each goes through the rest, so that the one to blame is found
                 job.open.extend(given.grasps)
                 return
-            candidates = [candidate for candidate, _ in given.grasps]
-            for candidate, verdict in job.sort(candidates, future.result()):
+            for candidate, verdict in job.take_screen_answers(given.grasps, future.result()):
                 yield job.job, candidate, verdict
         elif error is None:
             job.crashes_in_a_row = 0
             yield job.job, given.grasps[0][0], future.result()
         else:
-            yield from self.settle(given, error)
+            yield from self.take_crash(given, error)
 
-    def settle(self, given: GivenWork, error: BaseException) -> Iterator[Answer]:
+    def take_crash(self, given: GivenWork, error: BaseException) -> Iterator[Answer]:
         """Deals with a grasp that has ended its workers."""
         job, candidate = given.job, given.grasps[0][0]
-        died = isinstance(error, WorkerDied)
-        reason = str(error) if died else one_line(error)
-        interrupted = isinstance(error, WorkerDied) and error.from_outside
-        failed = Outcome.SIMULATION_FAILED
+        reason, interrupted = one_line(error), False
+        if isinstance(error, WorkerDied):
+            reason, interrupted = str(error), error.from_outside
         self.crashing.append(candidate.id)
-        yield (
-            job.job,
-            candidate,
-            Verdict(failed, given.stage, reason=reason, interrupted=interrupted),
-        )
+        failed = Outcome.SIMULATION_FAILED
+        verdict = Verdict(failed, given.stage, reason=reason, interrupted=interrupted)
+        yield job.job, candidate, verdict
         job.crashes_in_a_row += 1
         if job.crashes_in_a_row >= self.limits.hopeless:
-            self.fail(
-                job,
-                SimulationError(
-                    f"{self.limits.hopeless} grasps in a row could not be simulated; the"
-                    f" reason of the last one: {reason}"
-                ),
+            why = (
+                f"{self.limits.hopeless} grasps in a row could not be simulated; the"
+                f" reason of the last one: {reason}"
             )
+            self.fail_job(job, SimulationError(why))
 
-    def fail(self, job: OpenJob, error: BurgError) -> None:
+    def fail_job(self, job: OpenJob, error: BurgError) -> None:
         """Gives a job up, and tells of it once."""
         if job.failed:
             return
@@ -487,7 +433,7 @@ class JudgePool:
 
     def release(self) -> None:
         """Lets idle workers end by themselves, and ends those that are at work."""
-        if self._workers is not None and not any(slot.busy for slot in self.slots):
+        if self._workers is not None and not any(slot.given for slot in self.slots):
             self._workers.shutdown()
         self.kill()
 
@@ -506,10 +452,6 @@ class JudgePool:
         self.jobs.clear()
 
 
-def _put_done(done: SimpleQueue[GivenWork], given: GivenWork, future: object) -> None:
-    done.put(given)
-
-
 def _build_error(error: BaseException) -> BurgError:
     if isinstance(error, BurgError) and not isinstance(error, WorkerDied):
         return error
@@ -523,7 +465,6 @@ class Executor(Protocol):
     @property
     def workers(self) -> int:
         """Number of processes that judge."""
-        ...
 
     def judge(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
@@ -544,7 +485,6 @@ class Executor(Protocol):
         Raises:
             BurgError: a job cannot be done, and there is no `on_failure`; see `judge_all`.
         """
-        ...
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Which grasps of a set the arm can execute in a scene, what hinders it, and the folder of its plans."""
+"""Which grasps the arm can execute in a scene, what hinders it, and the folder of its plans."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from burg_drake.core import (
     ensure_writable_folder,
     load_document,
     one_line,
-    quaternion_from_rotation,
     remove_unfinished,
     require_name,
     save_document,
@@ -54,15 +53,12 @@ from burg_drake.evaluation.judge import (
     hand_alone,
     hand_screen,
 )
-from burg_drake.evaluation.results_table import Columns, columns_of_verdicts
-from burg_drake.evaluation.run_document import (
-    HASH_DIGITS,
-    Input,
+from burg_drake.evaluation.results_table import Columns, columns_of_verdicts, pose_columns
+from burg_drake.evaluation.run_document import HASH_DIGITS, Input, input_of, settings_numbers
+from burg_drake.evaluation.run_identity import (
     identity_differences,
     input_difference,
-    input_of,
     setting_differences,
-    settings_numbers,
 )
 from burg_drake.evaluation.trial_origin import motion_text, read_motion, without_motion
 from burg_drake.motion import Plan, ReachSettings, Witness
@@ -79,11 +75,11 @@ class PlanOutput:
 
     Attributes:
         folder: gets the timed motion of each grasp that the arm can execute, as
-            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
+            `INSTANCE-GRASP.json`, see `Plan.to_json`: a new or empty one, or that of an
             interrupted call, which the same call goes on with. What is finished is kept, and
             grasps are tried again whose worker process was ended from outside or whose plan is
             missing.
-        format: `csv` for tables, with what their columns are beside them; see `plans.csv_file`.
+        format: `csv` for tables, with what their columns are beside them; see `Plan.to_csv`.
             `load_plan` reads both.
         retry_failed: try all grasps again that an earlier call with this folder could not judge.
     """
@@ -188,14 +184,11 @@ class PlanFolder:
     def _require_same(self, there: PlansDocument) -> None:
         here = self.document
         counts = f"grasps are {there.grasps} there, {here.grasps} here"
+        same = there.grasps == here.grasps
         words = {
             "scene": [input_difference("scene", there.scene, here.scene, behind="objects")],
             "station": [input_difference("station", there.station, here.station)],
-            "grasps": [
-                counts
-                if there.grasps != here.grasps
-                else ("the number of grasps is the same, but not the grasps")
-            ],
+            "grasps": ["the number of grasps is the same, but not the grasps" if same else counts],
             "settings of the arm": setting_differences(
                 _other_arm_settings(there), _other_arm_settings(here)
             ),
@@ -299,7 +292,7 @@ def reach(
         `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
         is no outcome, or no plan of what is reachable, should a computation fail; `clearance`
         of the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
-        `core.grasps.Margins`; `lift_height` [m], as asked or as far as there is room;
+        `Margins`; `lift_height` [m], as asked or as far as there is room;
         `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there [rad], NaN where there is
         none; and `cpu` [s]. Answers do not depend on the batch, the order or the number of workers.
         The provenance tells documents, versions and settings.
@@ -375,7 +368,7 @@ class ReachJudge:
     """Asks whether the arm can execute a grasp.
 
     Attributes:
-        screens, stages: see `judge.Judge`.
+        screens, stages: see `Judge`.
     """
 
     def __init__(self, factory: ReachJudgeFactory) -> None:
@@ -431,15 +424,17 @@ def _add_columns(
     station: Station,
     settings: ReachSettings,
 ) -> GraspSet:
-    # What becomes of a grasp, unless the computation itself fails.
-    answers = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
     arm = station.document.arm
     assert arm is not None
+    failed = Outcome.SIMULATION_FAILED
+    texts = {
+        "outcome": ["" if v.outcome is failed else v.outcome.value for v in rows],
+        "blocker": [v.blocker for v in rows],
+        "reason": [v.reason for v in rows],
+    }
     columns: dict[str, Any] = {
         INSTANCE_COLUMN: candidates.instance,
-        "outcome": _text_array([v.outcome.value if v.outcome in answers else "" for v in rows]),
-        "blocker": _text_array([v.blocker for v in rows]),
-        "reason": _text_array([v.reason for v in rows]),
+        **{name: np.array(values, dtype=np.str_) for name, values in texts.items()},
     }
     for name in REACH_MARGIN_COLUMNS:
         columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
@@ -458,18 +453,12 @@ def _add_columns(
 
 def reach_columns(grasps: GraspSet) -> Columns:
     """What `reach` returns as a table: ids as in runs, poses as quaternions, all its columns."""
-    wxyz = quaternion_from_rotation(grasps.X_OG[:, :3, :3]) if len(grasps) else np.empty((0, 4))
     return {
-        "id": _text_array(Candidates(grasps, grasps.column(INSTANCE_COLUMN)).id),
+        "id": np.array(Candidates(grasps, grasps.column(INSTANCE_COLUMN)).id, dtype=np.str_),
         INSTANCE_COLUMN: grasps.column(INSTANCE_COLUMN),
         "object": grasps.object,
         "width": grasps.width,
         "score": grasps.score,
-        **{name: grasps.X_OG[:, k, 3] for k, name in enumerate("xyz")},
-        **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
+        **pose_columns(grasps.X_OG),
         **{name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN},
     }
-
-
-def _text_array(values: Sequence[str]) -> np.ndarray:
-    return np.array(values, dtype=np.str_)

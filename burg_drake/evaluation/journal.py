@@ -1,4 +1,4 @@
-"""The journal of a run: one line of JSON for each judged grasp; and the lock of the folder's writer.
+"""The journal of a run: one line of JSON for each judged grasp; and the lock of its writer.
 
 A line is written by a single call, so a killed run leaves whole lines and at most one torn line at
 the end, which is cut off when the run goes on. The operating system drops a lock when its process
@@ -12,9 +12,8 @@ import os
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from burg_drake.core import (
@@ -28,20 +27,22 @@ from burg_drake.core import (
 )
 
 
-def acquire_lock(file: int, path: Path) -> None:
-    """Locks an open file, whose path is for messages; closes it if that fails.
+def _open_locked(path: Path, flags: int = 0) -> int:
+    """Opens a file for writing, made if need be, and locks it.
 
     Raises:
-        InvalidInputError: another process has it, or its file system has no locks.
+        InvalidInputError: it cannot be written, another process has it, or its file system has no
+            locks.
     """
-    attempts = 5
-    # Seconds; a check whether a folder is being written holds the lock briefly.
-    retry_interval = 0.02
     try:
-        for k in range(attempts):
+        file = os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+    try:
+        for wait in (0.02, 0.02, 0.02, 0.02, 0.0):  # a look at a folder holds the lock briefly
             if try_lock(file):
-                return
-            time.sleep(retry_interval if k + 1 < attempts else 0.0)
+                return file
+            time.sleep(wait)
     except OSError as error:
         os.close(file)
         raise missing_locks_error(path.parent, error) from error
@@ -75,9 +76,8 @@ def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
     Raises:
         InvalidInputError: another process is writing it.
     """
-    try:
-        file = _open_shared(path, os.O_CREAT if make else 0)
-    except OSError:
+    file = _open_to_read(path, make)
+    if file is None:
         yield
         return
     try:
@@ -92,11 +92,11 @@ def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
         os.close(file)
 
 
-def _open_shared(path: Path, make: int) -> int:
-    try:
-        return os.open(path, os.O_RDONLY | os.O_NONBLOCK | make, 0o666)
-    except OSError:  # in a folder that cannot be written, for example
-        return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+def _open_to_read(path: Path, make: bool) -> int | None:
+    for flags in (os.O_CREAT, 0) if make else (0,):  # the folder may be one that cannot be written
+        with suppress(OSError):
+            return os.open(path, os.O_RDONLY | os.O_NONBLOCK | flags, 0o666)
+    return None
 
 
 def folder_in_use_error(folder: Path) -> InvalidInputError:
@@ -116,11 +116,7 @@ class WriterLock:
             InvalidInputError: it cannot be written, another process has it, or its file system has
                 no locks.
         """
-        try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        acquire_lock(self._file, path)
+        self._file = _open_locked(path)
 
     def __enter__(self) -> WriterLock:
         return self
@@ -149,11 +145,7 @@ class Journal:
                 no locks.
         """
         self._path = path
-        try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
-        except OSError as error:
-            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        acquire_lock(self._file, path)
+        self._file = _open_locked(path, os.O_APPEND)
         if not stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
             raise InvalidInputError(f"cannot write {path}: it is not a file; choose another folder")
@@ -188,12 +180,7 @@ class Journal:
     def __enter__(self) -> Journal:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

@@ -1,8 +1,9 @@
 """How one grasp is judged: stage by stage, until one of them decides.
 
-Each stage answers for one grasp with an outcome, or passes it on. The first stages are screens, which
-are asked about many grasps at once. A station has these stages, by the mode of the run: clearance of
-the open hand, feasibility for the arm, and a trial in simulation, of the hand alone or of the arm.
+Each stage answers for one grasp with an outcome, or passes it on. The first stages are screens,
+which are asked about many grasps at once. A station has these stages, by the mode of the run:
+clearance of the open hand, feasibility for the arm, and a trial in simulation, of the hand alone or
+of the arm.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from burg_drake.core import (
     Verdict,
     merge_findings,
     one_line,
+    report_progress,
 )
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.motion import Plan, Witness
@@ -34,7 +36,6 @@ from burg_drake.scene import Scene
 from burg_drake.station import DRAKE_ENGINES, Engine, GraspMotion, Station
 
 if TYPE_CHECKING:
-    from burg_drake.evaluation.lift_room import LiftRoom
     from burg_drake.grasping import HandClearance
     from burg_drake.motion import ArmReach, Reach, ReachSettings
     from burg_drake.simulation import TrialResult, TrialSettings
@@ -87,7 +88,7 @@ def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
 
     Raises:
         InvalidInputError: an object has no convex pieces, or the hand's pads are not flat; see
-            `simulation.mujoco`.
+            `MujocoTrial`.
     """
     if engine.simulator != "drake":
         from burg_drake.simulation import MujocoTrial
@@ -132,12 +133,10 @@ class Judge(Protocol):
     @property
     def screens(self) -> Sequence[Screen]:
         """The first stages."""
-        ...
 
     @property
     def stages(self) -> Sequence[tuple[Stage, Decide]]:
         """Name and function of each later stage."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -199,21 +198,20 @@ def screen_grasps(
 def judge_grasp(
     judge: Judge,
     candidate: Candidate,
-    announce: Callable[[Stage], None] | None = None,
     screened: ScreenAnswers | None = None,
+    announce: Callable[[Stage], None] = report_progress,
 ) -> Verdict:
     """Sends a grasp through the stages.
 
     Args:
         judge: the stages.
         candidate: the grasp.
-        announce: called with each stage before it begins.
         screened: answers of screens that are known already.
+        announce: called with each stage before it begins; a worker tells who waits for it.
 
     Returns:
         The verdict. An error inside a stage ends in `simulation_failed` with its message.
     """
-    announce = announce or (lambda stage: None)
     answers = screened or ScreenAnswers()
     for screen in judge.screens[len(answers.decisions) :]:
         if answers.outcome is None:
@@ -226,7 +224,7 @@ def judge_grasp(
         motion = next((d.motion for d in reversed(answers.decisions) if d.motion), None)
         start = time.process_time()
         try:
-            decision = decide(_set_lift(candidate, answers.decisions), motion)
+            decision = decide(_with_found_lift(candidate, answers.decisions), motion)
         except Exception as error:  # whatever Drake throws becomes this one grasp's outcome
             decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
         answers = answers.then(stage, decision, time.process_time() - start)
@@ -235,16 +233,13 @@ def judge_grasp(
     return answers.verdict()
 
 
-def _set_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
+def _with_found_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
     """A grasp with the length of the lift for which an earlier stage has found room, unless it
     comes with one."""
     if candidate.lift is not None:
         return candidate
-    found = [
-        d.margins[MarginNames.lift_height]
-        for d in decisions
-        if MarginNames.lift_height in d.margins
-    ]
+    name = MarginNames.lift_height
+    found = [d.margins[name] for d in decisions if name in d.margins]
     return replace(candidate, lift=found[-1]) if found else candidate
 
 
@@ -253,8 +248,7 @@ def _make_verdict(
 ) -> Verdict:
     last = decisions[-1].outcome
     assert last is not None
-    failed = last is Outcome.SIMULATION_FAILED
-    decided = stage if failed else last.stage
+    decided = stage if last is Outcome.SIMULATION_FAILED else last.stage
     return Verdict(last, decided, cpu=cpu, **merge_findings(decisions))
 
 
@@ -268,6 +262,46 @@ def trial_verdict(result: TrialResult) -> Verdict:
     return _make_verdict([trial_decision(result)], Stage.EXECUTED, {})
 
 
+class LiftRoom:
+    """How far the hand alone can lift, where a motion allows less than the whole lift.
+
+    It looks at what the hand sweeps in a scene: geometry, no arm, no time steps.
+
+    Args:
+        scene: what stands there.
+        station: whose hand it is.
+        motion: of the hand.
+    """
+
+    def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
+        from burg_drake.motion import HandSweep, lift_heights
+
+        self._sweep = HandSweep(scene, station, motion)
+        self._heights = lift_heights(motion.shortest, motion.lift_height)
+
+    def length(self, instance: str, X_WG: Array, width: Array) -> Array:
+        """(N,) lengths of lifts on which the hand meets nothing, with the target in it [m].
+
+        The least one that is allowed is given where even that one is not free: the trial tells what
+        comes of it.
+
+        Args:
+            instance: the target.
+            X_WG: (N, 4, 4) grasps in the world.
+            width: (N,) distance between the pads [m]; NaN where the hand is open.
+        """
+        low = np.zeros(len(X_WG), dtype=int)
+        high = np.full(len(X_WG), len(self._heights))
+        level = high - 1  # most often there is room for all of it
+        while (high - low > 1).any():
+            for k in np.unique(level[high - low > 1]):
+                rows = np.flatnonzero((level == k) & (high - low > 1))
+                sweep = self._sweep.lift(instance, X_WG[rows], width[rows], self._heights[k])
+                low[rows[sweep.free]], high[rows[~sweep.free]] = k, k
+            level = (low + high) // 2
+        return np.asarray(self._heights[low])
+
+
 def hand_screen(
     clearance: HandClearance, X_WO: Mapping[str, Array], room: LiftRoom | None = None
 ) -> Screen:
@@ -278,8 +312,6 @@ def hand_screen(
         X_WO: (4, 4) poses of the free instances by name.
         room: says how far clear hands can lift, if no later stage does.
     """
-
-    batch_size = 512  # A grasp takes about 0.025 ms in such a batch.
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
         places: dict[str, list[int]] = {}
@@ -301,7 +333,7 @@ def hand_screen(
                 decisions[k] = Decision(answer.outcome, blocker=answer.blocker, margins=margins)
         return decisions
 
-    return Screen(Stage.CLEAR, ask, batch_size)
+    return Screen(Stage.CLEAR, ask, 512)  # a grasp takes about 0.025 ms in such a batch
 
 
 def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = False) -> Screen:
@@ -313,8 +345,6 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
         motions: whether later stages need the motions that are found.
     """
 
-    batch_size = 128  # As many as `ArmReach` judges together.
-
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
         found = reach.check_all(
             [grasp.instance for grasp in grasps],
@@ -323,7 +353,7 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
         )
         return [_reach_decision(answer, motions) for answer in found]
 
-    return Screen(Stage.REACHABLE, ask, batch_size)
+    return Screen(Stage.REACHABLE, ask, 128)  # as many as `ArmReach` judges together
 
 
 def grasps_in_world(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
@@ -344,14 +374,10 @@ def _reach_decision(answer: Reach, motions: bool) -> Decision:
         answer.outcome,
         blocker=answer.blocker,
         margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
-        q_grasp=_float_tuple(answer.q_grasp),
-        q_pregrasp=_float_tuple(answer.q_pregrasp),
+        q_grasp=() if answer.q_grasp is None else tuple(answer.q_grasp.tolist()),
+        q_pregrasp=() if answer.q_pregrasp is None else tuple(answer.q_pregrasp.tolist()),
         motion=answer.witness if motions else None,
     )
-
-
-def _float_tuple(q: Array | None) -> tuple[float, ...]:
-    return () if q is None else tuple(q.tolist())
 
 
 def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
@@ -389,7 +415,7 @@ class StationJudge:
     """Judges grasps on a station.
 
     Attributes:
-        screens, stages: see `judge.Judge`.
+        screens, stages: see `Judge`.
         plan: the one that the arm has executed last, if it has executed any.
     """
 
@@ -418,7 +444,8 @@ class HandJudge(StationJudge):
         self._trial = hand_trial_of(scene, station, engine, settings=settings)
         motion = self._trial.motion
         X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
-        room = _lift_room(scene, station, motion) if mode == "hand" else None
+        shortened = mode == "hand" and motion.shortest < motion.lift_height
+        room = LiftRoom(scene, station, motion) if shortened else None
         screens = [hand_screen(self._trial.clearance, X_WO, room)]
         if mode == "reach":
             screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
@@ -426,11 +453,10 @@ class HandJudge(StationJudge):
 
     def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
         lift = self._trial.motion.lift_height if grasp.lift is None else grasp.lift
-        decision = trial_decision(
-            self._trial.run(
-                grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
-            )
+        result = self._trial.run(
+            grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
         )
+        decision = trial_decision(result)
         return replace(decision, margins={**decision.margins, MarginNames.lift_height: lift})
 
 
@@ -461,11 +487,10 @@ class ArmJudge(StationJudge):
     def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
         assert isinstance(motion, Plan)
         self.plan = motion
-        return trial_decision(
-            self._trial.run(
-                grasp.instance, grasp.X_OG, motion, friction=grasp.friction, mass=grasp.mass
-            )
+        result = self._trial.run(
+            grasp.instance, grasp.X_OG, motion, friction=grasp.friction, mass=grasp.mass
         )
+        return trial_decision(result)
 
 
 def build_judge(
@@ -498,13 +523,6 @@ def build_judge(
     return HandJudge(scene, station, engine=engine, mode=mode, settings=settings)
 
 
-def _lift_room(scene: Scene, station: Station, motion: GraspMotion) -> LiftRoom | None:
-    """What says how far the hand can lift, where it may be less than asked for."""
-    from burg_drake.evaluation.lift_room import LiftRoom
-
-    return LiftRoom(scene, station, motion) if motion.shortest < motion.lift_height else None
-
-
 @dataclass(frozen=True)
 class StationJudgeFactory:
     """What a worker process needs to build its `StationJudge`; see `build_judge`."""
@@ -517,9 +535,5 @@ class StationJudgeFactory:
 
     def __call__(self) -> StationJudge:
         return build_judge(
-            self.scene,
-            self.station,
-            engine=self.engine,
-            mode=self.mode,
-            settings=self.settings,
+            self.scene, self.station, engine=self.engine, mode=self.mode, settings=self.settings
         )

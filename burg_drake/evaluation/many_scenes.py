@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -14,7 +14,6 @@ from typing import cast
 import numpy as np
 
 from burg_drake.core import (
-    JUDGING_PACKAGES,
     MAX_NAME_BYTES,
     STARTING_PHASE,
     BurgError,
@@ -33,21 +32,14 @@ from burg_drake.core import (
     read_bytes,
     remove_unfinished,
     resolve_reference,
-    software_versions,
     suggest_names,
-)
-from burg_drake.evaluation.campaign_document import (
-    CampaignDocument,
-    Ledger,
-    SceneEntry,
-    SceneState,
-    campaign_hash,
-    require_same_campaign,
 )
 from burg_drake.evaluation.campaign_folder import (
     CAMPAIGN_LOCK_FILE,
     SCENES_FOLDER,
     Campaign,
+    SceneState,
+    SceneStates,
     is_campaign,
     load_campaign,
     require_campaign_folder,
@@ -59,10 +51,16 @@ from burg_drake.evaluation.grasp_sets.mistake_search import campaign_hints
 from burg_drake.evaluation.journal import WriterLock
 from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.report.pages import renew_report
-from burg_drake.evaluation.run_document import begin_session, input_of, input_reference
+from burg_drake.evaluation.run_document import (
+    CampaignDocument,
+    SceneEntry,
+    add_session,
+    begin_session,
+    input_reference,
+)
+from burg_drake.evaluation.run_identity import require_same_run, run_hash
 from burg_drake.evaluation.run_preparation import (
-    Request,
-    current_command,
+    RunRequest,
     given_content,
     given_correction,
     require_scenes_judged,
@@ -139,7 +137,7 @@ def read_scenes(
     return SceneList(tuple(named), dict(zip(names, given, strict=True)), reader.hashes)
 
 
-def require_used_names(entries: Iterable[SceneEntry], request: Request) -> None:
+def require_used_names(entries: Iterable[SceneEntry], request: RunRequest) -> None:
     """Refuses names and grasps that are for none of the scenes.
 
     Raises:
@@ -158,7 +156,8 @@ def require_used_names(entries: Iterable[SceneEntry], request: Request) -> None:
         for name in names:
             if name not in known:
                 raise UnknownNameError(
-                    f"{what}: none of {len(entries)} scenes has {name!r}; {suggest_names(name, known)}"
+                    f"{what}: none of {len(entries)} scenes has {name!r};"
+                    f" {suggest_names(name, known)}"
                 )
 
 
@@ -167,7 +166,7 @@ class _Reader:
 
     def __init__(self, known: CampaignDocument | None) -> None:
         self._known = {} if known is None else {(e.path, e.file): e for e in known.scenes}
-        self._were = {} if known is None else known.libraries
+        self._known_libraries = {} if known is None else known.libraries
         self._libraries: dict[tuple[str, Path | None], ObjectLibrary] = {}
         self.hashes: dict[str, str] = {}
 
@@ -207,7 +206,7 @@ class _Reader:
                 self.hashes[root] = content_hash(self.library(root, None).content)
             except BurgError:
                 return False
-        return self._were.get(root) == self.hashes[root]
+        return self._known_libraries.get(root) == self.hashes[root]
 
 
 def _require_different(entries: Sequence[SceneEntry]) -> None:
@@ -241,7 +240,7 @@ def _distinct_names(entries: Sequence[SceneEntry]) -> list[SceneEntry]:
 
 def evaluate_scenes(
     references: Sequence[SceneLike],
-    request: Request,
+    request: RunRequest,
     folder: Path,
     executor: Executor,
     progress: bool | Listener,
@@ -260,15 +259,15 @@ def evaluate_scenes(
     before = load_campaign(folder) if is_campaign(folder) else None
     scenes = read_scenes(references, None if before is None else before.document)
     require_used_names(scenes.entries, request)
-    document = _campaign_document(scenes, request)
+    document = campaign_document(scenes, request)
     if before is not None:
-        require_same_campaign(folder, before.document, document)
+        require_same_run(folder, before.document, document)
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, WriterLock(folder / CAMPAIGN_LOCK_FILE):
         remove_unfinished(folder)
         if is_campaign(folder):  # as it is now that nobody else has it
             there = load_campaign(folder).document
-            require_same_campaign(folder, there, document)
+            require_same_run(folder, there, document)
             document = replace(
                 there, table=document.table, scenes=document.scenes, libraries=document.libraries
             )
@@ -285,29 +284,20 @@ def evaluate_scenes(
         return judged
 
 
-def _campaign_document(scenes: SceneList, request: Request) -> CampaignDocument:
+def campaign_document(scenes: SceneList, request: RunRequest) -> CampaignDocument:
     arm = request.station.document.arm if request.mode != "hand" else None
     document = CampaignDocument(
-        command=current_command(),
-        station=input_of(request.station, "stations"),
+        **request.document_fields(),
         grasps=replace(
-            request.requested_of_all(),
+            request.describe_all_grasps(),
             content=given_content(request.grasps),
             correction=given_correction(request.grasps),
         ),
-        engine=request.engine,
-        trial=request.trial,
-        mode=request.mode,
-        arm=request.arm,
-        seed=request.settings.seed,
-        shard="" if request.shard is None else str(request.shard),
-        table=request.settings.table,
         joints=0 if arm is None else len(arm.home),
         scenes=scenes.entries,
         libraries=scenes.libraries,
-        versions=software_versions({**JUDGING_PACKAGES, **request.engine.packages}),
     )
-    return replace(document, hash=campaign_hash(document))
+    return replace(document, hash=run_hash(document))
 
 
 @dataclass
@@ -316,13 +306,13 @@ class _CampaignCall:
 
     campaign: Campaign
     scenes: SceneList
-    request: Request
+    request: RunRequest
     executor: Executor
     reporter: Reporter
 
     def __post_init__(self) -> None:
         self.folder = self.campaign.path
-        self.ledger = Ledger(self.folder)
+        self.ledger = SceneStates(self.folder)
         self.judging: dict[str, SceneJudging] = {}
         # a scene whose grasps are shared out knows its share
         self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
@@ -333,17 +323,14 @@ class _CampaignCall:
     def run(self) -> Campaign:
         """Judges what is left."""
         left = [name for name in self.campaign.names if not self._is_done(name)]
-        keeping = SceneOutputs(
+        outputs = SceneOutputs(
             self.folder,
             tuple(self.campaign.places),
             self.campaign.document.instances,
             self.request.settings.table,
             self.reports,
         )
-        with ExitStack() as stack:
-            processes = stack.enter_context(
-                SceneProcesses(Preparer(self.each), keeping, self.executor.workers)
-            )
+        with SceneProcesses(Preparer(self.each), outputs, self.executor.workers) as processes:
             if left:
                 self._judge(left, processes)
             processes.close()
@@ -353,28 +340,22 @@ class _CampaignCall:
         document = self.campaign.document
         self.expected = self.campaign.expected_by_scene
         there = sum(n for name, n in self.expected.items() if name not in left)
-        found = self._found()
+        found = self._known_outcomes()
         event = Progress(STARTING_PHASE, there, sum(self.expected.values()), outcomes=found)
         self.pace = ProgressMeter(self.reporter.show, event, "judging")
         session = begin_session(self.executor.workers, found.total())
-        sessions = document.stretches
-        save_campaign(
-            replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
-        )
+        save_campaign(Campaign(self.folder, add_session(document, session)))
         begun = time.monotonic()
         try:
             jobs = cast(Iterable[Job], self._jobs(left, processes))  # None only where it is polled
             with closing(self.executor.judge(jobs, self._give_up)) as answers:
                 for job, candidate, verdict in answers:
-                    self._take(job, candidate.id, verdict, processes)
+                    self._take_verdict(job, candidate.id, verdict, processes)
         finally:
             for judging in list(self.judging.values()):
                 judging.close()
-            seconds = round(time.monotonic() - begun, 3)
-            session = replace(session, judged=self.judged, seconds=seconds)
-            save_campaign(
-                replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
-            )
+            session = session.finish(self.judged, begun)
+            save_campaign(Campaign(self.folder, add_session(document, session)))
 
     def _jobs(
         self, left: list[str], processes: SceneProcesses
@@ -391,11 +372,11 @@ class _CampaignCall:
             prepared = processes.prepared()
             if prepared is None:
                 return
-            job = self._begin(*prepared, processes)
+            job = self._begin_scene(*prepared, processes)
             if job is not None:
                 yield job
 
-    def _begin(
+    def _begin_scene(
         self, item: PrepareTask, scene: Scene | BaseException | None, processes: SceneProcesses
     ) -> Job | None:
         """What is to be judged of a scene that is prepared, if anything."""
@@ -404,7 +385,7 @@ class _CampaignCall:
             self._expect(item.name, 0)
             return None
         if isinstance(scene, BaseException):
-            self._fail(item.name, scene)
+            self._note_failure(item.name, scene)
             return None
         judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
         self.ledger.note(judging.state("open"))
@@ -415,39 +396,39 @@ class _CampaignCall:
         self._expect(item.name, judging.mine)
         self.judging[item.name] = judging
         if judging.known:
-            self.pace.skip(judging.known, note=self._note())
+            self.pace.skip(judging.known, note=self._progress_note())
         request = self.request
         factory = StationJudgeFactory(
             scene, request.station, request.engine, request.mode, request.phases
         )
         return Job(item.name, factory, judging.left)
 
-    def _take(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
+    def _take_verdict(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
         judging = self.judging[job.key]
-        judging.take(id, verdict)
+        judging.add_verdict(id, verdict)
         self.judged += 1
-        self.pace.step(outcome=verdict.outcome, note=self._note())
+        self.pace.step(outcome=verdict.outcome, note=self._progress_note())
         if judging.is_done:
             del self.judging[job.key]
             self._finish(judging, processes)
         elif judging.is_part_due():
-            processes.take(job.key)
+            processes.write_rows(job.key)
 
     def _give_up(self, failed: JobFailed) -> None:
         """A scene whose judge cannot be built, for example."""
         self.judging.pop(failed.job.key).close()
-        self._fail(failed.job.key, failed.error)
+        self._note_failure(failed.job.key, failed.error)
 
     def _finish(self, judging: SceneJudging, processes: SceneProcesses) -> None:
         self.ledger.note(judging.state("done"))
         processes.finish(judging.name)
 
-    def _fail(self, name: str, error: BaseException) -> None:
+    def _note_failure(self, name: str, error: BaseException) -> None:
         why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"
         self.ledger.note(SceneState(scene=name, state="failed", why=why))
         self._expect(name, 0)
 
-    def _found(self) -> Counter[Outcome]:
+    def _known_outcomes(self) -> Counter[Outcome]:
         """Grasps that were judged before, by outcome."""
         if not (self.folder / SCENES_FOLDER).exists():
             return Counter()
@@ -459,7 +440,7 @@ class _CampaignCall:
         self.expected[name] = grasps
         self.pace.expect(sum(self.expected.values()))
 
-    def _note(self) -> str:
+    def _progress_note(self) -> str:
         done = sum(s.state != "open" for s in self.ledger.states.values())
         return f"{done:,} of {len(self.campaign.names):,} scenes"
 

@@ -32,7 +32,7 @@ from burg_drake.evaluation.journal import (
     encode_verdict,
     journal_lines,
 )
-from burg_drake.evaluation.run_document import WorkSession, grasp_differences, run_differences
+from burg_drake.evaluation.run_document import OneRunDocument
 from burg_drake.evaluation.run_folder import (
     GRASPS_FILE,
     SCENE_FILE,
@@ -41,17 +41,18 @@ from burg_drake.evaluation.run_folder import (
     portable_station,
     save_run,
 )
+from burg_drake.evaluation.run_identity import grasp_differences, run_differences
 from burg_drake.evaluation.settings import Shard, select_share
 from burg_drake.scene import SceneDocument, save_scene
 from burg_drake.station import StationDocument
 
 
 class VerdictRank:
-    """Verdict rank."""
+    """Ranks of verdicts, of which the highest is taken; 0 stands for none."""
 
     interrupted = 1  # The worker was ended from outside.
     failed = 2  # The trial failed.
-    judged = 3  # The trial came to an end; the highest rank is taken.
+    judged = 3  # The trial came to an end.
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +77,7 @@ class JournalChoice:
     @property
     def failed(self) -> int:
         """Grasps that could not be simulated."""
-        return int(
-            ((self.worth == VerdictRank.failed) | (self.worth == VerdictRank.interrupted)).sum()
-        )
+        return int(np.isin(self.worth, (VerdictRank.failed, VerdictRank.interrupted)).sum())
 
     @property
     def interrupted(self) -> int:
@@ -106,18 +105,10 @@ def choose_verdicts(journals: Sequence[Path], ids: Sequence[str]) -> JournalChoi
         seen = np.zeros_like(digest)
         for line, id, verdict in journal_lines(journal):
             if (k := places.get(id)) is not None:
-                own.worth[k], own.place[k], seen[k] = (
-                    _verdict_rank(verdict),
-                    line,
-                    _verdict_digest(verdict),
-                )
-        both = (
-            (own.worth == VerdictRank.judged)
-            & (chosen.worth == VerdictRank.judged)
-            & (seen != digest)
-        )
-        if both.any():
-            k = int(np.flatnonzero(both)[0])
+                own.worth[k], own.place[k] = _verdict_rank(verdict), line
+                seen[k] = _verdict_digest(verdict)
+        both = np.minimum(own.worth, chosen.worth) == VerdictRank.judged
+        for k in np.flatnonzero(both & (seen != digest))[:1].tolist():
             first = (journals[chosen.source[k]], int(chosen.place[k]))
             raise _conflict_error(ids[k], first, (journal, int(own.place[k])))
         better = own.worth > chosen.worth
@@ -158,14 +149,10 @@ def _verdict_digest(verdict: Verdict) -> int:
 def _conflict_error(
     id: str, first: tuple[Path, int], second: tuple[Path, int]
 ) -> InvalidInputError:
-    texts = []
-    values = []
-    for journal, place in (first, second):
-        _, _, verdict = next(journal_lines(journal, place))
-        values.append(vars(replace(verdict, cpu={})))
-        texts.append(f"{verdict.outcome.value} in {journal.parent}")
-    names = [name for name in values[0] if str(values[0][name]) != str(values[1][name])]
-    how = texts[0] + " and " + texts[1]
+    a, b = (next(journal_lines(journal, place))[2] for journal, place in (first, second))
+    there, here = (vars(replace(verdict, cpu={})) for verdict in (a, b))
+    names = [name for name in there if str(there[name]) != str(here[name])]
+    how = f"{a.outcome.value} in {first[0].parent} and {b.outcome.value} in {second[0].parent}"
     if "outcome" not in names:
         how += f", with other values of {', '.join(names)}"
     return InvalidInputError(
@@ -193,7 +180,11 @@ def write_merged(
     """
     first = runs[0]
     for run in runs[1:]:
-        require_mergeable(first, run)
+        there, here = first.document, run.document
+        if there.hash != here.hash:
+            differences = run_differences(there, here)
+            differences = differences or grasp_differences(there.grasps, here.grasps)
+            require_mergeable(first, run, differences)
     shard = common_shard(runs) if shard is None else shard
     ids = select_share(first.candidates.id, shard)
     journals = [run.path / JOURNAL_FILE for run in runs]
@@ -203,30 +194,34 @@ def write_merged(
         stream.writelines(chosen_lines(journals, choice))
         stream.flush()
         os.fsync(stream.fileno())
-    document = replace(
-        first.document,
-        shard=shard,
-        stretches=all_sessions([run.document.stretches for run in runs]),
-        hints=next((run.document.hints for run in runs if run.document.hints), ()),
-    )
-    save_run(Run(staging, document))
+    save_run(Run(staging, merge_documents([run.document for run in runs], shard)))
     copy_documents(first, staging, folder)
     return choice
 
 
-def require_mergeable(first: Run, other: Run) -> None:
-    """Refuses to merge runs that are not of the same.
+def require_mergeable(
+    first: Run | Campaign, other: Run | Campaign, differences: Sequence[str]
+) -> None:
+    """Refuses to merge runs that differ.
 
     Raises:
         InvalidInputError: names every difference.
     """
-    a, b = first.document, other.document
-    if a.hash == b.hash:
-        return
-    found = run_differences(a, b) or grasp_differences(a.grasps, b.grasps)
-    raise InvalidInputError(
-        f"{first.path} and {other.path} are different runs ({'; '.join(found)}); only"
-        " shards or copies of the same run can be merged"
+    if differences:
+        raise InvalidInputError(
+            f"{first.path} and {other.path} are different runs ({'; '.join(differences)});"
+            " only shards or copies of the same run can be merged"
+        )
+
+
+def merge_documents(documents: Sequence[OneRunDocument], shard: str) -> OneRunDocument:
+    """The first document with all sessions, by their beginning, and the first hints of any."""
+    sessions = dict.fromkeys(session for one in documents for session in one.stretches)
+    return replace(
+        documents[0],
+        shard=shard,
+        stretches=tuple(sorted(sessions, key=lambda session: session.started)),
+        hints=next((one.hints for one in documents if one.hints), ()),
     )
 
 
@@ -241,11 +236,8 @@ def copy_documents(run: Run, staging: Path, folder: Path) -> None:
             library = portable_reference(root, folder)
             save_scene(replace(scene, library=library), staging / SCENE_FILE)
     station = load_document(run.path / STATION_FILE, StationDocument)
-    references = [
-        station.hand,
-        *([station.arm.model] if station.arm else []),
-        *station.packages.values(),
-    ]
+    arm = [station.arm.model] if station.arm else []
+    references = [station.hand, *arm, *station.packages.values()]
     if not all(reference.startswith(PACKAGE_URI) for reference in references):
         with suppress(BurgError):
             save_document(portable_station(run.station(), folder), staging / STATION_FILE)
@@ -269,9 +261,3 @@ def missing_shards(runs: Sequence[Run | Campaign]) -> tuple[str, ...]:
         for k in range(1, count + 1)
         if f"{k}/{count}" not in shards
     )
-
-
-def all_sessions(sessions: Sequence[Sequence[WorkSession]]) -> tuple[WorkSession, ...]:
-    """All sessions, by their beginning."""
-    found = dict.fromkeys(session for some in sessions for session in some)
-    return tuple(sorted(found, key=lambda session: session.started))

@@ -6,13 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import (
-    CONTESTED_CONFIDENCE,
     CPU_COLUMNS,
     PUSHED_PREFIX,
     Array,
@@ -53,7 +51,7 @@ def member_codes(values: NDArray[np.str_], members: Sequence[str]) -> NDArray[np
 
 
 @dataclass(frozen=True, eq=False)
-class Texts:
+class TextValues:
     """A column of texts, each different one once.
 
     Attributes:
@@ -72,27 +70,12 @@ class Texts:
         return tuple(found[:most])
 
 
-def code_texts(values: NDArray[np.str_]) -> Texts:
+def code_texts(values: NDArray[np.str_]) -> TextValues:
     """A column (N,) of few different texts."""
     texts = values.tolist()
     places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
     codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
-    return Texts(codes, tuple(places))
-
-
-def contested_rows(confidence: Array, settled: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Rows (N,) whose verdict is contested, as `Verdict.contested` has it.
-
-    Args:
-        confidence: (N,) NaN where there is none.
-        settled: (N,) whether another engine has judged again.
-    """
-    return (np.nan_to_num(confidence, nan=1.0) < CONTESTED_CONFIDENCE) & ~settled
-
-
-def settled_rows(judged_again: NDArray[Any]) -> NDArray[np.bool_]:
-    """Rows (N,) that another engine has judged again, from their texts."""
-    return np.asarray(judged_again != "", dtype=bool)
+    return TextValues(codes, tuple(places))
 
 
 @dataclass(frozen=True)
@@ -133,9 +116,8 @@ def count_short_lifts(lift_height: Array, whole: float) -> ShortLifts | None:
     Returns:
         None if no lift is short.
     """
-    tolerance = 1e-9  # Metres; lengths that differ by less are the same.
     known = lift_height[np.isfinite(lift_height)]
-    short = known[known < whole - tolerance]
+    short = known[known < whole - 1e-9]
     if not len(short):
         return None
     return ShortLifts(len(known), len(short), whole, float(np.median(short)), float(short.min()))
@@ -218,15 +200,8 @@ class OutcomeCounts:
     @property
     def funnel(self) -> dict[str, int]:
         """Counts from the first stage to success; none is larger than the one before."""
-        return {
-            "candidates": self.judged,
-            "clear": self.clear,
-            "reachable": self.reachable,
-            "planned": self.planned,
-            "executed": self.executed,
-            "held": self.held,
-            "lifted": self.lifted,
-        }
+        later = ("clear", "reachable", "planned", "executed", "held", "lifted")
+        return {"candidates": self.judged, **{name: getattr(self, name) for name in later}}
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -295,7 +270,7 @@ class Summary:
         mode: what was asked about each grasp.
         pushes: what the approaches pushed; None where none were simulated.
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
-        notes: what is missing, and why, one sentence each; see `notes`.
+        notes: what is missing, and why, one sentence each; see `run_notes`.
         scenes: by scene, in a run over many, in their order.
         knows_confidence: whether verdicts have a confidence; those of earlier releases, and of
             engines with settings of their own, have none.
@@ -317,11 +292,9 @@ class Summary:
     def steps(self) -> list[str]:
         """Names of the funnel's counts that the mode has, first to last. With the hand alone, the
         pregrasp is the part of what can be reached that may be in a collision."""
-        # Steps that a run without the arm does not have.
-        arm_steps = (Stage.REACHABLE.value, Stage.PLANNED.value)
-        absent = set() if self.mode != "hand" else set(arm_steps)
+        absent = {"reachable", "planned"} if self.mode == "hand" else set()
         if self.total.reachable < self.total.clear:
-            absent.discard(Stage.REACHABLE.value)
+            absent.discard("reachable")
         return [name for name in self.total.funnel if name not in absent]
 
 
@@ -335,8 +308,8 @@ def count_pushes(columns: Columns) -> Pushes | None:
     anything, instance = columns["pushed"][went], columns["instance"][went]
     target = np.zeros(len(anything))
     for name in np.unique(instance):
-        of = instance == name
-        target[of] = columns[PUSHED_PREFIX + name][went][of]
+        own = instance == name
+        target[own] = columns[PUSHED_PREFIX + name][went][own]
     return Pushes(
         trials=len(anything),
         pushed=int((anything > MIN_PUSH).sum()),

@@ -1,4 +1,4 @@
-"""The columnar store of a run: parts of its table beside its journals, read, written and counted."""
+"""The columnar store of a run: parts of its table beside its journals."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from burg_drake.evaluation.run_folder import Run, load_run
 from burg_drake.evaluation.table_parts import (
     CANDIDATE_COLUMN,
     JournalSegment,
-    Part,
     StoredRows,
+    TablePart,
     arrow_table,
     column_names,
     empty_column,
@@ -29,6 +29,7 @@ from burg_drake.evaluation.table_parts import (
     read_part,
     require_arrow,
     segment_of,
+    select_columns,
     valid_segments,
     whole_lines,
     write_part,
@@ -64,7 +65,7 @@ class PartIndex:
         damaged: files that are not.
     """
 
-    parts: list[Part] = field(default_factory=list)
+    parts: list[TablePart] = field(default_factory=list)
     damaged: list[Path] = field(default_factory=list)
 
     @classmethod
@@ -80,14 +81,14 @@ class PartIndex:
                 index.parts.append(part)
         return index
 
-    def drop(self, part: Part) -> None:
+    def drop(self, part: TablePart) -> None:
         """Takes out a part that is damaged."""
         self.parts = [other for other in self.parts if other is not part]
         self.damaged.append(part.path)
 
-    def segments(self) -> dict[str, list[tuple[JournalSegment, Part, int]]]:
+    def segments(self) -> dict[str, list[tuple[JournalSegment, TablePart, int]]]:
         """By scene: segments, the parts that they are in, and where their rows begin there."""
-        found: dict[str, list[tuple[JournalSegment, Part, int]]] = defaultdict(list)
+        found: dict[str, list[tuple[JournalSegment, TablePart, int]]] = defaultdict(list)
         for part in self.parts:
             row = 0
             for segment in part.segments:
@@ -146,11 +147,11 @@ def _read_tables(
     places: Sequence[StoredRun],
     names: Sequence[str] | None,
     instances: Sequence[str],
-) -> StoredRows | Part:
+) -> StoredRows | TablePart:
     """The rows, or a part that is damaged."""
     arrow = require_arrow("reading the results of many grasps")
     segments = index.segments()
-    pieces: list[list[tuple[Part, int, int]]] = []
+    pieces: list[list[tuple[TablePart, int, int]]] = []
     tails: list[Any | None] = []
     for place in places:
         mine = segments.get(place.scene, [])
@@ -176,7 +177,7 @@ def _read_tables(
             continue
         slices = [tables[part.path].slice(row, rows) for part, row, rows in piece]
         if tail is not None:
-            slices.append(_add_columns(tail, wanted))
+            slices.append(select_columns(tail, wanted))
         runs.append(merge_tables(slices) if len(slices) > 1 else slices[0] if slices else None)
     counts = np.array([_row_count(run) for run in runs], dtype=np.int64)
     there = [table for table in _concatenate_runs(runs, tables) if table.num_rows]
@@ -198,7 +199,6 @@ def _concatenate_runs(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterat
             part, begin, rows = runs[k]
             while (
                 k + 1 < len(runs)
-                and runs[k + 1] is not None
                 and isinstance(runs[k + 1], tuple)
                 and runs[k + 1][:2] == (part, begin + rows)
             ):
@@ -215,14 +215,7 @@ def _read_tail(place: StoredRun, begin: int) -> Any | None:
     return segment_table(load_run(place.folder), begin, end) if end > begin else None
 
 
-def _add_columns(table: Any, names: Sequence[str]) -> Any:
-    for name in names:
-        if name not in table.column_names:
-            table = table.append_column(name, empty_column(name, table.num_rows))
-    return table.select(list(names))
-
-
-def _all_names(parts: Sequence[Part], tails: Sequence[Any | None]) -> list[str]:
+def _all_names(parts: Sequence[TablePart], tails: Sequence[Any | None]) -> list[str]:
     """Names of all columns, in the order of the tables."""
     names: dict[str, None] = {}
     for part in parts:
@@ -280,7 +273,7 @@ class PartWriter:
         self._number = max((part.number for part in self._index.parts), default=0)
         self._remove_stale_segments()
 
-    def behind(self) -> list[str]:
+    def scenes_behind(self) -> list[str]:
         """Scenes whose journals have more than the parts."""
         return [
             scene
@@ -290,10 +283,10 @@ class PartWriter:
 
     def catch_up(self, scenes: Iterable[str] | None = None) -> None:
         """Takes what the journals have beyond the parts; of all scenes if None."""
-        for scene in self.behind() if scenes is None else scenes:
-            self.take(scene)
+        for scene in self.scenes_behind() if scenes is None else scenes:
+            self.add_rows(scene)
 
-    def take(self, scene: str, run: Run | None = None) -> None:
+    def add_rows(self, scene: str, run: Run | None = None) -> None:
         """Takes what the journal of a scene has beyond the parts."""
         place = self._places[scene]
         begin, end = self._ends.get(scene, 0), whole_lines(place.journal)
@@ -323,14 +316,8 @@ class PartWriter:
         self.flush()
         again = self._judged_again()
         if again:
-            self._remove(
-                {
-                    segment
-                    for part in self._index.parts
-                    for segment in part.segments
-                    if segment.scene in again
-                }
-            )
+            parts = self._index.parts
+            self._remove({s for part in parts for s in part.segments if s.scene in again})
             for scene in again:
                 self._ends.pop(scene)
             self.catch_up(again)
@@ -342,16 +329,10 @@ class PartWriter:
         several = [scene for scene, found in segments.items() if len(found) > 1]
         twice = []
         for scene in several:
-            places = [
-                self._candidates(part)[row : row + s.rows] for s, part, row in segments[scene]
-            ]
+            places = [_candidates(part)[row : row + s.rows] for s, part, row in segments[scene]]
             if len(np.unique(np.concatenate(places))) < sum(map(len, places)):
                 twice.append(scene)
         return twice
-
-    def _candidates(self, part: Part) -> Any:
-        table = read_part(part, [CANDIDATE_COLUMN])
-        return np.empty(0) if table is None else table.column(CANDIDATE_COLUMN).to_numpy()
 
     def _write(self, table: Any, segments: Sequence[JournalSegment]) -> None:
         self._number += 1
@@ -391,12 +372,22 @@ class PartWriter:
             part.path.unlink(missing_ok=True)
 
 
+def _candidates(part: TablePart) -> Any:
+    table = read_part(part, [CANDIDATE_COLUMN])
+    return np.empty(0) if table is None else table.column(CANDIDATE_COLUMN).to_numpy()
+
+
 def keep_parts(run: Run) -> None:
     """Keeps parts of a run of one scene, if it is so large that they matter and pyarrow is
     installed."""
     if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
         return
-    writer = PartWriter(run.path, [StoredRun("", run.path)], ())
+    update_parts(run.path, [StoredRun("", run.path)], ())
+
+
+def update_parts(folder: Path, places: Sequence[StoredRun], instances: Sequence[str]) -> None:
+    """Writes what the journals of runs have beyond the parts; see `PartWriter`."""
+    writer = PartWriter(folder, places, instances)
     writer.catch_up()
     writer.close()
 
@@ -432,7 +423,6 @@ class JournalTail:
 
     def refresh(self) -> None:
         """Reads what has come since."""
-        chunk_bytes = 1 << 22
         try:
             status = os.stat(self.path)
         except OSError:
@@ -444,7 +434,7 @@ class JournalTail:
             return
         with open_regular(self.path) as stream:
             stream.seek(self.place)
-            while data := stream.read(chunk_bytes):
+            while data := stream.read(1 << 22):
                 whole = data.rfind(b"\n") + 1
                 if not whole:
                     return

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from burg_drake.core import (
     INSTANCE_PREFIXES,
@@ -84,17 +84,18 @@ def find_inputs(
         if run.document.hash == origin.run:
             scenes[:0] = [] if scene else [("the run's copy", run.scene)]
             stations[:0] = [] if station else [("the run's copy", run.station)]
-    search = _InputSearch(origin, force)
-    first = search.find("scene", origin.scene_content, scenes)
-    second = search.find("station", origin.station_content, stations)
-    missing = [found for found in (first, second) if isinstance(found, str)]
-    if isinstance(first, str) or isinstance(second, str):
-        found = {"scene": first, "station": second}
-        kinds = [kind for kind, missed in found.items() if isinstance(missed, str)]
-        raise InvalidInputError(f"{where} needs {'; and '.join(missing)}").about(
-            *kinds, *(["force"] if any("by force" in text for text in missing) else [])
+    found = {
+        "scene": _find_document("scene", origin, scenes, force),
+        "station": _find_document("station", origin, stations, force),
+    }
+    missing = {kind: text for kind, text in found.items() if isinstance(text, str)}
+    if missing:
+        by_force = ["force"] if any("by force" in text for text in missing.values()) else []
+        raise InvalidInputError(f"{where} needs {'; and '.join(missing.values())}").about(
+            *missing, *by_force
         )
-    return TrialInputs(first[0], second[0], tuple(note for _, note in (first, second) if note))
+    notes = tuple(note for _, note in found.values() if note)
+    return TrialInputs(found["scene"][0], found["station"][0], notes)
 
 
 def _existing_file(reference: str, kind: str) -> Path:
@@ -105,38 +106,33 @@ def _existing_file(reference: str, kind: str) -> Path:
         raise UnknownNameError(f"{reference} does not exist") from error
 
 
-@dataclass(frozen=True)
-class _InputSearch:
-    origin: TrialOrigin
-    force: bool
-
-    def find(
-        self, kind: str, content: str, places: Sequence[FilePlace[Document]]
-    ) -> tuple[Document, str] | str:
-        """The first document that fits, and a note if it is taken though it does not fit; what is
-        needed if there is none."""
-        problems: list[str] = []
-        other: Document | None = None
-        for place, load in places:
-            try:
-                document = load()
-            except BurgError as error:
-                problems.append(str(error))
-                continue
-            if document.content.startswith(content):
-                return document, ""
-            problems.append(f"{place} has content {document.content[:HASH_DIGITS]}")
-            other = other or document
-        found = "; ".join(problems)
-        if other is not None and self.force:
-            return other, f"the {kind} is not the one of the trial (content {content}): {found}"
-        meant = "objects and their library count" if kind == "scene" else "robot models count"
-        copy = f"a copy is {kind}.yaml in the folder of run {self.origin.run}"
-        go_on = f", or replay on {other.path} by force" if other is not None else ""
-        return (
-            f"the {kind} with content {content} ({meant}), but {found}; give its file ("
-            f"{copy}){go_on}"
-        )
+def _find_document(
+    kind: str, origin: TrialOrigin, places: Sequence[FilePlace[Any]], force: bool
+) -> Any:
+    """The first document that fits, and a note if it is taken by force though it does not fit; a
+    text that says what is needed if there is none."""
+    content = origin.scene_content if kind == "scene" else origin.station_content
+    problems: list[str] = []
+    other = None
+    for place, load in places:
+        try:
+            document = load()
+        except BurgError as error:
+            problems.append(str(error))
+            continue
+        if document.content.startswith(content):
+            return document, ""
+        problems.append(f"{place} has content {document.content[:HASH_DIGITS]}")
+        other = other or document
+    found = "; ".join(problems)
+    if other is not None and force:
+        return other, f"the {kind} is not the one of the trial (content {content}): {found}"
+    meant = "objects and their library count" if kind == "scene" else "robot models count"
+    copy = f"a copy is {kind}.yaml in the folder of run {origin.run}"
+    go_on = f", or replay on {other.path} by force" if other is not None else ""
+    return (
+        f"the {kind} with content {content} ({meant}), but {found}; give its file ({copy}){go_on}"
+    )
 
 
 @dataclass(frozen=True)
@@ -155,10 +151,11 @@ class Difference:
     @property
     def rounding(self) -> bool:
         """Whether a table that was written again by another program explains it."""
-        max_rounding_error = 1e-14  # Relative; a spreadsheet writes 15 digits.
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
-        return math.isclose(self.recorded, self.now, rel_tol=max_rounding_error)
+        return math.isclose(
+            self.recorded, self.now, rel_tol=1e-14
+        )  # a spreadsheet writes 15 digits
 
     def __str__(self) -> str:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
@@ -200,10 +197,9 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     there, here = _compared_results(recorded), _compared_results(now)
     if "clearance" not in there:  # of a release that did not measure it
         here.pop("clearance", None)
-    if math.isnan(
-        recorded.margins.get(MarginNames.lift_height, math.nan)
-    ):  # likewise, or of a trial alone
-        here.pop(MarginNames.lift_height, None)
+    name = MarginNames.lift_height
+    if math.isnan(recorded.margins.get(name, math.nan)):  # likewise, or of a trial alone
+        here.pop(name, None)
     if math.isnan(recorded.margins.get("others_turned", math.nan)):  # it watched centres of mass
         there, here = (_drop_object_motions(found) for found in (there, here))
     # The arm may have passed a grasp on, and is not asked again.
@@ -262,9 +258,8 @@ def _float_bits(value: float | str) -> str:
 
 def arm_figures(verdict: Verdict) -> list[str]:
     """What the screen of the arm has measured, as lines for people; none if it was not asked."""
-    of_arm = [
-        n for n in MarginNames.all if n not in MarginNames.trial and n != MarginNames.lift_height
-    ]
+    others = {*MarginNames.trial, MarginNames.lift_height}
+    of_arm = [name for name in MarginNames.all if name not in others]
     figures = format_column_values(verdict.margins, of_arm)
     return [figures] if figures else []
 

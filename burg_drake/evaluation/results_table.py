@@ -6,8 +6,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +29,9 @@ from burg_drake.core import (
     list_names,
     quaternion_from_rotation,
     quote_value,
-    suggest_names,
 )
 from burg_drake.evaluation.candidates import Candidate, Candidates, rows_of_names
-from burg_drake.evaluation.trial_origin import ORIGIN_TEXT, TrialOrigin, engine_label
-
-Member = TypeVar("Member", bound=StrEnum)
+from burg_drake.evaluation.trial_origin import ORIGIN_TEXT, TrialOrigin, engine_label, read_choice
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,23 +64,15 @@ class RecordedTrial:
     def lift(self) -> float | None:
         """Length of the lift that was executed, in place of the motion's [m]; None if it is not
         known, which it is not of older releases."""
-        height = (
-            math.nan if self.verdict is None else self.verdict.margins.get(MarginNames.lift_height)
-        )
-        return None if height is None or math.isnan(height) else height
+        margins = {} if self.verdict is None else self.verdict.margins
+        height = margins.get(MarginNames.lift_height, math.nan)
+        return None if math.isnan(height) else height
 
     @property
     def candidate(self) -> Candidate:
         """What a judge has to know."""
-        return Candidate(
-            self.id,
-            self.instance,
-            self.X_OG,
-            self.friction,
-            self.mass,
-            width=self.width,
-            lift=self.lift,
-        )
+        grasp = (self.id, self.instance, self.X_OG, self.friction, self.mass)
+        return Candidate(*grasp, width=self.width, lift=self.lift)
 
 
 def pose_text(X_OG: Array) -> str:
@@ -98,17 +86,17 @@ def pose_from_text(text: str, where: str) -> Array:
     Raises:
         InvalidInputError: the text is something else.
     """
-    words, numbers = text.split(), []
+    numbers = []
     expected = "it must be the 12 numbers of the upper three rows of the pose"
-    for word in words:
+    for word in text.split():
         try:
             numbers.append(float(word))
         except ValueError as error:
             raise InvalidInputError(
                 f"{where}: X_OG contains {quote_value(word)}; {expected}"
             ) from error
-    if len(words) != 12:
-        raise InvalidInputError(f"{where}: X_OG has {len(words)} numbers; {expected}")
+    if len(numbers) != 12:
+        raise InvalidInputError(f"{where}: X_OG has {len(numbers)} numbers; {expected}")
     upper = np.array(numbers).reshape(3, 4)
     return check_pose(np.vstack([upper, (0.0, 0.0, 0.0, 1.0)]), f"{where}: X_OG")
 
@@ -138,8 +126,8 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
             f"{where}: {', '.join(empty)} is empty, without which a row alone cannot be replayed;"
             " give the folder of its run"
         )
-    outcome = _read_member(Outcome, row["outcome"], f"{where}: outcome")
-    stage = _read_member(Stage, row["stage"], f"{where}: stage")
+    outcome = read_choice(row["outcome"], tuple(Outcome), f"{where}: outcome")
+    stage = read_choice(row["stage"], tuple(Stage), f"{where}: stage")
     findings = {one.name: one.from_row(row) for one in RecordedFields.trial}
     return RecordedTrial(
         id=row["id"],
@@ -151,15 +139,6 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
         mass=_read_property(row, "mass", where),
         verdict=Verdict(outcome, stage, **findings),
     )
-
-
-def _read_member(kind: type[Member], text: str, where: str) -> Member:
-    known = [member.value for member in kind]
-    if text not in known:
-        raise InvalidInputError(
-            f"{where} {quote_value(text)} is not known to this release; {suggest_names(text, known)}"
-        )
-    return kind(text)
 
 
 def _read_property(row: Mapping[str, Any], name: str, where: str) -> float | None:
@@ -229,7 +208,9 @@ def make_columns(
     ]
     columns = trial_columns(trials, origin, instances=instances, joints=joints)
     return columns | {
-        INPUT_PREFIX + name: _booleans_to_integers(v[judged]) for name, v in grasps.columns.items()
+        # truth values become 1 and 0, which every reader takes for numbers
+        INPUT_PREFIX + name: v[judged].astype(np.int64) if v.dtype.kind == "b" else v[judged]
+        for name, v in grasps.columns.items()
     }
 
 
@@ -247,19 +228,16 @@ def trial_columns(
     approach = bool(origin.trial.get("approach"))
     shape = TableShape(origin.mode, instances, joints, approach)
     X_OG = np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)
-    wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if rows else np.empty((0, 4))
     columns: Columns = {
-        "id": _text_column([t.id for t in trials]),
-        "instance": _text_column([t.instance for t in trials]),
-        "object": _text_column([t.object for t in trials]),
+        **{n: _text_column([getattr(t, n) for t in trials]) for n in ("id", "instance", "object")},
         **columns_of_verdicts(rows, "decided", shape),
-        "width": _number_column([t.width for t in trials]),
-        "score": _number_column([t.score for t in trials]),
-        **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
-        **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
+        **{name: _number_column([getattr(t, name) for t in trials]) for name in ("width", "score")},
+        **pose_columns(X_OG),
         **columns_of_verdicts(rows, "measured", shape),
-        "friction": _number_column([t.friction for t in trials]),
-        "mass": _number_column([t.mass for t in trials]),
+        **{
+            name: _number_column([getattr(t, name) for t in trials])
+            for name in ("friction", "mass")
+        },
         **columns_of_verdicts(rows, "posture", shape),
     }
     columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
@@ -271,14 +249,20 @@ def trial_columns(
     columns |= columns_of_verdicts(rows, "cost", shape)
     cells = {name: one.cells() for name, one in origins.items()}
     for name in ORIGIN_TEXT:
-        texts = {judge: cells[judge][name] for judge in cells}
-        columns[name] = _judge_column(texts, judges)
+        columns[name] = _judge_column({judge: cells[judge][name] for judge in cells}, judges)
     columns["X_OG"] = _text_column([pose_text(t.X_OG) for t in trials])
     return columns
 
 
+def pose_columns(X_OG: Array) -> Columns:
+    """Columns of positions and quaternions of poses (N, 4, 4)."""
+    wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if len(X_OG) else np.empty((0, 4))
+    columns = {name: X_OG[:, k, 3] for k, name in enumerate("xyz")}
+    return columns | {name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))}
+
+
 def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: TableShape) -> Columns:
-    """The columns of verdicts that lie in a part of a row, see `core.columns`."""
+    """The columns of verdicts that lie in a part of a row, see `TableShape`."""
     columns: Columns = {}
     for one in fields_of_part(shape, part):
         values = [getattr(verdict, one.name) for verdict in rows]
@@ -291,11 +275,6 @@ def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: Table
 def table_row(columns: Columns, index: int) -> dict[str, Any]:
     """One row as Python values by column."""
     return {name: values[index].item() for name, values in columns.items()}
-
-
-def _booleans_to_integers(values: NDArray[Any]) -> NDArray[Any]:
-    """Truth values as 1 and 0, which every reader takes for numbers."""
-    return values.astype(np.int64) if values.dtype.kind == "b" else values
 
 
 def _text_column(values: Sequence[str]) -> NDArray[Any]:
@@ -318,19 +297,18 @@ def _number_column(values: Sequence[float | None]) -> NDArray[Any]:
     return np.array([math.nan if value is None else value for value in values], dtype=float)
 
 
+def contested_rows(confidence: Array, settled: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows (N,) whose verdict is contested, as `Verdict.contested` has it.
+
+    Args:
+        confidence: (N,) NaN where there is none.
+        settled: (N,) whether another engine has judged again.
+    """
+    return (np.nan_to_num(confidence, nan=1.0) < CONTESTED_CONFIDENCE) & ~settled
+
+
 RANKING_CLEARANCE_STEP = 5e-4
 """Metres; smaller differences in clearance do not rank grasps."""
-
-
-class RankingScales:
-    """Ranking scales."""
-
-    length_step = 1e-4  # Metres; smaller differences do not rank grasps.
-    angle_step = float(np.deg2rad(0.1))  # Radians.
-    area_step = 1e-6  # Square metres.
-    slip = 0.005  # Metres that weigh as much as `tilt` and `push`.
-    tilt = 0.1  # Radians.
-    push = 0.01  # Metres.
 
 
 def best_rows(
@@ -362,12 +340,11 @@ def best_rows(
     lifted = _clearest_rows(columns, lifted, count, each=each)
     room = _clearance_steps(columns, lifted)
     penalty = (
-        _round_to_step(columns["slip"][lifted], RankingScales.length_step) / RankingScales.slip
-        + _round_to_step(columns["tilt"][lifted], RankingScales.angle_step) / RankingScales.tilt
-        + _round_to_step(columns["others_moved"][lifted], RankingScales.length_step)
-        / RankingScales.push
+        _round_to_step(columns["slip"][lifted], 1e-4) / 0.005
+        + _round_to_step(columns["tilt"][lifted], float(np.deg2rad(0.1))) / 0.1
+        + _round_to_step(columns["others_moved"][lifted], 1e-4) / 0.01
     )
-    patch = _round_to_step(columns["patch_area"][lifted], RankingScales.area_step)
+    patch = _round_to_step(columns["patch_area"][lifted], 1e-6)
     score = np.nan_to_num(columns["score"][lifted], nan=-np.inf)
     # equal sums may differ in their last digits
     order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -room))
@@ -389,8 +366,8 @@ def _clearance_steps(columns: Columns, rows: NDArray[np.int64]) -> Array:
     steps = np.nan_to_num(np.floor(clearance / RANKING_CLEARANCE_STEP + 1e-9), nan=-max_steps)
     if "confidence" not in columns or "judged_again" not in columns:  # of earlier releases
         return steps
-    contested = columns["confidence"][rows] < CONTESTED_CONFIDENCE
-    contested &= columns["judged_again"][rows] == ""
+    settled = columns["judged_again"][rows] != ""
+    contested = contested_rows(columns["confidence"][rows], settled)
     return np.where(contested, steps - 2.0 * max_steps, steps)
 
 

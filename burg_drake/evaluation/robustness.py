@@ -1,4 +1,4 @@
-"""Robustness of grasps that a run found to lift: tests in worker processes, and the table of results."""
+"""Robustness of lifted grasps of a run: tests in worker processes, and the table of results."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
 from burg_drake.evaluation.judge import require_engine_for
 from burg_drake.evaluation.results_table import Columns
 from burg_drake.evaluation.robustness_probes import (
-    Probe,
     ProbeAnswer,
     ProbeJudgeFactory,
+    RobustnessProbe,
     known_answers,
     make_probes,
 )
@@ -88,11 +88,7 @@ def gather_answers(
 ) -> GraspRobustness:
     """What the answers to the probes of a grasp say of it; see `GraspRobustness`."""
     by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
-    repeats = Counter(
-        answer.outcome
-        for answer in answers
-        if answer.test == "noise" and answer.outcome is not None
-    )
+    repeats = Counter(a.outcome for a in answers if a.test == "noise" and a.outcome is not None)
     tug, shake, friction_min = (by_test.get(test) for test in ("tug", "shake", "friction"))
     return GraspRobustness(
         id,
@@ -116,10 +112,7 @@ def robustness_columns(
     """The table; `engines` are those of the grasps."""
     # Outcomes of a grasp that no arm is asked about.
     hand_outcomes = tuple(o for o in Outcome if o.stage in (Stage.CLEAR, Stage.EXECUTED))
-    columns: Columns = {
-        name: np.array([getattr(g, name) for g in grasps], dtype=np.str_)
-        for name in ("id", "instance", "object")
-    }
+    columns = {n: _text_column(getattr(g, n) for g in grasps) for n in ("id", "instance", "object")}
     tugs = [None if g.tug is None else g.tug.accelerations for g in grasps]
     forces = [None if g.tug is None else g.tug.forces for g in grasps]
     shakes = [None if g.shake is None else g.shake.accelerations for g in grasps]
@@ -138,11 +131,11 @@ def robustness_columns(
     columns |= {
         f"n_{outcome}": _integer_column(counts, itemgetter(outcome)) for outcome in hand_outcomes
     }
-    columns["failed"] = np.array([" ".join(g.failed) for g in grasps], dtype=np.str_)
-    columns["engine"] = np.array([engine_label(engine) for engine in engines], dtype=np.str_)
+    columns["failed"] = _text_column(" ".join(g.failed) for g in grasps)
+    columns["engine"] = _text_column(map(engine_label, engines))
     columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)
-    columns["settings"] = np.array([_settings_text(settings)] * len(grasps), dtype=np.str_)
-    columns["run"] = np.array([run] * len(grasps), dtype=np.str_)
+    columns["settings"] = _text_column([_settings_text(settings)] * len(grasps))
+    columns["run"] = _text_column([run] * len(grasps))
     return columns
 
 
@@ -217,6 +210,10 @@ def _table_caption(settings: RobustnessSettings) -> str:
     return "\n".join(parts)
 
 
+def _text_column(values: Iterable[str]) -> np.ndarray:
+    return np.array(list(values), dtype=np.str_)
+
+
 def _integer_column(values: Sequence[T | None], count: Callable[[T], int]) -> np.ndarray:
     """A whole number of each value, None where there is none."""
     return np.array([None if v is None else count(v) for v in values], dtype=object)
@@ -268,7 +265,7 @@ class _EngineTests:
         names = ("burg_drake", "drake", *packages)
         return cls(factory, (*factory.content(), *(versions[name] for name in names)))
 
-    def probes(self, grasp: Candidate) -> Iterator[Probe]:
+    def probes(self, grasp: Candidate) -> Iterator[RobustnessProbe]:
         """All questions about a grasp."""
         return make_probes(grasp, self.factory.scene, self.factory.settings, self.context)
 
@@ -331,21 +328,16 @@ def assess_robustness(
     probes = [probe for grasp in chosen for probe in tests[grasp.id].probes(grasp)]
     ensure_writable_folder(table.parent)
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
-        known = {
-            id
-            for id, verdict in read_journal(journal_path).items()
-            if not verdict.is_open(retry_failed=retry_failed)
-        }
+        there = read_journal(journal_path)
+        known = {id for id, v in there.items() if not v.is_open(retry_failed=retry_failed)}
         _answer_probes(run, probes, tests, journal, known, workers, reporter)
     answers = read_journal(journal_path)
     found = tuple(tests[grasp.id].gathered(grasp, answers) for grasp in chosen)
     engines = [tests[grasp.id].factory.engine for grasp in chosen]
     write_table(table, robustness_columns(found, settings, engines, run.document.hash))
-    failures = {
-        p.id: answers[p.id].reason
-        for p in probes
-        if answers[p.id].outcome is Outcome.SIMULATION_FAILED
-    }
+    asked = {probe.id: answers[probe.id] for probe in probes}
+    failed = Outcome.SIMULATION_FAILED
+    failures = {id: v.reason for id, v in asked.items() if v.outcome is failed}
     interrupted = sum(answers[id].interrupted for id in failures)
     return Robustness(found, table, failures, interrupted)
 
@@ -355,9 +347,8 @@ def _require_other_files(run: Run, *written: Path) -> None:
     own = [path.resolve() for path in (run.table_path, run.path / JOURNAL_FILE)]
     for path in written:
         if path.resolve() in own:
-            raise InvalidInputError(f"{path} belongs to the run itself; choose another file").about(
-                "out"
-            )
+            error = InvalidInputError(f"{path} belongs to the run itself; choose another file")
+            raise error.about("out")
 
 
 def _choose_grasps(
@@ -394,10 +385,10 @@ def _tests_by_grasp(
         if judge not in by_judge:
             engine = origin.judged_by(judge).engine
             if engine.simulator != "drake" and loaded:
+                others = ",".join(test for test in ROBUSTNESS_TESTS if test not in LOADED_TESTS)
                 raise InvalidInputError(
                     f"tests {' and '.join(loaded)} need Drake, but {grasp.id} was judged"
-                    f" by engine {engine.name}; give the tests "
-                    f"{','.join(test for test in ROBUSTNESS_TESTS if test not in LOADED_TESTS)}"
+                    f" by engine {engine.name}; give the tests {others}"
                 ).about("tests")
             require_engine_for(engine, "hand")
             factory = ProbeJudgeFactory(scene, station, engine, trial, settings)
@@ -408,7 +399,7 @@ def _tests_by_grasp(
 
 def _answer_probes(
     run: Run,
-    probes: Sequence[Probe],
+    probes: Sequence[RobustnessProbe],
     tests: Mapping[str, _EngineTests],
     journal: Journal,
     known: Collection[str],
@@ -433,7 +424,7 @@ def _answer_probes(
                 pace.step(work=TEST_COSTS[own[asked.id]])
 
 
-def _trial_time(run: Run, probes: Sequence[Probe]) -> float:
+def _trial_time(run: Run, probes: Sequence[RobustnessProbe]) -> float:
     """CPU time that the run's own trials of the grasps took on average [s]."""
     took = [run.verdicts[id].cpu.get(Stage.EXECUTED, 0.0) for id in {p.grasp for p in probes}]
     return sum(took) / max(len(took), 1)

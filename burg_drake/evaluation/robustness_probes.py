@@ -39,7 +39,7 @@ class ProbeAnswer:
     tried.
 
     Attributes:
-        test: one of `settings.TESTS`.
+        test: one of `ROBUSTNESS_TESTS`.
         outcome: how the trial ended. Of `noise` that is the answer; the other tests have one only
             where the object was not held, and None where their answer is in numbers.
         forces: what the grip bears, of `tug` and `shake`.
@@ -82,7 +82,7 @@ def _nan_to_infinity(value: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Probe:
+class RobustnessProbe:
     """One question.
 
     Attributes:
@@ -103,7 +103,7 @@ class Probe:
 
 def make_probes(
     grasp: Candidate, scene: Scene, settings: RobustnessSettings, context: Sequence[object]
-) -> Iterator[Probe]:
+) -> Iterator[RobustnessProbe]:
     """All questions about a grasp that the settings ask.
 
     Args:
@@ -117,7 +117,7 @@ def make_probes(
         if test != "noise":
             id = _probe_id(grasp.id, test, key)
             trial = Candidate(id, grasp.instance, grasp.X_OG, lift=grasp.lift)
-            yield Probe(test, grasp.id, trial)
+            yield RobustnessProbe(test, grasp.id, trial)
             continue
         entry = scene.entry(grasp.instance)
         for repeat in range(settings.repeats):
@@ -138,7 +138,7 @@ def make_probes(
                 drawn.mass,
                 lift=grasp.lift,
             )
-            yield Probe(test, grasp.id, trial)
+            yield RobustnessProbe(test, grasp.id, trial)
 
 
 def known_answers(
@@ -200,7 +200,7 @@ class ProbeJudge:
         """The answer to a probe.
 
         Args:
-            test: one of `settings.TESTS`.
+            test: one of `ROBUSTNESS_TESTS`.
             grasp: as it is tried.
 
         Returns:

@@ -1,4 +1,4 @@
-"""Shares of perturbed repeats that were lifted, from tables of robustness, as success probabilities."""
+"""Success probabilities: shares of perturbed repeats that lift, from tables of robustness."""
 
 from __future__ import annotations
 
@@ -66,6 +66,7 @@ def _require_one_run(
     foreign = sorted(set(grasps) - set(ids))
     if foreign:
         raise InvalidInputError(
-            f"{path} is of another run than {list_names(sorted(runs))}: that has no grasp {foreign[0]}"
+            f"{path} is of another run than {list_names(sorted(runs))}: that has no grasp"
+            f" {foreign[0]}"
         )
     return next(iter(runs))

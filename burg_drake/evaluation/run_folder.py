@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -133,7 +133,7 @@ class Run:
         part.__dict__.update(
             candidates=self.candidates,
             verdicts=verdicts,
-            _instances=self.instances,
+            instances=self.instances,
             _joints=self._joints,
         )
         return part
@@ -141,10 +141,8 @@ class Run:
     @property
     def failures(self) -> list[str]:
         """Ids of the grasps that could not be simulated."""
-        failed: list[str] = self.results["id"][
-            self.results["outcome"] == Outcome.SIMULATION_FAILED
-        ].tolist()
-        return failed
+        failed = self.results["outcome"] == Outcome.SIMULATION_FAILED
+        return [str(id) for id in self.results["id"][failed]]
 
     @property
     def interrupted(self) -> list[str]:
@@ -348,9 +346,13 @@ def require_run_folder(folder: Path) -> None:
         return
     journal = folder / JOURNAL_FILE
     begun = journal.is_file() and journal.stat().st_size == 0
+    refuse_other_files(folder, {JOURNAL_FILE, GRASPS_FILE} if begun else ())
+
+
+def refuse_other_files(folder: Path, own: Collection[str] = ()) -> None:
+    """Refuses a folder in which there is anything but files of some names, and hidden ones."""
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
-    foreign = sorted(names - {JOURNAL_FILE, GRASPS_FILE} if begun else names)
-    if foreign:
+    if foreign := sorted(names.difference(own)):
         raise InvalidInputError(
             f"{folder} is not empty and not a run: it has {foreign[0]} in it; choose another folder"
         ).about("out")

@@ -9,7 +9,7 @@ import secrets
 import shutil
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from burg_drake.core import (
@@ -19,32 +19,32 @@ from burg_drake.core import (
     ensure_writable_folder,
     list_names,
 )
-from burg_drake.evaluation.campaign_document import (
-    LEDGER_FILE,
-    SceneState,
-    campaign_differences,
-    ledger_text,
-)
 from burg_drake.evaluation.campaign_folder import (
     CAMPAIGN_LOCK_FILE,
+    LEDGER_FILE,
     SCENES_FOLDER,
     Campaign,
+    SceneState,
     is_campaign,
+    ledger_text,
     open_results,
     save_campaign,
 )
 from burg_drake.evaluation.journal import JOURNAL_FILE, WriterLock, hold_unchanged
 from burg_drake.evaluation.merged_run import (
-    all_sessions,
+    JournalChoice,
     choose_verdicts,
     common_shard,
     copy_documents,
+    merge_documents,
     missing_shards,
+    require_mergeable,
     write_merged,
 )
-from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex, PartWriter
+from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex, update_parts
 from burg_drake.evaluation.report.pages import write_campaign_report
 from burg_drake.evaluation.run_folder import REPORT_FILE, RUN_FILE, Run, load_run
+from burg_drake.evaluation.run_identity import run_differences
 from burg_drake.evaluation.run_preparation import finish_run
 from burg_drake.evaluation.run_summary import run_shortfall_notes
 from burg_drake.evaluation.scene_tasks import is_finished
@@ -65,11 +65,6 @@ class MissingFromMerge:
     missing: int = 0
     scenes: tuple[str, ...] = ()
     shards: tuple[str, ...] = ()
-
-
-def note_unfinished(folder: Path, sources: Sequence[Path], left: MissingFromMerge) -> None:
-    """Notes in a merged run that it is to be finished."""
-    _note_file(folder, sources).write_text(json.dumps(asdict(left)), encoding="utf-8")
 
 
 def read_unfinished(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
@@ -111,14 +106,12 @@ def _finish_campaign(campaign: Campaign) -> None:
         size = place.journal.stat().st_size
         if not is_finished(place.folder, size, document.table, report=reports):
             finish_run(load_run(place.folder), document.table, report=reports)
-    writer = PartWriter(campaign.path, campaign.places, document.instances)
-    writer.catch_up()
-    writer.close()
+    update_parts(campaign.path, campaign.places, document.instances)
     write_campaign_report(campaign)
 
 
 def _note_file(folder: Path, sources: Sequence[Path]) -> Path:
-    """Named as `files.remove_unfinished` wants it."""
+    """Named as `remove_unfinished` wants it."""
     names = sorted(str(path.resolve()) for path in sources)
     return folder / f".merge.{content_hash(names)[:16]}"
 
@@ -140,23 +133,14 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
     """
     require_arrow("a run over many scenes")
     first = campaigns[0]
+    documents = [campaign.document for campaign in campaigns]
     for other in campaigns[1:]:
-        if found := campaign_differences(first.document, other.document):
-            raise InvalidInputError(
-                f"{first.path} and {other.path} are different runs ({'; '.join(found)});"
-                " only shards or copies of the same run can be merged"
-            )
-    document = replace(
-        first.document,
-        shard=common_shard(campaigns),
-        stretches=all_sessions([campaign.document.stretches for campaign in campaigns]),
-        hints=next((c.document.hints for c in campaigns if c.document.hints), ()),
-    )
-    merged = Campaign(staging, document)
+        require_mergeable(first, other, run_differences(first.document, other.document))
+    merged = Campaign(staging, merge_documents(documents, common_shard(campaigns)))
     (staging / SCENES_FOLDER).mkdir()
     merge = _Merge(campaigns, merged, folder)
     for name in merged.names:
-        merge.take(name)
+        merge.take_scene(name)
     merge.copy_parts()
     atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
     save_campaign(merged)
@@ -182,7 +166,7 @@ class _Merge:
         self.missing = 0
         self.not_begun: list[str] = []
 
-    def take(self, name: str) -> None:
+    def take_scene(self, name: str) -> None:
         """Takes a scene."""
         begun = [k for k, c in enumerate(self._campaigns) if (c.folder(name) / RUN_FILE).exists()]
         known = [s for c in self._campaigns if (s := c.states.get(name)) is not None]
@@ -195,9 +179,9 @@ class _Merge:
         with ExitStack() as stack:
             for k in begun:
                 stack.enter_context(hold_unchanged(self._campaigns[k].folder(name) / JOURNAL_FILE))
-            self._take(name, begun)
+            self._merge_scene(name, begun)
 
-    def _take(self, name: str, begun: Sequence[int]) -> None:
+    def _merge_scene(self, name: str, begun: Sequence[int]) -> None:
         target = self._merged.folder(name)
         final = self._folder / SCENES_FOLDER / name
         runs = [load_run(self._campaigns[k].folder(name)) for k in begun]
@@ -206,7 +190,7 @@ class _Merge:
             return
         target.mkdir()
         choice = write_merged(runs, target, final, self._shard)
-        self._note(name, runs[0], choice.missing, choice.failed, choice.interrupted)
+        self._note_state(name, runs[0], choice)
 
     def copy_parts(self) -> None:
         """Copies the parts of which all scenes were copied; the others are made from journals."""
@@ -231,44 +215,36 @@ class _Merge:
             self.states.append(state)
             return
         choice = choose_verdicts([target / JOURNAL_FILE], run.mine)
-        self._note(name, run, choice.missing, choice.failed, choice.interrupted)
+        self._note_state(name, run, choice)
 
-    def _note(self, name: str, run: Run, missing: int, failed: int, interrupted: int) -> None:
-        self.missing += missing
+    def _note_state(self, name: str, run: Run, choice: JournalChoice) -> None:
+        self.missing += choice.missing
         count = len(run.candidates)
-        shard = self._merged.document.shard_of_grasps
-        mine = len(select_share(range(count), shard))
         size = (self._merged.folder(name) / JOURNAL_FILE).stat().st_size
         state = SceneState(
             scene=name,
-            state="open" if missing else "done",
+            state="open" if choice.missing else "done",
             run=run.document.hash,
             grasps=count,
-            mine=mine,
+            mine=len(select_share(range(count), self._shard)),
             sampling=run.document.grasps.cpu,
-            size=0 if missing else size,
-            failed=failed,
-            interrupted=interrupted,
+            size=0 if choice.missing else size,
+            failed=choice.failed,
+            interrupted=choice.interrupted,
             missing="; ".join(run_shortfall_notes(run)),
         )
         self.states.append(state)
 
 
-@dataclass(frozen=True, eq=False)
-class MergeResult:
-    """What came of it.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MergeResult(MissingFromMerge):
+    """A merged run, and what it lacks.
 
     Attributes:
         result: the run.
-        missing: grasps that are not judged.
-        scenes: that have not been begun.
-        shards: that were not among the runs.
     """
 
     result: Run | Campaign
-    missing: int = 0
-    scenes: tuple[str, ...] = ()
-    shards: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -322,7 +298,7 @@ def merge_folders(paths: Sequence[str | Path], out: str | Path) -> MergeResult:
             for path in folders:
                 stack.enter_context(hold_unchanged(lock_file(path), make=is_campaign(path)))
             left = _merge_folders(folders, folder)
-    return MergeResult(finish_merge(folder, folders), left.missing, left.scenes, left.shards)
+    return MergeResult(**vars(left), result=finish_merge(folder, folders))
 
 
 def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
@@ -344,7 +320,8 @@ def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
             runs = [result for result in results if isinstance(result, Run)]
             choice = write_merged(runs, staging, folder)
             left = MissingFromMerge(choice.missing, (), missing_shards(runs))
-        note_unfinished(staging, folders, left)
+        note = _note_file(staging, folders)
+        note.write_text(json.dumps(asdict(left)), encoding="utf-8")
         move_folder(staging, folder)
         return left
     finally:

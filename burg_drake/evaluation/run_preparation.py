@@ -1,8 +1,9 @@
 """From a call of `evaluate` to a run that can be judged: request, folder, candidates, open grasps.
 
-A balanced run samples further grasps in rounds, each when all grasps so far are judged. What a round
-samples follows from the verdicts alone, not from who judged them or in which order. A later round
-repeats the sampling with the same seed and a larger number, so it begins with the same grasps.
+A balanced run samples further grasps in rounds, each when all grasps so far are judged. What a
+round samples follows from the verdicts alone, not from who judged them or in which order. A later
+round repeats the sampling with the same seed and a larger number, so it begins with the same
+grasps.
 """
 
 from __future__ import annotations
@@ -57,10 +58,7 @@ from burg_drake.evaluation.run_document import (
     Grasps,
     Library,
     RunDocument,
-    TableFormat,
     input_of,
-    require_same_run,
-    run_hash,
     settings_numbers,
 )
 from burg_drake.evaluation.run_folder import (
@@ -72,8 +70,15 @@ from burg_drake.evaluation.run_folder import (
     save_run,
     write_copies,
 )
+from burg_drake.evaluation.run_identity import require_same_run, run_hash
 from burg_drake.evaluation.run_summary import lifted_and_failed
-from burg_drake.evaluation.settings import EvaluationSettings, SamplingSettings, Shard, as_shard
+from burg_drake.evaluation.settings import (
+    EvaluationSettings,
+    SamplingSettings,
+    Shard,
+    TableFormat,
+    as_shard,
+)
 from burg_drake.evaluation.table_file import write_table
 from burg_drake.evaluation.trial_origin import MEASURE_NUMBERS
 from burg_drake.scene import Scene
@@ -90,7 +95,7 @@ grasps come from, and the correction with which it reads them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Request:
+class RunRequest:
     """What is asked.
 
     Attributes:
@@ -120,7 +125,7 @@ class Request:
         grasps: GraspsLike | None = None,
         *,
         retry_failed: bool = False,
-    ) -> Request:
+    ) -> RunRequest:
         """What settings ask for on a station.
 
         Raises:
@@ -162,7 +167,7 @@ class Request:
             retry_failed=retry_failed,
         )
 
-    def given(self, scene: Scene) -> ByInstance | None:
+    def given_grasps(self, scene: Scene) -> ByInstance | None:
         """The user's grasps on the instances of a scene; None where they are sampled.
 
         Raises:
@@ -174,7 +179,7 @@ class Request:
         found = group_by_names(scene, found) if isinstance(found, GraspSet) else found
         return select_instances(scene, found, self.only)
 
-    def of_scene(self, scene: Scene) -> Request | None:
+    def narrow_to_scene(self, scene: Scene) -> RunRequest | None:
         """What is asked about one scene of many: `only` and grasps may be for others alone.
 
         Returns:
@@ -192,9 +197,8 @@ class Request:
         grasps: GraspsLike = self.grasps
         if isinstance(grasps, GraspSet):
             by = grasps.columns.get(INSTANCE_COLUMN, grasps.object)
-            among = (
-                list(scene.instances) if INSTANCE_COLUMN in grasps.columns else sorted({*known, ""})
-            )
+            named = INSTANCE_COLUMN in grasps.columns
+            among = list(scene.instances) if named else sorted({*known, ""})
             grasps = grasps.select(np.isin(by, among))
         elif isinstance(grasps, Mapping):
             grasps = {name: grasps[name] for name in grasps if name in scene.instances}
@@ -209,7 +213,7 @@ class Request:
         found = {name: part for name, part in found.items() if name in chosen}
         return replace(self, only=only, grasps=found) if found else None
 
-    def requested(self, scene: Scene) -> Grasps:
+    def describe_grasps(self, scene: Scene) -> Grasps:
         """What is asked of the grasps; what comes of it is filled in when it is known.
 
         Raises:
@@ -217,58 +221,61 @@ class Request:
         """
         chosen = chosen_instances(scene, self.only)
         only = () if chosen == tuple(scene.instances) else chosen
-        return replace(self.requested_of_all(), only=only)
+        return replace(self.describe_all_grasps(), only=only)
 
-    def _balance(self) -> dict[str, Any]:
-        """What a run that grows says of its grasps; nothing where they are sampled once."""
-        if self.settings.until_balanced is None:
-            return {}
-        return {
-            "until_balanced": self.settings.until_balanced,
-            "balanced_among": self.settings.balanced_among,
-            "max_per_object": self.settings.max_grasps_per_object,
-        }
-
-    def requested_of_all(self) -> Grasps:
+    def describe_all_grasps(self) -> Grasps:
         """The same, whatever the scene."""
         if self.grasps is not None:
             return Grasps(origin="given", only=self.only, count=0, objects={}, content="")
-        return Grasps(
+        settings = self.settings
+        found = Grasps(
             origin="sampled",
-            per_object=self.settings.grasps_per_object,
-            approach_angle_deg=float(self.settings.approach_angle_deg),
-            blind=self.settings.blind,
+            per_object=settings.grasps_per_object,
+            approach_angle_deg=float(settings.approach_angle_deg),
+            blind=settings.blind,
             only=self.only,
-            **self._balance(),
             count=0,
             objects={},
             content="",
         )
+        if settings.until_balanced is None:
+            return found
+        return replace(
+            found,
+            until_balanced=settings.until_balanced,
+            balanced_among=settings.balanced_among,
+            max_per_object=settings.max_grasps_per_object,
+        )
+
+    def document_fields(self) -> dict[str, Any]:
+        """Fields of the document of a run that do not depend on the scene."""
+        return {
+            "command": current_command(),
+            "station": input_of(self.station, "stations"),
+            "engine": self.engine,
+            "trial": self.trial,
+            "mode": self.mode,
+            "arm": self.arm,
+            "seed": self.settings.seed,
+            "shard": "" if self.shard is None else str(self.shard),
+            "table": self.settings.table,
+            "versions": software_versions({**JUDGING_PACKAGES, **self.engine.packages}),
+        }
 
     def document(self, folder: Path, scene: Scene) -> RunDocument:
         """The document of a run; what comes of the grasps is filled in later."""
         instances = [*scene.instances.values(), *scene.background.values()]
         library = portable_reference(scene.library.root, folder)
+        packaged = library.startswith(PACKAGE_URI)
         return RunDocument(
-            command=current_command(),
+            **self.document_fields(),
             scene=input_of(scene, "scenes"),
-            station=input_of(self.station, "stations"),
             library=Library(
                 name=scene.library.name,
-                path=library
-                if library.startswith(PACKAGE_URI)
-                else str(scene.library.root.resolve()),
+                path=library if packaged else str(scene.library.root.resolve()),
                 objects={i.object: scene.library.entry(i.object).build for i in instances},
             ),
-            grasps=self.requested(scene),
-            engine=self.engine,
-            trial=self.trial,
-            mode=self.mode,
-            arm=self.arm,
-            seed=self.settings.seed,
-            shard="" if self.shard is None else str(self.shard),
-            table=self.settings.table,
-            versions=software_versions({**JUDGING_PACKAGES, **self.engine.packages}),
+            grasps=self.describe_grasps(scene),
         )
 
     @property
@@ -429,7 +436,7 @@ def require_sound(scene: Scene, station: Station, mode: Mode, engine: Engine) ->
 def open_run(
     folder: Path,
     scene: Scene,
-    request: Request,
+    request: RunRequest,
     given: ByInstance | None,
     sampling: Callable[[], None] = lambda: None,
 ) -> Run:
@@ -522,7 +529,7 @@ def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
         run = save_run(Run(run.path, replace(run.document, table=table)))
     journal = run.path / JOURNAL_FILE
     if not _is_up_to_date(run.table_path, journal):
-        _write_table(run)
+        write_table(run.table_path, run.results, asdict(run.document))
     if not _is_up_to_date(run.report_path, journal):
         run.report_path.unlink(missing_ok=True)
         if report:
@@ -532,10 +539,6 @@ def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
 
 def _is_up_to_date(path: Path, journal: Path) -> bool:
     return path.exists() and path.stat().st_mtime_ns >= journal.stat().st_mtime_ns
-
-
-def _write_table(run: Run) -> None:
-    write_table(run.table_path, run.results, asdict(run.document))
 
 
 def require_judged(run: Run) -> None:
@@ -558,12 +561,7 @@ def require_scenes_judged(campaign: Campaign) -> None:
     Raises:
         SimulationError: there are such scenes.
     """
-    ended = ("done", "empty", "failed")
-    states = campaign.states
-    left = [
-        name for name in campaign.names if name not in states or states[name].state not in ended
-    ]
-    if left:
+    if left := campaign.open_scenes:
         raise SimulationError(
             f"{len(left)} of {len(campaign.names)} scenes are not complete ("
             f"{list_names(left)}); the results so far are kept: run the same command to"

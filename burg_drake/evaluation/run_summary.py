@@ -1,12 +1,11 @@
-"""Summary of a run, of one scene or of many: counts, and notes on grasps that are missing or failed."""
+"""Summary of a run, of one scene or of many: counts, and notes on missing or failed grasps."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +26,12 @@ from burg_drake.evaluation.outcome_counts import (
     OutcomeCounts,
     StageCost,
     Summary,
-    contested_rows,
     count_pushes,
     count_short_lifts,
     member_codes,
-    settled_rows,
     stage_cost,
 )
-from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.results_table import contested_rows
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.evaluation.table_parts import StoredRows
 from burg_drake.evaluation.trial_origin import read_motion
@@ -55,9 +52,14 @@ def run_notes(run: Run) -> tuple[str, ...]:
     than asked, or for those that no grasps were given for, and, once all of its grasps are judged,
     for each object of which nothing could be executed, or that has too few lifted or failing ones
     for a run that is to be balanced."""
+    grasps = run.document.grasps
+    missing = ""
+    if grasps.per_object is None:
+        given = [name for name, count in grasps.objects.items() if count]
+        missing = missing_grasps_note(grasps.objects, given)
     return (
         *run.document.hints,
-        *_missing_grasps_notes(run),
+        *([missing] if missing else []),
         *run_shortfall_notes(run),
         *_unexecuted_notes(run),
         *_balance_notes(run),
@@ -81,38 +83,22 @@ def run_shortfall_notes(run: Run) -> list[str]:
     return [note for note in notes if note]
 
 
-def _missing_grasps_notes(run: Run) -> list[str]:
-    grasps = run.document.grasps
-    if grasps.per_object is not None:
-        return []
-    note = missing_grasps_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
-    return [note] if note else []
-
-
 def _unexecuted_notes(run: Run) -> list[str]:
     columns, notes = run.results, []
     motion = read_motion(run.document.trial)
     given = run.document.grasps.origin == "given"
     for name, count in run.document.grasps.objects.items():
         mine = columns["object"] == name
-        outcomes = columns["outcome"][mine]
+        outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
         tried = np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.EXECUTED])
         executed = tried & (outcomes != Outcome.SIMULATION_FAILED)
         if count and len(outcomes) == count and not executed.any():
-            notes.append(_unexecuted_note(name, columns, mine, motion, given=given))
+            stages = Counter(columns["stage"][mine].tolist())
+            remedy = _remedy(Stage(stages.most_common(1)[0][0]), given=given)
+            if other := _motion_remedy(_most_frequent_outcome(outcomes, blockers), motion):
+                remedy = f"{other} may help; {remedy}"
+            notes.append(_none_note(name, "was executed", outcomes, blockers, remedy))
     return notes
-
-
-def _unexecuted_note(
-    name: str, columns: Columns, mine: np.ndarray, motion: GraspMotion, *, given: bool
-) -> str:
-    stages = Counter(columns["stage"][mine].tolist())
-    remedy = _remedy(Stage(stages.most_common(1)[0][0]), given=given)
-    outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
-    if other := _motion_remedy(Outcome(_frequent_causes(outcomes, blockers)[0][0][0]), motion):
-        remedy = f"{other} may help; {remedy}"
-    causes = _causes_text(outcomes, blockers)
-    return f"{name}: none of {_grasps_text(mine)} was executed: {causes}; {remedy}"
 
 
 def _remedy(stage: Stage, *, given: bool) -> str:
@@ -157,9 +143,8 @@ def unclear_notes(
     for name in dict.fromkeys(objects.tolist()):
         mine = objects == name
         if not clear[mine].any():
-            causes = _causes_text(outcomes[mine], blockers[mine])
             remedy = _remedy(Stage.CLEAR, given=given)
-            notes.append(f"{name}: none of {_grasps_text(mine)} is clear: {causes}; {remedy}")
+            notes.append(_none_note(name, "is clear", outcomes[mine], blockers[mine], remedy))
     return tuple(notes)
 
 
@@ -179,36 +164,37 @@ def unmoved_notes(
     notes = []
     for name in dict.fromkeys(objects.tolist()):
         mine = objects == name
-        if (outcomes[mine] == Outcome.REACHABLE).any():
+        own = (outcomes[mine], blockers[mine])
+        if (own[0] == Outcome.REACHABLE).any():
             continue
-        first = Outcome(_frequent_causes(outcomes[mine], blockers[mine])[0][0][0])
-        if other := _motion_remedy(first, motion):
-            causes = _causes_text(outcomes[mine], blockers[mine])
-            notes.append(
-                f"{name}: none of {_grasps_text(mine)} is reachable: {causes}; {other} may help"
-            )
+        if other := _motion_remedy(_most_frequent_outcome(*own), motion):
+            notes.append(_none_note(name, "is reachable", *own, f"{other} may help"))
     return tuple(notes)
 
 
-def _grasps_text(mine: np.ndarray) -> str:
-    count = int(mine.sum())
-    return f"{count:,} grasp{'' if count == 1 else 's'}"
-
-
-def _causes_text(outcomes: NDArray[np.str_], blockers: NDArray[np.str_]) -> str:
-    """The most frequent outcomes, with what was in the way."""
+def _none_note(
+    name: str, achievement: str, outcomes: NDArray[np.str_], blockers: NDArray[np.str_], remedy: str
+) -> str:
+    """That none of an object's grasps achieves something, with the most frequent causes."""
+    count = len(outcomes)
     named = _frequent_causes(outcomes, blockers)
-    parts = [f"{_cause_words(Outcome(what), body)} in {count:,}" for (what, body), count in named]
-    rest = len(outcomes) - sum(count for _, count in named)
-    return ", ".join([*parts, *([f"others in {rest:,}"] if rest else [])])
+    parts = [f"{_cause_words(Outcome(what), body)} in {n:,}" for (what, body), n in named]
+    if rest := count - sum(n for _, n in named):
+        parts.append(f"others in {rest:,}")
+    grasps = f"{count:,} grasp{'' if count == 1 else 's'}"
+    return f"{name}: none of {grasps} {achievement}: {', '.join(parts)}; {remedy}"
 
 
 def _frequent_causes(
     outcomes: NDArray[np.str_], blockers: NDArray[np.str_]
 ) -> list[tuple[tuple[str, str], int]]:
-    """The most frequent pairs of outcome and blocker, with their counts."""
-    max_causes = 3  # So many outcomes are named.
-    return Counter(zip(outcomes.tolist(), blockers.tolist(), strict=True)).most_common(max_causes)
+    """The three most frequent pairs of outcome and blocker, with their counts."""
+    return Counter(zip(outcomes.tolist(), blockers.tolist(), strict=True)).most_common(3)
+
+
+def _most_frequent_outcome(outcomes: NDArray[np.str_], blockers: NDArray[np.str_]) -> Outcome:
+    """The outcome of the most frequent pair of outcome and blocker."""
+    return Outcome(_frequent_causes(outcomes, blockers)[0][0][0])
 
 
 def _cause_words(outcome: Outcome, blocker: str) -> str:
@@ -238,11 +224,9 @@ def _balance_notes(run: Run) -> list[str]:
         return []
     notes = []
     for name, counts in lifted_and_failed(run).items():
-        parts = [
-            f"{n} of the {grasps.until_balanced} {what}"
-            for n, what in zip(counts, ("lifted", "failing"), strict=True)
-            if n < grasps.until_balanced
-        ]
+        pairs = zip(counts, ("lifted", "failing"), strict=True)
+        asked = grasps.until_balanced
+        parts = [f"{n} of the {asked} {what}" for n, what in pairs if n < asked]
         if parts:
             among = grasps.balanced_among
             counted = "" if among == "all" else f" (only {among} grasps count)"
@@ -255,30 +239,66 @@ def _balance_notes(run: Run) -> list[str]:
     return notes or [f"every object has {asked} lifted and {asked} failing grasps, as asked for"]
 
 
-Text = TypeVar("Text", bound=str)
+def summarize(run: Run | Campaign) -> Summary:
+    """Counts what a run, of one scene or of many, has found so far."""
+    return _summarize_scene(run) if isinstance(run, Run) else _summarize_scenes(run)
 
 
-def summarize_campaign(campaign: Campaign) -> Summary:
-    """Counts what a run over many scenes has found so far."""
+def _summarize_scene(run: Run) -> Summary:
+    columns, document = run.results, run.document
+    settled = columns["judged_again"] != ""
+    rows = _CodedRows(
+        member_codes(columns["outcome"], tuple(Outcome)),
+        member_codes(columns["stage"], tuple(Stage)),
+        contested_rows(columns["confidence"], settled),
+        settled,
+    )
+    grasps = document.grasps
+    places = {name: place for place, name in enumerate(grasps.objects)}
+    object = np.array([places[name] for name in columns["object"].tolist()], dtype=np.int64)
+    costs = [stage_cost(columns, stage) for stage in STAGES_BY_MODE[document.mode]]
+    if grasps.origin == "sampled" and grasps.count:
+        costs.insert(0, StageCost("sampling", grasps.count, grasps.cpu, math.nan))
+    return Summary(
+        objects=tuple(rows.count_groups(object, list(places))),
+        total=rows.count_all(),
+        costs=tuple(costs),
+        mode=document.mode,
+        pushes=count_pushes(columns),
+        lifts=count_short_lifts(
+            columns[MarginNames.lift_height], read_motion(document.trial).lift_height
+        ),
+        notes=run_notes(run),
+        knows_confidence=bool(np.isfinite(columns["confidence"]).any()),
+        settled_by=tuple(name for name in np.unique(columns["judged_again"]).tolist() if name),
+    )
+
+
+def _summarize_scenes(campaign: Campaign) -> Summary:
     document = campaign.document
-    stages = [stage for stage in Stage if stage in STAGES_BY_MODE[document.mode]]
+    stages = STAGES_BY_MODE[document.mode]
     names = [
-        "object",
-        "outcome",
-        "stage",
-        *("confidence", "judged_again"),
+        *("object", "outcome", "stage", "confidence", "judged_again"),
         MarginNames.lift_height,
         *(CPU_COLUMNS[s] for s in stages),
     ]
     approached = document.mode == "arm" or bool(document.trial.get("approach"))
     if approached:
         names += ["pushed", "instance", *(PUSHED_PREFIX + name for name in document.instances)]
-    rows = campaign.rows(names)
-    object, objects = rows.codes("object")
-    by_object = dict(zip(objects, _count_groups(rows, object, objects), strict=True))
-    by_scene = _count_groups(rows, rows.run, campaign.names)
+    stored = campaign.rows(names)
+    judges, judge_names = stored.codes("judged_again")
+    # parts of earlier releases lack the column: -1 is the last one, which is no text
+    settled = np.array([*(name != "" for name in judge_names), False], dtype=bool)[judges]
+    rows = _CodedRows(
+        _stored_member_codes(stored, "outcome", tuple(Outcome)),
+        _stored_member_codes(stored, "stage", tuple(Stage)),
+        contested_rows(stored.column("confidence"), settled),
+        settled,
+    )
+    object, objects = stored.codes("object")
+    by_object = dict(zip(objects, rows.count_groups(object, objects), strict=True))
     none = OutcomeCounts("", 0, Counter(), Counter(), Counter())
-    costs = [stage_cost(rows.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
+    costs = [stage_cost(stored.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
     sampled = [s for s in campaign.states.values() if s.sampling > 0.0]
     if sampled:
         grasps, seconds = sum(s.grasps for s in sampled), sum(s.sampling for s in sampled)
@@ -287,80 +307,71 @@ def summarize_campaign(campaign: Campaign) -> Summary:
     known = dict.fromkeys(o for entry in document.mine for o in entry.chosen(only).values())
     return Summary(
         objects=tuple(replace(by_object.get(name, none), name=name) for name in known),
-        total=_count_groups(rows, np.zeros_like(rows.run), ["all"])[0],
+        total=rows.count_all(),
         costs=tuple(costs),
         mode=document.mode,
-        pushes=count_pushes(rows.columns(rows.table.column_names)) if approached else None,
+        pushes=count_pushes(stored.columns(stored.table.column_names)) if approached else None,
         lifts=count_short_lifts(
-            rows.column(MarginNames.lift_height), read_motion(document.trial).lift_height
+            stored.column(MarginNames.lift_height), read_motion(document.trial).lift_height
         ),
         notes=_campaign_notes(campaign),
-        scenes=tuple(by_scene),
-        knows_confidence=bool(np.isfinite(rows.column("confidence")).any()),
-        settled_by=tuple(sorted(text for text in rows.codes("judged_again")[1] if text)),
+        scenes=tuple(rows.count_groups(stored.run, campaign.names)),
+        knows_confidence=bool(np.isfinite(stored.column("confidence")).any()),
+        settled_by=tuple(sorted(name for name in judge_names if name)),
     )
 
 
-def _count_groups(
-    rows: StoredRows, keys: NDArray[np.int64], names: Sequence[str]
-) -> list[OutcomeCounts]:
-    """Grasps by object, by scene, or all.
-
-    Args:
-        rows: the grasps.
-        keys: (N,) the place of each in `names`.
-        names: of the groups.
-    """
-    outcome = _member_codes(rows, "outcome", tuple(Outcome))
-    stage = _member_codes(rows, "stage", tuple(Stage))
-    shape = (len(names), len(tuple(Outcome)), len(tuple(Stage)))
-    flat = (keys * shape[1] + outcome) * shape[2] + stage
-    counts = np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
-    codes, texts = rows.codes("judged_again")
-    # parts of earlier releases lack the column: -1 is the last one, which is no text
-    settled = np.array([*(text != "" for text in texts), False], dtype=bool)[codes]
-    contested = contested_rows(rows.column("confidence"), settled)
-    lifted = contested & (outcome == tuple(Outcome).index(Outcome.LIFTED))
-    doubts = [
-        np.bincount(keys[chosen], minlength=len(names)) for chosen in (contested, lifted, settled)
-    ]
-    return [
-        _group_counts(name, counts[k], *(int(number[k]) for number in doubts))
-        for k, name in enumerate(names)
-    ]
-
-
-def _member_codes(rows: StoredRows, name: str, members: Sequence[str]) -> NDArray[np.int64]:
+def _stored_member_codes(
+    rows: StoredRows, name: str, members: Sequence[str]
+) -> NDArray[np.integer]:
     codes, texts = rows.codes(name)
     return np.array([list(members).index(text) for text in texts], dtype=np.int64)[codes]
 
 
-def _group_counts(
-    name: str, counts: NDArray[np.int64], contested: int, contested_lifts: int, settled: int
-) -> OutcomeCounts:
-    """Grasps of an object or a scene.
+@dataclass(frozen=True, eq=False)
+class _CodedRows:
+    """N judged grasps.
 
-    Args:
-        name: of it.
-        counts: (outcomes, stages) how many there are.
-        contested, contested_lifts, settled: see `OutcomeCounts`.
+    Attributes:
+        outcome, stage: (N,) places in `Outcome` and `Stage`.
+        contested, settled: (N,) see `OutcomeCounts`.
     """
-    failed = counts[tuple(Outcome).index(Outcome.SIMULATION_FAILED)]
-    return OutcomeCounts(
-        name,
-        int(counts.sum()),
-        _counter_of_counts(tuple(Outcome), counts.sum(axis=1)),
-        _counter_of_counts(tuple(Stage), counts.sum(axis=0)),
-        _counter_of_counts(tuple(Stage), failed),
-        contested=contested,
-        contested_lifts=contested_lifts,
-        settled=settled,
-    )
 
+    outcome: NDArray[np.integer]
+    stage: NDArray[np.integer]
+    contested: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
 
-def _counter_of_counts(members: Sequence[Text], counts: NDArray[np.int64]) -> Counter[Text]:
-    found = zip(members, counts.tolist(), strict=True)
-    return Counter({member: n for member, n in found if n})
+    def count_all(self) -> OutcomeCounts:
+        """Counts of all grasps together."""
+        (total,) = self.count_groups(np.zeros(len(self.outcome), dtype=np.int64), ["all"])
+        return total
+
+    def count_groups(self, keys: NDArray[np.int64], names: Sequence[str]) -> list[OutcomeCounts]:
+        """Counts by group; `keys` (N,) are places in the names of the groups."""
+        outcomes, stages = tuple(Outcome), tuple(Stage)
+        shape = (len(names), len(outcomes), len(stages))
+        flat = (keys * shape[1] + self.outcome) * shape[2] + self.stage
+        counts = np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
+        lifted = self.contested & (self.outcome == outcomes.index(Outcome.LIFTED))
+        contested, contested_lifts, settled = (
+            np.bincount(keys[chosen], minlength=len(names)).tolist()
+            for chosen in (self.contested, lifted, self.settled)
+        )
+        failed = counts[:, outcomes.index(Outcome.SIMULATION_FAILED)]
+        return [
+            OutcomeCounts(
+                name,
+                int(counts[k].sum()),
+                +Counter(dict(zip(outcomes, counts[k].sum(axis=1).tolist(), strict=True))),
+                +Counter(dict(zip(stages, counts[k].sum(axis=0).tolist(), strict=True))),
+                +Counter(dict(zip(stages, failed[k].tolist(), strict=True))),
+                contested=contested[k],
+                contested_lifts=contested_lifts[k],
+                settled=settled[k],
+            )
+            for k, name in enumerate(names)
+        ]
 
 
 def _campaign_notes(campaign: Campaign) -> tuple[str, ...]:
@@ -375,60 +386,3 @@ def _campaign_notes(campaign: Campaign) -> tuple[str, ...]:
     if len(short) > max_listed:
         notes.append(f"{len(short) - max_listed} more scenes have fewer grasps than were asked for")
     return tuple(notes)
-
-
-def summarize(run: Run | Campaign) -> Summary:
-    """Counts what a run, of one scene or of many, has found so far."""
-    if not isinstance(run, Run):
-        return summarize_campaign(run)
-    columns, document = run.results, run.document
-    outcome = member_codes(columns["outcome"], tuple(Outcome))
-    stage = member_codes(columns["stage"], tuple(Stage))
-    settled = settled_rows(columns["judged_again"])
-    doubts = np.stack([contested_rows(columns["confidence"], settled), settled], axis=1)
-    mine = {name: columns["object"] == name for name in document.grasps.objects}
-    sampling = document.grasps
-    costs = [
-        stage_cost(columns, stage) for stage in Stage if stage in STAGES_BY_MODE[document.mode]
-    ]
-    if sampling.origin == "sampled" and sampling.count:
-        costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
-    return Summary(
-        objects=tuple(
-            _count_group(name, outcome[own], stage[own], doubts[own]) for name, own in mine.items()
-        ),
-        total=_count_group("all", outcome, stage, doubts),
-        costs=tuple(costs),
-        mode=document.mode,
-        pushes=count_pushes(columns),
-        lifts=count_short_lifts(
-            columns[MarginNames.lift_height], read_motion(document.trial).lift_height
-        ),
-        notes=run_notes(run),
-        knows_confidence=bool(np.isfinite(columns["confidence"]).any()),
-        settled_by=tuple(name for name in np.unique(columns["judged_again"]).tolist() if name),
-    )
-
-
-def _count_group(
-    name: str, outcome: np.ndarray, stage: np.ndarray, doubts: np.ndarray
-) -> OutcomeCounts:
-    """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`, and
-    whether they are contested, and settled (N, 2)."""
-    contested, settled = doubts.T
-    failed = stage[outcome == tuple(Outcome).index(Outcome.SIMULATION_FAILED)]
-    return OutcomeCounts(
-        name,
-        len(outcome),
-        _counter_of_codes(tuple(Outcome), outcome),
-        _counter_of_codes(tuple(Stage), stage),
-        _counter_of_codes(tuple(Stage), failed),
-        contested=int(contested.sum()),
-        contested_lifts=int((contested & (outcome == tuple(Outcome).index(Outcome.LIFTED))).sum()),
-        settled=int(settled.sum()),
-    )
-
-
-def _counter_of_codes(members: tuple[Any, ...], codes: np.ndarray) -> Counter[Any]:
-    counts = np.bincount(codes, minlength=len(members)).tolist()
-    return Counter({member: n for member, n in zip(members, counts, strict=True) if n})

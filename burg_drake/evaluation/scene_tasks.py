@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from burg_drake.core import (
-    BurgError,
     Outcome,
     Prefetcher,
     Session,
@@ -23,11 +22,11 @@ from burg_drake.core import (
     ensure_writable_folder,
     remove_unfinished,
 )
-from burg_drake.evaluation.campaign_document import SceneState
+from burg_drake.evaluation.campaign_folder import SceneState
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
 from burg_drake.evaluation.part_store import PART_ROWS, PartWriter, StoredRun
-from burg_drake.evaluation.run_document import TableFormat, WorkSession, begin_session
+from burg_drake.evaluation.run_document import WorkSession, add_session, begin_session
 from burg_drake.evaluation.run_folder import (
     REPORT_FILE,
     RUN_FILE,
@@ -37,13 +36,14 @@ from burg_drake.evaluation.run_folder import (
     save_run,
 )
 from burg_drake.evaluation.run_preparation import (
-    Request,
+    RunRequest,
     finish_run,
     open_grasps,
     open_run,
     require_sound,
 )
 from burg_drake.evaluation.run_summary import run_shortfall_notes
+from burg_drake.evaluation.settings import TableFormat
 from burg_drake.scene import Scene, as_scene
 
 
@@ -57,7 +57,7 @@ class SceneJudging:
         known: how many of them had one.
     """
 
-    def __init__(self, name: str, folder: Path, request: Request, workers: int) -> None:
+    def __init__(self, name: str, folder: Path, request: RunRequest, workers: int) -> None:
         """Opens the run.
 
         Raises:
@@ -94,7 +94,7 @@ class SceneJudging:
         self._begun = time.monotonic()
         self._save(self._session)
 
-    def take(self, id: str, verdict: Verdict) -> None:
+    def add_verdict(self, id: str, verdict: Verdict) -> None:
         """Keeps a verdict."""
         assert self._journal is not None
         self._journal.append(id, verdict)
@@ -113,8 +113,7 @@ class SceneJudging:
         self._journal.close()
         self._journal = None
         if self.left:
-            seconds = round(time.monotonic() - self._begun, 3)
-            self._save(replace(self._session, judged=self._judged, seconds=seconds))
+            self._save(self._session.finish(self._judged, self._begun))
 
     def state(self, state: Literal["open", "done"]) -> SceneState:
         """How far it is."""
@@ -136,9 +135,7 @@ class SceneJudging:
         )
 
     def _save(self, session: WorkSession) -> None:
-        document = self._run.document
-        sessions = (*document.stretches, session)
-        save_run(replace(self._run, document=replace(document, stretches=sessions)))
+        save_run(Run(self._run.path, add_session(self._run.document, session)))
 
 
 def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
@@ -181,11 +178,6 @@ class FinishTask:
     judged: bool = True
 
 
-@dataclass(frozen=True)
-class ClosePartsTask:
-    """The parts are to be written to the end."""
-
-
 @dataclass(frozen=True, eq=False)
 class Preparer:
     """Prepares scenes.
@@ -194,7 +186,7 @@ class Preparer:
         request: what is asked.
     """
 
-    request: Request
+    request: RunRequest
 
     def __call__(self, work: PrepareTask) -> Scene | None:
         """Makes the folder of a scene's run; returns the scene, or None if there are no grasps.
@@ -202,14 +194,20 @@ class Preparer:
         Raises:
             BurgError: it cannot be judged.
         """
+        try:
+            return self._prepare(work)
+        except SystemExit as error:  # DRAKE_DEMAND ends this way
+            raise SimulationError(f"SystemExit: {error}") from error
+
+    def _prepare(self, work: PrepareTask) -> Scene | None:
         scene = as_scene(work.scene)
-        request = self.request.of_scene(scene)
+        request = self.request.narrow_to_scene(scene)
         if request is None:
             return None
         require_run_folder(work.folder)
         if not (work.folder / RUN_FILE).exists():
             require_sound(scene, request.station, request.mode, request.engine)
-        given = request.given(scene)
+        given = request.given_grasps(scene)
         remove_unfinished(ensure_writable_folder(work.folder))
         with Journal(work.folder / JOURNAL_FILE):
             open_run(work.folder, scene, request, given)
@@ -235,121 +233,88 @@ class SceneOutputs:
     reports: bool
 
 
-class Finisher:
+class SceneResultsWriter:
     """Writes what comes of scenes: tables, reports, parts."""
 
-    def __init__(self, keeping: SceneOutputs) -> None:
-        self._keeping = keeping
-        self._folders = {place.scene: place.folder for place in keeping.places}
+    def __init__(self, outputs: SceneOutputs) -> None:
+        self._outputs = outputs
+        self._folders = {place.scene: place.folder for place in outputs.places}
         self._writer: PartWriter | None = None
 
-    def __call__(self, work: FinishTask | ClosePartsTask) -> None:
-        """Does a piece of work.
+    def __call__(self, work: FinishTask | None) -> None:
+        """Writes what a scene is for, or closes the parts if None.
 
         Raises:
             BurgError: a file cannot be written.
         """
-        if isinstance(work, ClosePartsTask):
-            if self.writer.behind():
+        if work is None:
+            if self.writer.scenes_behind():
                 self.writer.catch_up()
             self.writer.close()
             return
         run = load_run(self._folders[work.name])
         if work.judged:
-            run = finish_run(run, self._keeping.table, report=self._keeping.reports)
-        self.writer.take(work.name, run)
+            run = finish_run(run, self._outputs.table, report=self._outputs.reports)
+        self.writer.add_rows(work.name, run)
 
     @property
     def writer(self) -> PartWriter:
         """Opened when it is needed, as it looks at all parts."""
         if self._writer is None:
-            keeping = self._keeping
-            self._writer = PartWriter(keeping.folder, keeping.places, keeping.instances)
+            outputs = self._outputs
+            self._writer = PartWriter(outputs.folder, outputs.places, outputs.instances)
         return self._writer
 
 
-def prepare_scene(preparer: Preparer, work: PrepareTask) -> Scene | None:
-    """Prepares a scene in a worker; see `Preparer`.
-
-    Raises:
-        BurgError: it cannot be judged.
-    """
-    try:
-        return preparer(work)
-    except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"SystemExit: {error}") from error
-
-
-def finish_scene(finisher: Finisher, work: FinishTask | ClosePartsTask) -> None:
-    """Writes what came of a scene in a worker; see `Finisher`.
-
-    Raises:
-        BurgError: a file cannot be written.
-    """
-    finisher(work)
-
-
 def preparer_count(workers: int) -> int:
-    """How many processes prepare scenes; 0 would do it in this process. A cluster may have no
-    workers yet."""
-    workers_per_process = 16  # Sampling takes about a thirtieth of the time of the trials.
-    return max(1, -(-workers // workers_per_process))
+    """How many processes prepare scenes. A cluster may have no workers yet."""
+    # one for 16 workers, as sampling takes about a thirtieth of the time of the trials
+    return max(1, -(-workers // 16))
 
 
 class SceneProcesses:
     """What is done about scenes but judging; a context that ends its processes."""
 
-    def __init__(self, preparer: Preparer, keeping: SceneOutputs, workers: int) -> None:
+    def __init__(self, preparer: Preparer, outputs: SceneOutputs, workers: int) -> None:
         """Starts nothing yet.
 
         Args:
             preparer: prepares scenes.
-            keeping: what is kept of them.
+            outputs: what is kept of them.
             workers: that judge.
         """
-        self._preparer = preparer
-        self._count = preparer_count(workers)
         self._pools: list[WorkerPool] = []
-        self._work: Iterator[PrepareTask] = iter(())
-        self._ahead: Prefetcher[PrepareTask, Scene | None] | None = None
-        self._finisher: WorkerPool | None = None
-        self._finishing: deque[tuple[FinishTask | ClosePartsTask, WorkerFuture[None]]] = deque()
-        self._session = Session("finish", partial(Finisher, keeping))
-        self._here = Finisher(keeping)
+        self._preparer, self._preparers = preparer, self._pool(preparer_count(workers))
+        self._finisher = self._pool(1)
+        self._finishing: deque[tuple[FinishTask | None, WorkerFuture[None]]] = deque()
+        self._session = Session("finish", partial(SceneResultsWriter, outputs))
+        self._here = SceneResultsWriter(outputs)
         self._used = False
-        self._failed: list[FinishTask | ClosePartsTask] = []
-        if self._count:
-            self._finisher = self._pool(1)
+        self._failed: list[FinishTask | None] = []
 
     def prepare(self, work: Iterable[PrepareTask]) -> None:
         """Says which scenes are to be prepared, in order."""
-        self._work = iter(work)
-        if self._count:
-            session = Session("prepare", partial(Preparer, self._preparer.request))
-            self._ahead = Prefetcher(
-                self._pool(self._count),
-                self._work,
-                lambda item: Task(prepare_scene, (item,), session=session),
-            )
+        session = Session("prepare", partial(Preparer, self._preparer.request))
+        self._ahead: Prefetcher[PrepareTask, Scene | None] = Prefetcher(
+            self._preparers,
+            iter(work),
+            lambda item: Task(Preparer.__call__, (item,), session=session),
+        )
 
     def ready(self) -> bool:
         """Whether `prepared` returns at once."""
-        return self._ahead is None or self._ahead.ready()
+        return self._ahead.ready()
 
     def prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
         """The next scene whose run has been begun, or why it cannot be; without grasps its result
         is None. None when there are no more scenes."""
-        if self._ahead is not None:
-            return self._ahead.take()
-        for item in self._work:
-            return item, self._prepared_here(item)
-        return None
+        return self._ahead.take()
 
     def finish(self, name: str) -> None:
         """Has table, report and rows of a judged scene written."""
         self._give(FinishTask(name))
 
-    def take(self, name: str) -> None:
+    def write_rows(self, name: str) -> None:
         """Has rows of a scene written that is being judged."""
         self._give(FinishTask(name, judged=False))
 
@@ -359,13 +324,13 @@ class SceneProcesses:
         Raises:
             BurgError: something cannot be written.
         """
-        if self._finisher is not None and self._used:
-            self._submit(self._finisher, ClosePartsTask())
+        if self._used:
+            self._submit(None)
             self._collect_finished(wait=True)
-        for work in self._failed or (() if self._used else (ClosePartsTask(),)):
+        for work in self._failed or (() if self._used else (None,)):
             self._here(work)  # where it fails again it is an error
         if self._failed:
-            self._here(ClosePartsTask())
+            self._here(None)
 
     def __enter__(self) -> SceneProcesses:
         return self
@@ -378,23 +343,14 @@ class SceneProcesses:
         self._pools.append(WorkerPool(workers, retries=0, own_group=True))
         return self._pools[-1]
 
-    def _prepared_here(self, item: PrepareTask) -> Scene | BaseException | None:
-        try:
-            return self._preparer(item)
-        except BurgError as error:
-            return error
-
     def _give(self, work: FinishTask) -> None:
-        if self._finisher is None:
-            self._here(work)
-            return
         self._used = True
-        self._submit(self._finisher, work)
+        self._submit(work)
         self._collect_finished(wait=False)
 
-    def _submit(self, finisher: WorkerPool, work: FinishTask | ClosePartsTask) -> None:
-        task = Task(finish_scene, (work,), session=self._session)
-        self._finishing.append((work, finisher.submit_task(task)))
+    def _submit(self, work: FinishTask | None) -> None:
+        task = Task(SceneResultsWriter.__call__, (work,), session=self._session)
+        self._finishing.append((work, self._finisher.submit_task(task)))
 
     def _collect_finished(self, wait: bool) -> None:
         """Notes what could not be written, of what is finished, or of all when that is."""

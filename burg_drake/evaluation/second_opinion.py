@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import overload
+from typing import TypeVar, overload
 
 from burg_drake.core import (
     STARTING_PHASE,
@@ -24,10 +24,10 @@ from burg_drake.core import (
     software_versions,
     suggest_names,
 )
-from burg_drake.evaluation.campaign_document import Ledger
 from burg_drake.evaluation.campaign_folder import (
     CAMPAIGN_LOCK_FILE,
     Campaign,
+    SceneStates,
     load_campaign,
     open_results,
     save_campaign,
@@ -36,36 +36,33 @@ from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, WriterLock
 from burg_drake.evaluation.judge import StationJudgeFactory, require_engine_for, require_scene_for
-from burg_drake.evaluation.part_store import PartWriter, keep_parts
+from burg_drake.evaluation.part_store import keep_parts, update_parts
 from burg_drake.evaluation.report.pages import renew_report
-from burg_drake.evaluation.run_document import begin_session, origin_of
+from burg_drake.evaluation.run_document import (
+    OneRunDocument,
+    WorkSession,
+    add_session,
+    begin_session,
+    origin_of,
+)
 from burg_drake.evaluation.run_folder import REPORT_FILE, Run, load_run, save_run
 from burg_drake.evaluation.run_preparation import finish_run
 from burg_drake.evaluation.run_summary import summarize
 from burg_drake.evaluation.scene_tasks import is_finished
 from burg_drake.station import ENGINES, Engine
 
+OneRun = TypeVar("OneRun", Run, Campaign)
+
 
 @overload
 def judge_again(
-    run: Run,
+    run: OneRun,
     *,
     engine: str = ...,
     executor: Executor | None = ...,
     workers: int | None = ...,
     progress: bool | Listener = ...,
-) -> Run: ...
-
-
-@overload
-def judge_again(
-    run: Campaign,
-    *,
-    engine: str = ...,
-    executor: Executor | None = ...,
-    workers: int | None = ...,
-    progress: bool | Listener = ...,
-) -> Campaign: ...
+) -> OneRun: ...
 
 
 @overload
@@ -128,15 +125,12 @@ def judge_again(
     with Reporter(progress) as reporter:
         if isinstance(found, Campaign):
             return _judge_scenes(found, engine, executor, reporter)
-        settled_runs: list[Run] = []
-
-        def finish(judged: Run) -> None:
-            settled_runs.append(finish_run(judged, judged.document.table))
-            keep_parts(settled_runs[-1])
-
-        count = len(found.contested)
-        _judge_contested([found], count, engine, executor, reporter, finish)
-        return settled_runs[0]
+        settled: list[Run] = []
+        _judge_contested([found], len(found.contested), engine, executor, reporter, settled.append)
+        (judged,) = settled
+        judged = finish_run(judged, judged.document.table)
+        keep_parts(judged)
+        return judged
 
 
 def _require_complete(found: Run | Campaign) -> None:
@@ -148,8 +142,7 @@ def _require_complete(found: Run | Campaign) -> None:
     if isinstance(found, Run):
         complete, which = found.complete, ""
     else:
-        ended = [n for n, s in found.states.items() if s.state in ("done", "empty", "failed")]
-        left = [name for name in found.names if name not in ended]
+        left = found.open_scenes
         complete, which = not left, f" ({list_names(left)})"
     if not complete:
         raise InvalidInputError(
@@ -196,15 +189,17 @@ def _judge_scenes(
 ) -> Campaign:
     """Judges again what is contested in each scene, and writes what is made of the verdicts."""
     with WriterLock(campaign.path / CAMPAIGN_LOCK_FILE):
-        document, ledger = campaign.document, Ledger(campaign.path)
+        document, ledger = campaign.document, SceneStates(campaign.path)
         done = {name for name, state in ledger.states.items() if state.state == "done"}
         contested = {g.name: g.contested for g in summarize(campaign).scenes if g.name in done}
         reports = {name: (campaign.folder(name) / REPORT_FILE).exists() for name in contested}
-        names = [
-            name
-            for name, count in contested.items()
-            if count or not _is_finished(campaign, ledger, name, report=reports[name])
-        ]
+        folders = {name: campaign.folder(name) for name in contested}
+
+        def is_settled(name: str) -> bool:
+            size, table = ledger.states[name].size, document.table
+            return is_finished(folders[name], size, table, report=reports[name])
+
+        names = [name for name, n in contested.items() if n or not is_settled(name)]
 
         def finish(run: Run) -> None:
             name = run.path.name
@@ -216,22 +211,12 @@ def _judge_scenes(
         session, begun = begin_session(executor.workers, sum(contested.values())), time.monotonic()
         judged = _judge_contested(runs, sum(contested.values()), engine, executor, reporter, finish)
         if judged:
-            seconds = round(time.monotonic() - begun, 3)
-            sessions = (*document.stretches, replace(session, judged=judged, seconds=seconds))
-            versions = software_versions(ENGINES[engine].packages) | document.versions
-            document = replace(document, stretches=sessions, versions=versions)
+            document = _add_second_session(document, session.finish(judged, begun), engine)
             save_campaign(Campaign(campaign.path, document))
-        writer = PartWriter(campaign.path, campaign.places, document.instances)
-        writer.catch_up()
-        writer.close()
+        update_parts(campaign.path, campaign.places, document.instances)
         campaign = load_campaign(campaign.path)
         renew_report(campaign)
         return campaign
-
-
-def _is_finished(campaign: Campaign, ledger: Ledger, name: str, *, report: bool) -> bool:
-    size, table = ledger.states[name].size, campaign.document.table
-    return is_finished(campaign.folder(name), size, table, report=report)
 
 
 def _judge_contested(
@@ -267,7 +252,7 @@ def _judge_contested(
         with closing(executor.judge(jobs())) as verdicts:
             for job, candidate, verdict in verdicts:
                 settling = opened[job.key]
-                judged += settling.take(candidate, verdict)
+                judged += settling.keep_answer(candidate, verdict)
                 pace.step(outcome=verdict.outcome)
                 if not settling.open:
                     finish(opened.pop(job.key).close())
@@ -314,7 +299,7 @@ class _ContestedRun:
         factory = StationJudgeFactory(run.scene(), run.station(), engine, mode, settings)
         return Job(str(run.path), factory, self.left)
 
-    def take(self, candidate: Candidate, verdict: Verdict) -> bool:
+    def keep_answer(self, candidate: Candidate, verdict: Verdict) -> bool:
         """Keeps an answer; whether it settles the grasp."""
         self.open -= 1
         if verdict.outcome is Outcome.SIMULATION_FAILED:
@@ -330,12 +315,16 @@ class _ContestedRun:
         document = self._run.document
         if not self.left:
             return Run(self._run.path, document)
-        seconds = round(time.monotonic() - self._begun, 3)
-        session = replace(self._session, judged=self._judged, seconds=seconds)
-        versions = software_versions(ENGINES[self._engine].packages) | document.versions
-        sessions = (*document.stretches, session)
-        document = replace(document, stretches=sessions, versions=versions)
-        return save_run(Run(self._run.path, document))
+        session = self._session.finish(self._judged, self._begun)
+        return save_run(Run(self._run.path, _add_second_session(document, session, self._engine)))
+
+
+def _add_second_session(
+    document: OneRunDocument, session: WorkSession, engine: str
+) -> OneRunDocument:
+    """A run's document with a session, and the versions of the engine of that session."""
+    versions = software_versions(ENGINES[engine].packages) | document.versions
+    return replace(add_session(document, session), versions=versions)
 
 
 def settle_verdict(before: Verdict, verdict: Verdict, engine: str) -> Verdict:

@@ -1,4 +1,4 @@
-"""Settings of evaluation, sampling and robustness, and the share of a run that one machine judges."""
+"""Settings of evaluation, sampling and robustness, and shards of runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar, get_args
+from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
 from burg_drake.core import (
     MAX_DOCUMENT_SEED,
@@ -24,8 +24,9 @@ from burg_drake.station import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
     from burg_drake.core import Array, Mode
-    from burg_drake.evaluation.run_document import TableFormat
     from burg_drake.station import Engine, GraspMotion
+
+TableFormat = Literal["csv", "parquet"]
 
 DEFAULT_APPROACH_ANGLE_DEG = 75.0
 """Keeps the hand above the horizontal, and leaves out pairs of an object's bottom and top for
@@ -225,9 +226,7 @@ class EvaluationSettings:
         low=1,
     )
     until_balanced: int | None = setting(
-        None,
-        "sample until each object has N lifted and N failed grasps (one scene)",
-        low=1,
+        None, "sample until each object has N lifted and N failed grasps (one scene)", low=1
     )
     balanced_among: Among = setting(
         "executed",
@@ -247,10 +246,7 @@ class EvaluationSettings:
         high=180,
         noun="an angle in degrees",
     )
-    blind: bool = setting(
-        False,
-        "also sample grasps where the hand collides",
-    )
+    blind: bool = setting(False, "also sample grasps where the hand collides")
     only: Iterable[str] | None = None
     mode: Mode | None = setting(
         None,
@@ -281,10 +277,7 @@ class EvaluationSettings:
         above=0,
         infinite=True,
     )
-    approach: bool = setting(
-        False,
-        "with the hand alone, simulate its straight approach, too",
-    )
+    approach: bool = setting(False, "with the hand alone, simulate its straight approach, too")
     motion: GraspMotion | None = None
     seed: int = setting(0, "random seed of the sampling", high=MAX_DOCUMENT_SEED)
     shard: Shard | str | None = setting(

@@ -87,58 +87,55 @@ class RunWatch:
         """How far it is now."""
         self._result = result = self._reopened()
         if isinstance(result, Campaign):
-            return self._campaign(result)
-        run, document = result, result.document
-        tail = self._tail("")
+            return self._look_at_scenes(result)
+        document = result.document
+        tail = self._refresh_tail("")
         total = len(select_share(range(document.grasps.count), document.shard))
         judged = min(tail.lines, total)
-        working = is_locked(run.path / JOURNAL_FILE)
-        rate = self._rate(judged, document.stretches, working)
-        return Status(
-            path=str(run.path),
-            kind="run",
-            working=working,
-            judged=judged,
-            total=total,
-            outcomes=_outcome_texts(tail.outcomes),
-            rate=rate,
-            left=(total - judged) / rate if rate else None,
-            last=tail.modified or None,
-            shard=document.shard,
-            done=int(judged == total),
-            under_way=() if judged == total else (document.scene.name,),
+        status = self._status(
+            result.path / JOURNAL_FILE, judged, total, tail.outcomes, tail.modified
+        )
+        under_way = () if judged == total else (document.scene.name,)
+        return replace(status, kind="run", done=int(judged == total), under_way=under_way)
+
+    def _look_at_scenes(self, campaign: Campaign) -> Status:
+        states = {name: s for name, s in campaign.states.items() if name in set(campaign.names)}
+        begun = [n for n in campaign.names if n in states and states[n].state in ("open", "done")]
+        tails = [self._refresh_tail(name) for name in begun]
+        outcomes: Counter[bytes] = Counter()
+        for tail in tails:
+            outcomes.update(tail.outcomes)
+        judged = sum(tail.lines for tail in tails)
+        last = max((tail.modified for tail in tails), default=0.0)
+        lock = campaign.path / CAMPAIGN_LOCK_FILE
+        total = max(judged, campaign.expected)
+        return replace(
+            self._status(lock, judged, total, outcomes, last),
+            kind="campaign",
+            scenes=len(campaign.names),
+            done=sum(state.state in ("done", "empty") for state in states.values()),
+            failed=campaign.failed,
+            under_way=tuple(n for n in begun if states[n].state == "open"),
         )
 
-    def _campaign(self, campaign: Campaign) -> Status:
-        states = campaign.states
-        begun = [n for n in campaign.names if n in states and states[n].state in ("open", "done")]
-        outcomes: Counter[bytes] = Counter()
-        judged, last = 0, 0.0
-        for name in begun:
-            tail = self._tail(name)
-            outcomes.update(tail.outcomes)
-            judged += tail.lines
-            last = max(last, tail.modified)
-        working = is_locked(campaign.path / CAMPAIGN_LOCK_FILE)
-        total = max(judged, campaign.expected)
-        rate = self._rate(judged, campaign.document.stretches, working)
-        mine = set(campaign.names)
-        ended = [s for n, s in states.items() if n in mine and s.state in ("done", "empty")]
+    def _status(
+        self, lock: Path, judged: int, total: int, outcomes: Counter[bytes], last: float
+    ) -> Status:
+        """What runs of one scene and of many have in common."""
+        document = self._result.document
+        working = is_locked(lock)
+        rate = self._rate(judged, document.stretches, working)
         return Status(
-            path=str(campaign.path),
-            kind="campaign",
+            path=str(self._result.path),
+            kind="",
             working=working,
             judged=judged,
             total=total,
-            outcomes=_outcome_texts(outcomes),
+            outcomes=Counter({name.decode(): n for name, n in outcomes.items() if n > 0}),
             rate=rate,
             left=(total - judged) / rate if rate else None,
             last=last or None,
-            shard=campaign.document.shard,
-            scenes=len(campaign.names),
-            done=len(ended),
-            failed=campaign.failed,
-            under_way=tuple(n for n in begun if states[n].state == "open"),
+            shard=document.shard,
         )
 
     def _reopened(self) -> Run | Campaign:
@@ -150,7 +147,7 @@ class RunWatch:
         self._date = date
         return open_results(path)
 
-    def _tail(self, name: str) -> JournalTail:
+    def _refresh_tail(self, name: str) -> JournalTail:
         tail = self._tails[name]
         tail.refresh()
         return tail
@@ -196,7 +193,3 @@ def read_status(path: str | Path) -> Status:
         DocumentError: its document does not fit the schema.
     """
     return RunWatch(path).look()
-
-
-def _outcome_texts(outcomes: Counter[bytes]) -> Counter[str]:
-    return Counter({name.decode(): count for name, count in outcomes.items() if count > 0})

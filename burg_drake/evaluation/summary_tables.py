@@ -69,20 +69,17 @@ def _stage_table(summary: Summary) -> TextTable:
         if group is summary.total and len(summary.objects) > 1:
             table.gap()
         low, high = group.interval
-        share, interval = "-", "-"
+        rate = ["-", "-"]
         if group.executed:
             share = format_percent(group.lifted / group.executed)
-            interval = f"{100 * low:.0f}-{100 * high:.0f} %"
-        table.row(
-            group.name, *(format_count(group.funnel[name]) for name in names), share, interval
-        )
+            rate = [share, f"{100 * low:.0f}-{100 * high:.0f} %"]
+        table.row(group.name, *(format_count(group.funnel[name]) for name in names), *rate)
+    meanings = _step_meanings(summary.mode)
     table.caption = "\n".join(
-        f"{short_names.get(name, name)}: {meaning}"
-        for name, meaning in _step_meanings(summary.mode).items()
-        if name in names
-    )
-    table.caption += (
-        "\nsuccess: share of executed grasps that were lifted; CI: Wilson's 95 % interval"
+        [
+            *(f"{short_names.get(n, n)}: {meanings[n]}" for n in meanings if n in names),
+            "success: share of executed grasps that were lifted; CI: Wilson's 95 % interval",
+        ]
     )
     return table
 
@@ -134,12 +131,8 @@ def _outcome_matrix(summary: Summary) -> TextTable:
 def _outcome_list(summary: Summary) -> TextTable:
     table = TextTable("Outcomes").names("object").texts("outcomes")
     for group in _groups_with_total(summary):
-        found = [
-            f"{format_count(group.outcomes[o])} {o}"
-            for o in _occurring_outcomes(summary)
-            if group.outcomes[o]
-        ]
-        table.row(group.name, ", ".join(found))
+        counts = [(group.outcomes[o], o) for o in _occurring_outcomes(summary)]
+        table.row(group.name, ", ".join(f"{format_count(n)} {o}" for n, o in counts if n))
     table.caption = _outcome_meanings(summary)
     return table
 
@@ -158,12 +151,8 @@ def _cost_table(summary: Summary) -> TextTable:
     table = TextTable("CPU time").texts("stage")
     table.numbers("grasps", "CPU time", "median", "grasps per CPU second")
     for cost in summary.costs:
-        spent = (
-            format_duration(cost.seconds),
-            format_duration(cost.median),
-            format_number(cost.rate),
-        )
-        table.row(cost.name, format_count(cost.grasps), *spent)
+        times = (format_duration(cost.seconds), format_duration(cost.median))
+        table.row(cost.name, format_count(cost.grasps), *times, format_number(cost.rate))
     table.caption = "CPU time: of all these grasps; median: of one grasp"
     return table
 

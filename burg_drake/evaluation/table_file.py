@@ -18,7 +18,6 @@ from burg_drake.core import (
     FileLimits,
     InvalidInputError,
     MarginNames,
-    MissingDependencyError,
     ReadBudget,
     atomic_write,
     atomic_write_all,
@@ -34,9 +33,10 @@ from burg_drake.core import (
     text_array,
 )
 from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
+from burg_drake.evaluation.table_parts import require_arrow
 
 T = TypeVar("T", int, float)
-
+PARQUET_REMEDY = ", or choose csv"
 
 RUN_METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key."""
@@ -52,7 +52,7 @@ def require_writer(table: str) -> None:
     if table not in ("csv", "parquet"):
         raise InvalidInputError(f"table format {table!r} does not exist; give csv or parquet")
     if table == "parquet":
-        _pyarrow()
+        require_arrow("Parquet", PARQUET_REMEDY)
 
 
 def require_table(path: Path) -> None:
@@ -75,7 +75,7 @@ def require_table(path: Path) -> None:
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
-    Beside a CSV file what its columns are goes to a file, see `core.column_descriptions`.
+    Beside a CSV file what its columns are goes to a file, see `core.describe_column`.
 
     Args:
         path: the file.
@@ -93,15 +93,11 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
         atomic_write(path, _parquet_bytes(columns, metadata or {}))
     else:
         meant = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in columns.items()}
-        notes = [{"dc:description": note} for note in _csv_notes(metadata or {})]
+        shard = (metadata or {}).get("shard")
+        note = f"shard {shard}: only these grasps of the run are judged here"
+        notes = [{"dc:description": note}] if shard else []
         description = json.dumps(csv_metadata(path.name, meant, notes), indent=1) + "\n"
         atomic_write_all({metadata_path(path): description, path: _csv_text(columns)})
-
-
-def _csv_notes(metadata: Mapping[str, Any]) -> list[str]:
-    """What a reader of a CSV file has to know of its run."""
-    shard = metadata.get("shard")
-    return [f"shard {shard}: only these grasps of the run are judged here"] if shard else []
 
 
 def read_table(path: Path) -> Columns:
@@ -115,9 +111,9 @@ def read_table(path: Path) -> Columns:
     """
     try:
         if path.suffix == ".parquet":
-            _, parquet = _pyarrow()
+            arrow = require_arrow("Parquet", PARQUET_REMEDY)
             with open_regular(path) as binary:
-                table = _read_bounded(path, parquet.ParquetFile(binary))
+                table = _read_bounded(path, arrow.parquet.ParquetFile(binary))
             cells = {name: table.column(name).to_pylist() for name in table.column_names}
         else:
             cells = _csv_cells([row for _, row in read_rows(path)])
@@ -140,13 +136,12 @@ def _read_bounded(path: Path, file: Any) -> Any:
     Raises:
         InvalidInputError: it is beyond the limits of tables.
     """
-    batch_rows = 1 << 10  # Rows of a Parquet file that are unpacked at once.
-    arrow, _ = _pyarrow()
+    arrow = require_arrow("Parquet", PARQUET_REMEDY)
     cells = file.metadata.num_rows * file.metadata.num_columns
     if cells > FileLimits.table.values:
         raise InvalidInputError(f"cannot read {path}: more than {FileLimits.table.values:,} cells")
     batches, size = [], 0
-    for batch in file.iter_batches(batch_size=batch_rows):
+    for batch in file.iter_batches(batch_size=1 << 10):
         size += batch.nbytes
         if size > FileLimits.table.size:
             raise InvalidInputError(f"cannot read {path}: it has cells of more than 1 GiB in all")
@@ -156,12 +151,11 @@ def _read_bounded(path: Path, file: Any) -> Any:
 
 def is_table(path: Path) -> bool:
     """Whether a file is a table of results, by its name or its first line."""
-    max_header = 1 << 16  # Characters that are read to recognise a file.
     if path.suffix == ".parquet":
         return path.is_file()
     try:
         with open_regular(path) as file:
-            line = file.readline(max_header).decode("utf-8-sig")
+            line = file.readline(1 << 16).decode("utf-8-sig")
         return {"id", "outcome", "X_OG"} <= set(next(csv.reader([line]), []))
     except (InvalidInputError, UnicodeDecodeError, csv.Error):
         return False
@@ -201,7 +195,7 @@ def _cells(values: NDArray[Any]) -> list[Any]:
 
 
 def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
-    arrow, parquet = _pyarrow()
+    arrow = require_arrow("Parquet", PARQUET_REMEDY)
     kinds = {"U": arrow.string(), "O": arrow.int64()}
     arrays = {
         name: arrow.array(values.tolist(), kinds[values.dtype.kind])
@@ -213,29 +207,17 @@ def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
     fields = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
     table = table.cast(arrow.schema(fields, {RUN_METADATA_KEY: json.dumps(metadata)}))
     sink = arrow.BufferOutputStream()
-    parquet.write_table(table, sink)
+    arrow.parquet.write_table(table, sink)
     return bytes(sink.getvalue().to_pybytes())
-
-
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise MissingDependencyError(
-            "Parquet needs pyarrow; run: pip install 'burg-drake[parquet]', or choose csv"
-        ) from error
-    return pyarrow, pyarrow.parquet
 
 
 def _typed_column(name: str, values: Sequence[Any], allowance: ReadBudget) -> NDArray[Any]:
     texts = ["" if value is None else str(value) for value in values]
     if name in TEXT_COLUMNS:
         return text_array(f"{allowance.path}: {name}", texts, allowance)
-    if name in ("seed",):
-        whole = [
-            _read_cell(int, name, row, text, "a whole number") for row, text in enumerate(texts, 1)
-        ]
+    if name == "seed":
+        rows = enumerate(texts, 1)
+        whole = [_read_cell(int, name, row, text, "a whole number") for row, text in rows]
         return np.array(whole, dtype=np.int64)
     try:
         return np.array(

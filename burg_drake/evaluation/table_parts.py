@@ -91,10 +91,8 @@ def _follow_segments(segments: Sequence[JournalSegment], stream: BinaryIO) -> li
 def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bool) -> bool:
     """Whether a journal still has the bytes that a segment is made of."""
     if untouched:
-        return (
-            _stream_hash(stream, max(segment.begin, segment.end - SEGMENT_TAIL), segment.end)
-            == segment.last
-        )
+        begin = max(segment.begin, segment.end - SEGMENT_TAIL)
+        return _stream_hash(stream, begin, segment.end) == segment.last
     return _stream_hash(stream, segment.begin, segment.end) == segment.whole
 
 
@@ -122,11 +120,10 @@ def line_end(journal: Path, place: int) -> int:
 
 
 def _stream_hash(stream: BinaryIO, begin: int, end: int) -> str:
-    chunk_bytes = 1 << 20
     digest = hashlib.blake2b(digest_size=12)
     stream.seek(begin)
     left = end - begin
-    while left > 0 and (data := stream.read(min(chunk_bytes, left))):
+    while left > 0 and (data := stream.read(min(1 << 20, left))):
         digest.update(data)
         left -= len(data)
     return digest.hexdigest()
@@ -141,7 +138,7 @@ PART_NAME_PATTERN = re.compile(r"part-(\d+)-([0-9a-f]{16})\.parquet")
 
 
 @dataclass(frozen=True)
-class Part:
+class TablePart:
     """A part on disk.
 
     Attributes:
@@ -155,18 +152,18 @@ class Part:
     segments: tuple[JournalSegment, ...]
 
 
-def require_arrow(what: str) -> Any:
+def require_arrow(what: str, remedy: str = "") -> Any:
     """The module pyarrow.
 
     Raises:
-        MissingDependencyError: it is not installed; says what needs it.
+        MissingDependencyError: it is not installed; says what needs it, and another remedy.
     """
     try:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
         raise MissingDependencyError(
-            f"{what} needs pyarrow; run: pip install 'burg-drake[parquet]'"
+            f"{what} needs pyarrow; run: pip install 'burg-drake[parquet]'{remedy}"
         ) from error
     return pyarrow
 
@@ -180,10 +177,16 @@ def arrow_table(columns: Columns) -> Any:
 def empty_column(name: str, rows: int) -> Any:
     """A column of nulls, of the type that columns of this name have."""
     arrow = require_arrow("a columnar table")
-    return arrow.nulls(rows, _arrow_type(name, "U" if name in TEXT_COLUMNS else "f"))
+    text = arrow.string()
+    if name not in TEXT_COLUMNS:
+        return arrow.nulls(rows, arrow.float64())
+    repeated = name not in UNIQUE_TEXT_COLUMNS
+    return arrow.nulls(rows, arrow.dictionary(arrow.int32(), text) if repeated else text)
 
 
-def write_part(folder: Path, number: int, table: Any, segments: Sequence[JournalSegment]) -> Part:
+def write_part(
+    folder: Path, number: int, table: Any, segments: Sequence[JournalSegment]
+) -> TablePart:
     """Writes a part, whole or not at all.
 
     Raises:
@@ -198,12 +201,11 @@ def write_part(folder: Path, number: int, table: Any, segments: Sequence[Journal
     data = bytes(sink.getvalue())
     path = folder / f"part-{number:06d}-{_footer_hash(data)}.parquet"
     atomic_write(path, data)
-    return Part(path, number, tuple(segments))
+    return TablePart(path, number, tuple(segments))
 
 
-def open_part(path: Path) -> Part | None:
+def open_part(path: Path) -> TablePart | None:
     """A part, from its footer; None if it is damaged or something else."""
-    max_footer = 1 << 26  # Bytes.
     name = PART_NAME_PATTERN.fullmatch(path.name)
     if name is None:
         return None
@@ -214,7 +216,7 @@ def open_part(path: Path) -> Part | None:
             size = stream.tell()
             stream.seek(max(0, size - 8))
             length = int.from_bytes(stream.read(4), "little")
-            if length > min(max_footer, size):
+            if length > min(1 << 26, size):
                 return None
             stream.seek(size - 8 - length)
             if _data_hash(stream.read()) != name[2]:
@@ -226,10 +228,10 @@ def open_part(path: Path) -> Part | None:
                 return None
     except (InvalidInputError, OSError, ValueError, KeyError, TypeError):
         return None
-    return Part(path, int(name[1]), segments)
+    return TablePart(path, int(name[1]), segments)
 
 
-def read_part(part: Part, names: Sequence[str]) -> Any | None:
+def read_part(part: TablePart, names: Sequence[str]) -> Any | None:
     """Columns of a part, as an Arrow table; None if it is damaged.
 
     Args:
@@ -247,13 +249,18 @@ def read_part(part: Part, names: Sequence[str]) -> Any | None:
     rows = sum(segment.rows for segment in part.segments)
     if table.num_rows != rows:
         return None
+    return select_columns(table, names).replace_schema_metadata()
+
+
+def select_columns(table: Any, names: Sequence[str]) -> Any:
+    """Columns of an Arrow table; those that it does not have are nulls."""
     for name in names:
-        if name not in there:
-            table = table.append_column(name, empty_column(name, rows))
-    return table.select(list(names)).replace_schema_metadata()
+        if name not in table.column_names:
+            table = table.append_column(name, empty_column(name, table.num_rows))
+    return table.select(list(names))
 
 
-def column_names(part: Part) -> list[str]:
+def column_names(part: TablePart) -> list[str]:
     """Names of the columns of a part."""
     arrow = require_arrow(f"reading {part.path}")
     with open_regular(part.path) as stream:
@@ -261,14 +268,13 @@ def column_names(part: Part) -> list[str]:
 
 
 def to_numpy(name: str, column: Any) -> NDArray[Any]:
-    """A column as `table.Columns` have it: nulls are NaN, or empty texts."""
+    """A column as `Columns` have it: nulls are NaN, or empty texts."""
     arrow = require_arrow("a columnar table")
     if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or _is_text(column.type):
         if not arrow.types.is_dictionary(column.type):
-            if column.type == arrow.null():
+            if column.type == arrow.null() or not len(column):
                 return np.full(len(column), "", dtype=np.str_)
-            filled = column.fill_null("").to_numpy()
-            return filled.astype(np.str_) if len(filled) else np.empty(0, dtype=np.str_)
+            return np.asarray(column.fill_null("").to_numpy().astype(np.str_))
         codes, categories = to_codes(column)
         return np.array([*categories, ""], dtype=np.str_)[codes]
     values = column.to_numpy()
@@ -301,17 +307,6 @@ def _arrow_column(name: str, values: NDArray[Any]) -> Any:
     return arrow.array(values, from_pandas=True)
 
 
-def _arrow_type(name: str, kind: str) -> Any:
-    arrow = require_arrow("a columnar table")
-    if kind != "U":
-        return arrow.float64()
-    return (
-        arrow.string()
-        if name in UNIQUE_TEXT_COLUMNS
-        else arrow.dictionary(arrow.int32(), arrow.string())
-    )
-
-
 def _is_text(kind: Any) -> bool:
     arrow = require_arrow("a columnar table")
     return bool(arrow.types.is_string(kind) or arrow.types.is_large_string(kind))
@@ -342,7 +337,7 @@ class StoredRows:
         return int(self.counts.sum())
 
     def column(self, name: str) -> NDArray[Any]:
-        """A column as `table.Columns` has it."""
+        """A column as `Columns` has it."""
         return to_numpy(name, self.table.column(name))
 
     def codes(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
@@ -408,10 +403,8 @@ def frame_of_rows(rows: StoredRows, scenes: Sequence[str]) -> pandas.DataFrame:
             codes, texts = rows.codes(name)
             series[name] = _category_column(name, *_fill_null(codes, texts))
         else:
-            values = (
-                rows.column(name) if name not in TEXT_COLUMNS else column.fill_null("").to_pandas()
-            )
-            series[name] = values
+            is_text = name in TEXT_COLUMNS
+            series[name] = column.fill_null("").to_pandas() if is_text else rows.column(name)
     return pandas.DataFrame(series)
 
 

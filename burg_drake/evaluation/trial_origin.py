@@ -1,10 +1,10 @@
-"""Scene, station, engine and settings that the trials of a table share, as each of its rows records them."""
+"""Scene, station, engine and settings of trials, as each row of a table records them."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,20 +40,6 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
         "slip_limit_mm": _limit_millimetres(values.get("slip_limit", math.inf)),
         "approach": bool(values.get("approach", False)),
     }
-
-
-def without_limits(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers of other settings."""
-    return {
-        k: v
-        for k, v in values.items()
-        if k not in ("tilt_limit", "slip_limit", "approach", "farthest_point")
-    }
-
-
-def without_measures(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers that are settings."""
-    return {k: v for k, v in values.items() if k not in MEASURE_NUMBERS}
 
 
 def measure_text(values: Mapping[str, float]) -> str:
@@ -104,8 +90,7 @@ def read_motion(values: Mapping[str, float]) -> GraspMotion:
     known = {field.name for field in fields(GraspMotion)}
     found = {k: v for k, v in join_direction(values).items() if k in known}
     if DIRECTION_FIELD in found:
-        x, y, z = (values[name] for name in DIRECTION_NUMBERS)
-        found[DIRECTION_FIELD] = (x, y, z)
+        found[DIRECTION_FIELD] = tuple(values[name] for name in DIRECTION_NUMBERS)
     return GraspMotion(**found)  # type: ignore[arg-type]
 
 
@@ -113,6 +98,12 @@ def without_motion(values: Mapping[str, float]) -> dict[str, float]:
     """Recorded numbers of other settings."""
     known = {field.name for field in fields(GraspMotion)}.union(DIRECTION_NUMBERS)
     return {name: value for name, value in values.items() if name not in known}
+
+
+def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
+    """Recorded numbers but those of the motion, of limits and of measures."""
+    known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
+    return {name: value for name, value in without_motion(values).items() if name not in known}
 
 
 def motion_text(motion: GraspMotion) -> str:
@@ -159,6 +150,7 @@ def _rounded_key(value: float) -> str:
 
 
 T = TypeVar("T")
+Choice = TypeVar("Choice", bound=str)
 
 ORIGIN_TEXT = (
     "scene",
@@ -184,7 +176,7 @@ class TrialOrigin:
         scene_content, station_content: first digits of their content hashes.
         mode: what was asked about each grasp.
         engine: how time was stepped.
-        trial: settings of the trial's phases; see `simulation.settings.TrialSettings`.
+        trial: settings of the trial's phases; see `TrialSettings`.
         versions: of the software and the machine.
         seed: of the run.
         run: hash of the run.
@@ -217,11 +209,7 @@ class TrialOrigin:
         """The texts `ORIGIN_TEXT` by column."""
         settings = {name: value for name, value in vars(self.engine).items() if name != "name"}
         return {
-            "scene": self.scene,
-            "scene_content": self.scene_content,
-            "station": self.station,
-            "station_content": self.station_content,
-            "mode": self.mode,
+            **{name: getattr(self, name) for name in ORIGIN_TEXT[:5]},
             "engine_settings": pairs_text(settings),
             "trial_settings": pairs_text(self.trial),
             "versions": pairs_text(self.versions),
@@ -244,7 +232,7 @@ def read_origin(row: Mapping[str, Any], where: str) -> TrialOrigin:
         scene_content=row["scene_content"],
         station=row["station"],
         station_content=row["station_content"],
-        mode=_read_mode(row["mode"], where),
+        mode=read_choice(row["mode"], MODES, f"{where}: mode"),
         engine=_read_engine(row["engine"], row["engine_settings"], where),
         trial={name: _read_origin_number(name, value, where) for name, value in trial.items()},
         versions=_read_pairs(row["versions"], where),
@@ -268,19 +256,15 @@ def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings
         InvalidInputError: one of them is unknown or cannot be used.
     """
     from burg_drake.simulation import NO_GRIP_LIMITS, TrialSettings
-    from burg_drake.station import GraspMotion
 
-    trial = without_measures(trial)
+    trial = {name: value for name, value in trial.items() if name not in MEASURE_NUMBERS}
     others, values = without_motion(trial), join_direction(trial)
     motion = {name: value for name, value in values.items() if name not in others}
     settings = _read_typed(_restore_booleans(others, TrialSettings), TrialSettings, where)
     limits = {name: others.get(name, none) for name, none in NO_GRIP_LIMITS.items()}
-    return replace(
-        settings,
-        motion=_read_typed(motion, GraspMotion, where),
-        tilt_limit=limits["tilt_limit"],
-        slip_limit=limits["slip_limit"],
-    )
+    tilt, slip = limits["tilt_limit"], limits["slip_limit"]
+    hand = _read_typed(motion, GraspMotion, where)
+    return replace(settings, motion=hand, tilt_limit=tilt, slip_limit=slip)
 
 
 def engine_label(engine: Engine) -> str:
@@ -294,12 +278,18 @@ def pairs_text(values: Mapping[str, object]) -> str:
     return " ".join(f"{name}={word}" for name, word in words.items())
 
 
-def _read_mode(text: str, where: str) -> Mode:
-    for mode in MODES:
-        if mode == text:
-            return mode
+def read_choice(text: str, choices: Sequence[Choice], where: str) -> Choice:
+    """The one of some choices that a text says; `where` names it in messages.
+
+    Raises:
+        InvalidInputError: it is none of them.
+    """
+    for choice in choices:
+        if choice == text:
+            return choice
     raise InvalidInputError(
-        f"{where}: mode {quote_value(text)} is not known to this release; {suggest_names(text, MODES)}"
+        f"{where} {quote_value(text)} is not known to this release;"
+        f" {suggest_names(text, [str(choice) for choice in choices])}"
     )
 
 
@@ -326,8 +316,7 @@ def _read_engine(label: str, settings: str, where: str) -> Engine:
 
 def _changed_settings(preset: Engine, engine: Engine) -> str:
     """Settings of a preset that an engine does not share."""
-    there = vars(engine)
-    return pairs_text({k: v for k, v in vars(preset).items() if there[k] != v})
+    return pairs_text({k: v for k, v in vars(preset).items() if getattr(engine, k) != v})
 
 
 def _read_origin_number(name: str, text: str, where: str) -> float:

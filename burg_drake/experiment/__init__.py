@@ -1,7 +1,8 @@
 """Trials on the real robot beside simulated ones: choice, records, comparison, the gap.
 
-`trials` has the file of trials and `planning` makes it; `comparison` rests on `pairing` and
-`statistics`, and `gap` on all of them.
+`trials`: the trials file, its journal, and the choice of grasps. `lab`: pages and pictures for the
+operator. `comparison`: runs against trials, or against each other. `gap`: the steps in which
+simulation and reality part. `trials` imports none of the others, `comparison` only `trials`.
 """
 
 import lazy_loader

@@ -1,8 +1,9 @@
 from .layout import (
     Layout as Layout,
-    LegalNames as LegalNames,
     PlacedObject as PlacedObject,
     lay_out as lay_out,
+    model_names as model_names,
+    prim_names as prim_names,
 )
 from .mjcf_hand import (
     HAND_CARRIER_BODY as HAND_CARRIER_BODY,

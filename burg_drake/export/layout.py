@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -102,49 +102,34 @@ def legal_model_name(name: str) -> str:
     return f"{name}_1" if _RESERVED_NAMES.fullmatch(name) else name
 
 
-@dataclass(frozen=True)
-class LegalNames:
-    """Names in a format by the names of instances and boxes.
+def model_names(layout: Layout) -> dict[str, str]:
+    """Names of models in SDFormat, Drake and MJCF, by the names of instances and boxes."""
+    return _make_unique(layout, legal_model_name)
 
-    Attributes:
-        by_name: the same where the format allows that.
-    """
 
-    by_name: dict[str, str]
+def prim_names(layout: Layout) -> dict[str, str]:
+    """Names of prims in USD: letters, digits and `_`, no digit in front."""
+    return _make_unique(layout, lambda name: re.sub(r"^(?=\d)|[^A-Za-z0-9_]", "_", name))
 
-    def __getitem__(self, name: str) -> str:
-        return self.by_name[name]
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Which names are others, one sentence each."""
-        return tuple(
-            f"{name!r} is called {legal!r} in the export, as the format does not allow the name"
-            for name, legal in self.by_name.items()
-            if legal != name
-        )
+def renaming_notes(names: Mapping[str, str]) -> tuple[str, ...]:
+    """Which names are others in the export, one sentence each."""
+    return tuple(
+        f"{name!r} is called {legal!r} in the export, as the format does not allow the name"
+        for name, legal in names.items()
+        if legal != name
+    )
 
-    @classmethod
-    def of_sdf(cls, layout: Layout) -> LegalNames:
-        """Names of models in SDFormat and in Drake; those of bodies in MJCF are the same."""
-        return cls._unique(layout, legal_model_name)
 
-    @classmethod
-    def of_usd(cls, layout: Layout) -> LegalNames:
-        """Names of prims in USD: letters, digits and `_`, no digit in front."""
-        return cls._unique(layout, lambda name: re.sub(r"^(?=\d)|[^A-Za-z0-9_]", "_", name))
-
-    @classmethod
-    def _unique(cls, layout: Layout, legal: Callable[[str], str]) -> LegalNames:
-        """Legal names stay; the others get one that none has."""
-        names = [*(placed.name for placed in layout.objects), *layout.boxes]
-        by_name = {name: name for name in names if legal(name) == name}
-        for name in names:
-            if name in by_name:
-                continue
-            base, candidate, number = legal(name), legal(name), 1
+def _make_unique(layout: Layout, legal: Callable[[str], str]) -> dict[str, str]:
+    """Legal names stay; the others get one that none has."""
+    names = [*(placed.name for placed in layout.objects), *layout.boxes]
+    by_name = {name: name for name in names if legal(name) == name}
+    for name in names:
+        if name not in by_name:
+            candidate, number = legal(name), 1
             while candidate in by_name.values():
                 number += 1
-                candidate = f"{base}_{number}"
+                candidate = f"{legal(name)}_{number}"
             by_name[name] = candidate
-        return cls({name: by_name[name] for name in names})
+    return {name: by_name[name] for name in names}

@@ -50,12 +50,8 @@ HAND_SHAPE_PREFIX = f"{HAND_PREFIX} shape"
 """Start of the names of other geoms; the link and a number follow."""
 
 
-class CollisionBits:
-    """Collision bits."""
-
-    object = 1  # Bit of `contype` and `conaffinity` for objects.
-    hand = 2  # Bit for the hand, which does not collide with itself.
-    table = 4  # Bit for the table.
+OBJECT_BIT, HAND_BIT, TABLE_BIT = 1, 2, 4
+"""Bits of `contype` and `conaffinity`; the hand does not collide with itself."""
 
 
 @dataclass(frozen=True)
@@ -86,11 +82,11 @@ def link_name(link: str) -> str:
 
 def add_trial_options(root: Element, step: float = MUJOCO_TIME_STEP) -> None:
     """Time step and solver that the hand is laid out for."""
-    friction_impedance_ratio = 1000.0  # Friction creep is inversely proportional to it.
-    solver_tolerance = 1e-14  # Relative to the mean inertia, which is that of the carrier: tons.
     SubElement(
         root, "option", timestep=repr(step), integrator="implicitfast", cone="elliptic",
-        impratio=repr(friction_impedance_ratio), tolerance=repr(solver_tolerance),
+        # Friction creep is inversely proportional to the impedance ratio. The tolerance is relative
+        # to the mean inertia, which is that of the carrier: tons.
+        impratio="1000.0", tolerance="1e-14",
         # So that scenes of any size are solved alike: from 60 degrees of freedom on MuJoCo would
         # take sparse factors. In MuJoCo 4.0.0 these give the same accelerations (within 2e-11, in
         # 6,000 steps of trials and in piles of 20) and save 9 % in a scene of twelve objects.
@@ -117,13 +113,8 @@ def add_moved_hand(
     """
     # 1/kg, mean over the three directions in which the hand moves.
     finger_mobility = (1.0 / FINGER_DRIVE_INERTIA + 3.0 / 100.0) / 3.0
-    # Slide joints of the carrier along x, y and z.
-    joints = tuple(
-        CarrierJoint(f"{HAND_PREFIX} {letter}", axis, f"{HAND_PREFIX} {letter} speed", 100.0, 50.0)
-        for letter, axis in zip(
-            "xyz", ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), strict=True
-        )
-    )
+    axes = {"hand x": (1.0, 0.0, 0.0), "hand y": (0.0, 1.0, 0.0), "hand z": (0.0, 0.0, 1.0)}
+    joints = [CarrierJoint(name, axis, f"{name} speed", 100.0, 50.0) for name, axis in axes.items()]
     add_hand(root, world, asset, parts, joints)
     mobility = (float(np.mean(mobilities)) if mobilities else 1.0) + finger_mobility
     for finger in parts.fingers:
@@ -176,8 +167,8 @@ def add_hand(
         low, high = sorted((finger.finger.closed, finger.finger.open))
         SubElement(
             body, "joint", name=link_name(finger.finger.joint), type="slide",
-            axis=format_numbers(finger.axis_B), range=format_numbers((low, high)), ref=repr(finger.finger.open),
-            armature=repr(FINGER_DRIVE_INERTIA),
+            axis=format_numbers(finger.axis_B), range=format_numbers((low, high)),
+            ref=repr(finger.finger.open), armature=repr(FINGER_DRIVE_INERTIA),
         )  # fmt: skip
         _add_pad(body, asset, finger.name, finger.pad, finger.front)
     _add_servos(root, parts, joints)
@@ -192,15 +183,12 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
     Returns:
         Their centers (N, 3) in the pad's frame P and radii (N,) [m].
     """
-    min_spheres = 6  # Along a side of a pad.
-    sphere_pitch = 0.0035  # Metres between spheres.
-    max_spheres = 12  # Along a side of a pad.
     max_radius = 0.002  # Metres; spheres are smaller where the pad ends.
     min_radius = 1e-5  # Metres.
     x, y = (
         ((np.arange(n) + 0.5) / n - 0.5) * side
         for side in front.size
-        for n in (min(max(min_spheres, math.ceil(side / sphere_pitch - 1e-9)), max_spheres),)
+        for n in (min(max(6, math.ceil(side / 0.0035 - 1e-9)), 12),)
     )
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     # Of a sphere that touches the plane z = 0 at (x, y), centered at -r: n (x, y, -r) + d <= -r.
@@ -227,9 +215,8 @@ def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[fl
     Returns:
         Stiffness and damping of `solref`, and the impedance of `solimp`.
     """
-    step_times_frequency = 0.8  # Time step times the angular frequency of the contact.
-    damping_time = 1e-3  # Seconds: damping over stiffness, as Drake's 5 s/m at a depth of 0.2 mm.
-    rate = step_times_frequency / step
+    damping_time = 1e-3  # seconds: damping over stiffness, as Drake's 5 s/m at a depth of 0.2 mm
+    rate = 0.8 / step  # angular frequency of the contact
     share = front.area / len(pad_spheres(front)[1])
     regularization = rate**2 / (front.stiffness * share)
     d = mobility / (mobility + regularization)
@@ -237,14 +224,12 @@ def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[fl
 
 
 def _add_link(parent: Element, asset: Element, link: HandLink, X_PB: Array) -> Element:
-    min_mass = 1e-4  # Kilograms, for links without a mass.
-    min_moment = 1e-8  # Moment of inertia in kg m^2, for links without one.
     body = add_body(parent, link_name(link.name), X_PB)
     body.set("gravcomp", "1")
     moments = link.I_BCm[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)].copy()
-    moments[:3] = np.maximum(moments[:3], min_moment)
-    mass = max(link.mass, min_mass)
-    SubElement(body, "inertial", inertia_attributes(mass, link.p_BCm, moments))
+    moments[:3] = np.maximum(moments[:3], 1e-8)  # kg m^2; MuJoCo refuses links without inertia
+    inertia = inertia_attributes(max(link.mass, 1e-4), link.p_BCm, moments)
+    SubElement(body, "inertial", inertia)
     for k, shape in enumerate(link.shapes):
         _add_shape(body, asset, f"{HAND_SHAPE_PREFIX} {link.name} {k}", shape)
     return body
@@ -282,8 +267,8 @@ def _add_geom(body: Element, name: str, X_BG: Array, **shape: str) -> None:
     """A geom of the hand, which says how objects are touched (`solmix`), and by itself has no
     friction: MuJoCo takes the higher coefficient of two."""
     touching = {
-        "contype": f"{CollisionBits.hand}",
-        "conaffinity": f"{CollisionBits.object}",
+        "contype": f"{HAND_BIT}",
+        "conaffinity": f"{OBJECT_BIT}",
         "condim": "3",
         "friction": "0 0 0",
         "solref": RIGID_CONTACT_SOLREF,
@@ -315,5 +300,6 @@ def _add_servos(root: Element, parts: HandDescription, joints: Sequence[CarrierJ
         # From where both are open, as `ref` says.
         SubElement(
             SubElement(root, "equality"), "joint", joint1=second, joint2=first,
-            polycoef=format_numbers((0, parts.coupling, 0, 0, 0)), solref=RIGID_CONTACT_SOLREF, solimp="0.99 0.99 0.001",
+            polycoef=format_numbers((0, parts.coupling, 0, 0, 0)),
+            solref=RIGID_CONTACT_SOLREF, solimp="0.99 0.99 0.001",
         )  # fmt: skip

@@ -13,7 +13,6 @@ from burg_drake.core import Array, atomic_write, quaternion_from_rotation
 from burg_drake.export.layout import PlacedObject
 from burg_drake.export.object_parts import VisualPart, collision_meshes, visual_parts
 from burg_drake.objects import ObjectEntry, ObjectLibrary
-from burg_drake.station import FixedBox
 
 
 def add_body(world: Element, name: str, X_WB: Array) -> Element:
@@ -55,15 +54,6 @@ def collision_shapes(placed: PlacedObject, assets: MjcfAssets) -> list[dict[str,
     return [{"type": "mesh", "mesh": mesh} for mesh in pieces]
 
 
-def box_geom_attributes(box: FixedBox) -> dict[str, str]:
-    """Attributes of the geom of a fixed box in its body."""
-    return box_attributes(box.size)
-
-
-_OBJECTS_FOLDER = "objects"
-"""Folder that has a folder for each object."""
-
-
 class MjcfAssets:
     """Writes the files of objects and declares them, each object once.
 
@@ -81,43 +71,42 @@ class MjcfAssets:
         self._asset = asset
         self._library = library
         self._folder = folder
-        self._visuals: dict[str, list[tuple[str, str]]] = {}
+        self._visuals: dict[str, list[str]] = {}
         self._pieces: dict[str, list[str]] = {}
 
-    def visuals(self, name: str, entry: ObjectEntry) -> list[tuple[str, str]]:
-        """Meshes and materials of what is looked at of an object."""
+    def visuals(self, name: str, entry: ObjectEntry) -> list[str]:
+        """Meshes of what is looked at of an object; their materials have the same names."""
         if name not in self._visuals:
             parts = visual_parts(self._library, entry)
-            self._visuals[name] = [self._visual(name, i, part) for i, part in enumerate(parts)]
+            self._visuals[name] = [self._add_visual(name, i, part) for i, part in enumerate(parts)]
         return self._visuals[name]
 
     def pieces(self, name: str, entry: ObjectEntry) -> list[str]:
         """Meshes of the convex pieces of an object."""
         if name not in self._pieces:
-            self._pieces[name] = [
-                self._piece(name, i, piece) for i, piece in enumerate(collision_meshes(entry))
-            ]
+            pieces = collision_meshes(entry)
+            self._pieces[name] = [self._add_piece(name, i, piece) for i, piece in enumerate(pieces)]
         return self._pieces[name]
 
-    def _visual(self, name: str, i: int, part: VisualPart) -> tuple[str, str]:
+    def _add_visual(self, name: str, i: int, part: VisualPart) -> str:
         assert self._folder is not None
-        mesh, file = f"{name}:visual_{i}", f"{_OBJECTS_FOLDER}/{name}/visual_{i}.obj"
+        mesh, file = f"{name}:visual_{i}", f"objects/{name}/visual_{i}.obj"
         atomic_write(self._folder / file, obj_text(part))
         # The walls of what is looked at may be open: no volume is needed, a surface is.
         SubElement(self._asset, "mesh", {"name": mesh, "file": file, "inertia": "shell"})
         appearance = {"rgba": " ".join(f"{v:g}" for v in part.rgba)}
         if part.image is not None:
-            texture = f"{_OBJECTS_FOLDER}/{name}/visual_{i}.png"
+            texture = f"objects/{name}/visual_{i}.png"
             data = io.BytesIO()
             part.image.convert("RGB").save(data, format="PNG")
             atomic_write(self._folder / texture, data.getvalue())
             SubElement(self._asset, "texture", {"name": mesh, "type": "2d", "file": texture})
             appearance = {"texture": mesh}
         SubElement(self._asset, "material", {"name": mesh, "specular": "0.1", **appearance})
-        return mesh, mesh
+        return mesh
 
-    def _piece(self, name: str, i: int, piece: str) -> str:
-        mesh, file = f"{name}:piece_{i:03d}", f"{_OBJECTS_FOLDER}/{name}/pieces/{i:03d}.obj"
+    def _add_piece(self, name: str, i: int, piece: str) -> str:
+        mesh, file = f"{name}:piece_{i:03d}", f"objects/{name}/pieces/{i:03d}.obj"
         if self._folder is None:
             file = str(self._library.path(piece).resolve())
         else:

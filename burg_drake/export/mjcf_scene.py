@@ -17,11 +17,19 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from burg_drake.core import atomic_write
-from burg_drake.export.layout import Layout, LegalNames, PlacedObject, legal_model_name
+from burg_drake.export.layout import (
+    Layout,
+    PlacedObject,
+    legal_model_name,
+    model_names,
+    renaming_notes,
+)
 from burg_drake.export.mjcf_hand import (
+    HAND_BIT,
+    OBJECT_BIT,
     RIGID_CONTACT_SOLREF,
+    TABLE_BIT,
     CarrierJoint,
-    CollisionBits,
     add_hand,
     add_moved_hand,
     add_trial_options,
@@ -30,7 +38,7 @@ from burg_drake.export.mjcf_objects import (
     MjcfAssets,
     add_body,
     add_object,
-    box_geom_attributes,
+    box_attributes,
     collision_shapes,
     format_numbers,
 )
@@ -55,18 +63,12 @@ def write_mjcf(
         MeshError: it is damaged.
         InvalidInputError: a place cannot be written to.
     """
-    # Attributes of the solver.
-    options = {
-        "timestep": "0.002",
-        "integrator": "implicitfast",
-        "cone": "elliptic",
-        "impratio": "10",
-    }
-    names = LegalNames.of_sdf(layout)
+    names = model_names(layout)
     root = Element("mujoco", {"model": legal_model_name(layout.name)})
     SubElement(root, "compiler", {"angle": "radian", "autolimits": "true"})
     if hand is None:
-        SubElement(root, "option", options)
+        options = {"timestep": "0.002", "integrator": "implicitfast", "cone": "elliptic"}
+        SubElement(root, "option", {**options, "impratio": "10"})
     else:
         add_trial_options(root)
     _add_classes(root)
@@ -80,7 +82,7 @@ def write_mjcf(
     for placed in layout.objects:
         body = add_object(world, names[placed.name], placed, free=not placed.fixed)
         _add_geoms(body, placed, assets)
-    notes = names.notes
+    notes = renaming_notes(names)
     if hand is not None:
         mobilities = [1.0 / placed.entry.mass for placed in layout.objects if not placed.fixed]
         notes += (add_moved_hand(root, world, asset, hand, mobilities),)
@@ -100,8 +102,8 @@ def _add_classes(root: Element) -> None:
 
 def _add_geoms(body: Element, placed: PlacedObject, assets: MjcfAssets) -> None:
     entry = placed.entry
-    for mesh, material in assets.visuals(placed.object, entry):
-        SubElement(body, "geom", {"class": "visual", "mesh": mesh, "material": material})
+    for mesh in assets.visuals(placed.object, entry):
+        SubElement(body, "geom", {"class": "visual", "mesh": mesh, "material": mesh})
     for shape in collision_shapes(placed, assets):
         touching = {"class": "collision", "friction": repr(entry.friction)}
         SubElement(body, "geom", {**touching, **shape})
@@ -109,17 +111,8 @@ def _add_geoms(body: Element, placed: PlacedObject, assets: MjcfAssets) -> None:
 
 def _add_box(body: Element, box: FixedBox) -> None:
     """One geom that is drawn and collides, in the group that is drawn."""
-    SubElement(
-        body,
-        "geom",
-        {
-            "class": "collision",
-            **box_geom_attributes(box),
-            "friction": repr(box.friction),
-            "rgba": format_numbers(box.color),
-            "group": "2",
-        },
-    )
+    shape = {"class": "collision", **box_attributes(box.size), "friction": repr(box.friction)}
+    SubElement(body, "geom", {**shape, "rgba": format_numbers(box.color), "group": "2"})
 
 
 LIFT_JOINT = CarrierJoint("hand lift", (0.0, 0.0, 1.0), "hand lift speed", 1e5, 1.0)
@@ -127,7 +120,7 @@ LIFT_JOINT = CarrierJoint("hand lift", (0.0, 0.0, 1.0), "hand lift speed", 1e5, 
 
 
 class MjcfBodyNames:
-    """Mjcf body names."""
+    """Names of bodies in the model of grasp trials, or how they start."""
 
     object = "object"  # Start of the names of movable bodies; the name in the scene follows.
     fixed = "fixed"  # Start of the names of fixed bodies.
@@ -157,40 +150,29 @@ def trial_mjcf(
     add_trial_options(root, step)
     SubElement(root[-1], "flag", autoreset="disable")
     default = SubElement(root, "default")
-    bits = {"contype": f"{CollisionBits.object}", "conaffinity": f"{CollisionBits.object}"}
+    bits = {"contype": f"{OBJECT_BIT}", "conaffinity": f"{OBJECT_BIT}"}
     SubElement(default, "geom", {"condim": "3", "solref": RIGID_CONTACT_SOLREF, **bits})
     SubElement(default, "pair", condim="3", solref=RIGID_CONTACT_SOLREF)
     asset, world = SubElement(root, "asset"), SubElement(root, "worldbody")
     contact = SubElement(root, "contact")
     assets = MjcfAssets(asset, layout.library, None)
-    SubElement(
-        world, "geom", name=MjcfBodyNames.plane, type="plane", size="1 1 1", contype="0", conaffinity="0"
-    )  # fmt: skip
+    plane = {"name": MjcfBodyNames.plane, "type": "plane", "size": "1 1 1"}
+    SubElement(world, "geom", {**plane, "contype": "0", "conaffinity": "0"})
     for name, box in layout.boxes.items():
         body = add_body(world, f"{MjcfBodyNames.fixed} {name}", box.X_WB)
-        met = (
-            {"contype": f"{CollisionBits.table}", "conaffinity": f"{CollisionBits.hand}"}
-            if name == MjcfBodyNames.table
-            else {}
-        )
-        SubElement(
-            body,
-            "geom",
-            {"name": f"{MjcfBodyNames.fixed} {name} 0", **box_geom_attributes(box), **met},
-        )
+        geom = {"name": f"{MjcfBodyNames.fixed} {name} 0", **box_attributes(box.size)}
+        if name == MjcfBodyNames.table:
+            geom |= {"contype": f"{TABLE_BIT}", "conaffinity": f"{HAND_BIT}"}
+        SubElement(body, "geom", geom)
     for placed in layout.objects:
         free = not placed.fixed and alone in (None, placed.name)
         name = f"{MjcfBodyNames.fixed if placed.fixed else MjcfBodyNames.object} {placed.name}"
         body = add_object(world, name, placed, free=free)
-        aware = (
-            CollisionBits.object
-            if placed.name in on_table
-            else CollisionBits.object | CollisionBits.table
-        )
+        met = OBJECT_BIT if placed.name in on_table else OBJECT_BIT | TABLE_BIT
         for k, shape in enumerate(collision_shapes(placed, assets)):
-            geom = f"{name} {k}"
-            SubElement(body, "geom", {"name": geom, "conaffinity": f"{aware}", **shape})
+            SubElement(body, "geom", {"name": f"{name} {k}", "conaffinity": f"{met}", **shape})
             if free and placed.name in on_table:
-                SubElement(contact, "pair", name=geom, geom1=MjcfBodyNames.plane, geom2=geom)
+                pair = {"geom1": MjcfBodyNames.plane, "geom2": f"{name} {k}"}
+                SubElement(contact, "pair", {"name": f"{name} {k}", **pair})
     add_hand(root, world, asset, hand, [LIFT_JOINT])
     return ElementTree.tostring(root, encoding="unicode")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import os
+import pkgutil
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
@@ -23,6 +23,7 @@ from burg_drake.core import (
     ensure_writable_folder,
     list_names,
     load_document,
+    report_write_errors,
     save_document,
     suggest_names,
 )
@@ -38,8 +39,8 @@ class SceneFormat:
     """A format that scenes are exported to.
 
     Attributes:
-        module: in this room, imported when needed.
-        writer: its function of a layout and a folder, which returns notes.
+        writer: MODULE:NAME, in this room, of a function of a layout and a folder that returns
+            notes; imported when needed.
         main: the file to open.
         about: what it is, and for whom.
         hydroelastic: whether it has Drake's contact properties.
@@ -47,7 +48,6 @@ class SceneFormat:
         package: that it needs beside those of burg_drake, as pip and as Python know it.
     """
 
-    module: str
     writer: str
     main: str
     about: str
@@ -58,29 +58,25 @@ class SceneFormat:
 
 SCENE_FORMATS = {
     "sdf": SceneFormat(
-        module="sdf",
-        writer="write_sdf",
+        writer="sdf:write_sdf",
         main="world.sdf",
         about="an SDFormat world, for Gazebo and Drake",
         hydroelastic=True,
     ),
     "dmd": SceneFormat(
-        module="sdf",
-        writer="write_directives",
+        writer="sdf:write_directives",
         main="scene.dmd.yaml",
         about="Drake's model directives",
         hydroelastic=True,
     ),
     "mjcf": SceneFormat(
-        module="mjcf_scene",
-        writer="write_mjcf",
+        writer="mjcf_scene:write_mjcf",
         main="scene.xml",
         about="MuJoCo's XML",
         with_hand=True,
     ),
     "usd": SceneFormat(
-        module="usd",
-        writer="write_usd",
+        writer="usd:write_usd",
         main="scene.usda",
         about="USD, for Isaac Sim; needs burg-drake[usd]",
         package=("usd-core", "pxr"),
@@ -144,11 +140,10 @@ def export_scene(
     chosen = SCENE_FORMATS[to]
     if hand and (station is None or not chosen.with_hand):
         able = ", ".join(name for name, format in SCENE_FORMATS.items() if format.with_hand)
-        raise InvalidInputError(
-            f"a hand can only be exported to {able}, not to {to}"
-            if not chosen.with_hand
-            else "a hand belongs to a station; name the station, too"
-        )
+        what = f"a hand can only be exported to {able}, not to {to}"
+        if chosen.with_hand:
+            what = "a hand belongs to a station; name the station, too"
+        raise InvalidInputError(what)
     write = _load_writer(to)
     path = require_own_folder(folder)
     layout = lay_out(scene, station)
@@ -159,17 +154,15 @@ def export_scene(
         write = partial(write, hand=parts)
     with replace_folder(path) as fresh:
         notes = write(layout, fresh)
-        write_record(
-            fresh,
-            ExportRecord(
-                format=to,
-                scene=scene.name,
-                scene_content=scene.content,
-                station=station.name if station is not None else "",
-                main=chosen.main,
-                software=f"burg_drake {burg_drake.__version__}",
-            ),
+        record = ExportRecord(
+            format=to,
+            scene=scene.name,
+            scene_content=scene.content,
+            station=station.name if station is not None else "",
+            main=chosen.main,
+            software=f"burg_drake {burg_drake.__version__}",
         )
+        write_record(fresh, record)
     if not chosen.hydroelastic:
         notes = (*notes, *_contact_notes(layout, to))
     return Exported(path / chosen.main, layout, notes)
@@ -182,8 +175,8 @@ def _load_writer(to: str) -> Callable[..., tuple[str, ...]]:
             f"exports to {to} need the package {chosen.package[0]}; install it with"
             f" pip install 'burg-drake[{to}]'"
         )
-    writer: Callable[..., tuple[str, ...]] = getattr(
-        importlib.import_module(f"burg_drake.export.{chosen.module}"), chosen.writer
+    writer: Callable[..., tuple[str, ...]] = pkgutil.resolve_name(
+        f"burg_drake.export.{chosen.writer}"
     )
     return writer
 
@@ -283,13 +276,10 @@ def replace_folder(path: Path) -> Iterator[Path]:
     fresh, old = (path.with_name(f".{path.name}.{token}{end}") for end in ("", ".old"))
     ensure_writable_folder(path.parent)
     try:
-        fresh.mkdir()
-        yield fresh
-        _swap_folders(fresh, path, old)
-    except OSError as error:
-        raise InvalidInputError(
-            f"cannot write {path}: {error.strerror or error}; choose a writable place"
-        ) from error
+        with report_write_errors(path):
+            fresh.mkdir()
+            yield fresh
+            _swap_folders(fresh, path, old)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
 

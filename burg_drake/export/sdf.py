@@ -34,7 +34,7 @@ from burg_drake.core import (
     read_bytes,
     resolve_reference,
 )
-from burg_drake.export.layout import Layout, LegalNames, legal_model_name
+from burg_drake.export.layout import Layout, legal_model_name, model_names, renaming_notes
 from burg_drake.objects import LINK_NAME, ObjectEntry, ObjectLibrary, package_manifest, package_name
 from burg_drake.station import FixedBox, SurroundingsProperties
 
@@ -50,27 +50,25 @@ def write_sdf(layout: Layout, folder: Path) -> tuple[str, ...]:
         What became other than it is in the scene, one sentence each.
 
     Raises:
-        InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written to.
+        InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written
+            to.
     """
-    objects_folder = "objects"  # Folder that has a folder for each object.
-    names = LegalNames.of_sdf(layout)
+    names = model_names(layout)
     world = Element("world", {"name": legal_model_name(layout.name)})
-    models = {
-        name: object_sdf_model(
-            layout.library, name, entry, folder / objects_folder / name, layout.packages
-        )
-        for name, entry in layout.entries.items()
-    }
+    models = {}
+    for name, entry in layout.entries.items():
+        home = folder / "objects" / name
+        models[name] = object_sdf_model(layout.library, name, entry, home, layout.packages)
     for placed in layout.objects:
         model = deepcopy(models[placed.object])
         model.set("name", names[placed.name])
         for uri in model.iter("uri"):
-            uri.text = f"{objects_folder}/{placed.object}/{uri.text}"
+            uri.text = f"objects/{placed.object}/{uri.text}"
         world.append(_set_model_pose(model, placed.X_WO, placed.fixed))
     for name, box in layout.boxes.items():
         world.append(_set_model_pose(box_sdf_model(names[name], box), box.X_WB, fixed=True))
     atomic_write(folder / "world.sdf", sdf_document(world))
-    return names.notes
+    return renaming_notes(names)
 
 
 def _set_model_pose(model: Element, X_WB: Array, fixed: bool) -> Element:
@@ -99,19 +97,18 @@ def write_directives(layout: Layout, folder: Path) -> tuple[str, ...]:
         What became other than it is in the scene, one sentence each.
 
     Raises:
-        InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written to.
+        InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written
+            to.
     """
-    objects_folder = "objects"  # Folder of the models of objects.
-    station_folder = "station"  # Folder of the models of table and obstacles.
     package = f"{package_name(layout.name)}_scene"  # a library may have the same name
     for name, entry in layout.entries.items():
-        home = folder / objects_folder / name
+        home = folder / "objects" / name
         model = object_sdf_model(layout.library, name, entry, home, layout.packages)
         atomic_write(home / f"{name}.sdf", sdf_document(model))
-    names = LegalNames.of_sdf(layout)
+    names = model_names(layout)
     directives: list[dict[str, Any]] = []
     for placed in layout.objects:
-        file = f"{objects_folder}/{placed.object}/{placed.object}.sdf"
+        file = f"objects/{placed.object}/{placed.object}.sdf"
         add = _model_directive(names[placed.name], f"package://{package}/{file}")
         if placed.fixed:
             directives += [add, _weld_directive(names[placed.name], placed.X_WO)]
@@ -120,20 +117,15 @@ def write_directives(layout: Layout, folder: Path) -> tuple[str, ...]:
             add["add_model"]["default_free_body_pose"] = {LINK_NAME: free}
             directives.append(add)
     for name, box in layout.boxes.items():
-        atomic_write(
-            folder / station_folder / f"{name}.sdf", sdf_document(box_sdf_model(names[name], box))
-        )
-        file = f"package://{package}/{station_folder}/{name}.sdf"
+        text = sdf_document(box_sdf_model(names[name], box))
+        atomic_write(folder / "station" / f"{name}.sdf", text)
+        file = f"package://{package}/station/{name}.sdf"
         directives += [_model_directive(names[name], file), _weld_directive(names[name], box.X_WB)]
     atomic_write(folder / "package.xml", package_manifest(package, "Scene"))
-    text = yaml.dump(
-        {"directives": directives},
-        Dumper=_DirectivesDumper,
-        sort_keys=False,
-        default_flow_style=None,
-    )
+    document = {"directives": directives}
+    text = yaml.dump(document, Dumper=_DirectivesDumper, sort_keys=False, default_flow_style=None)
     atomic_write(folder / "scene.dmd.yaml", text)
-    return names.notes
+    return renaming_notes(names)
 
 
 class _AngleAxis(dict[str, Any]):
@@ -212,9 +204,9 @@ def object_sdf_model(
 
 def sdf_document(*children: Element) -> str:
     """The text of an SDF file."""
-    sdf_version = "1.9"  # First version with quaternions in poses; Gazebo Garden and later read it.
     ElementTree.register_namespace("drake", DRAKE_NAMESPACE)
-    root = Element("sdf", {"version": sdf_version})
+    # The first version with quaternions in poses; Gazebo Garden and later read it.
+    root = Element("sdf", {"version": "1.9"})
     root.extend(children)
     ElementTree.indent(root)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
@@ -237,13 +229,12 @@ def _resolve_uri(uri: str, model: Path, packages: Packages) -> Path:
 
 def _require_mass(model: Element, entry: ObjectEntry, path: Path) -> None:
     """Refuses a model that weighs something else than the library says, as Drake would have it."""
-    mass_tolerance = 1e-6  # Relative.
     text = (model.findtext("link/inertial/mass") or "nan").strip()
     try:
         mass = float(text)
     except ValueError:
         mass = math.nan
-    if not math.isclose(mass, entry.mass, rel_tol=mass_tolerance):
+    if not math.isclose(mass, entry.mass, rel_tol=1e-6):
         raise InvalidInputError(
             f"{path} has a mass of {text} kg, but library.yaml says {entry.mass:g} kg;"
             " build the library again"
@@ -255,12 +246,12 @@ def _move_friction(collision: Element) -> None:
     properties = collision.find(f"{{{DRAKE_NAMESPACE}}}proximity_properties")
     if properties is None or collision.find("surface") is not None:
         return
-    found = [properties.find(f"{{{DRAKE_NAMESPACE}}}mu_{kind}") for kind in ("static", "dynamic")]
-    texts = [str(e.text).strip() for e in found if e is not None]
-    if texts:
+    tags = [f"{{{DRAKE_NAMESPACE}}}mu_{kind}" for kind in ("static", "dynamic")]
+    found = [element for tag in tags if (element := properties.find(tag)) is not None]
+    if found:
         for element in found:
-            if element is not None:
-                properties.remove(element)
+            properties.remove(element)
+        texts = [str(element.text).strip() for element in found]
         add_friction(collision, texts[0], texts[-1])
 
 

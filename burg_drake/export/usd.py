@@ -16,18 +16,10 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
 from burg_drake.core import Array, Rgba, quaternion_from_rotation
-from burg_drake.export.layout import Layout, LegalNames, PlacedObject
+from burg_drake.export.layout import Layout, PlacedObject, prim_names, renaming_notes
 from burg_drake.export.object_parts import VisualPart, collision_meshes, visual_parts
 from burg_drake.objects import MassProperties, ObjectEntry, ObjectLibrary, Primitive
 from burg_drake.station import FixedBox
-
-
-class UsdPaths:
-    """Usd paths."""
-
-    objects_folder = "objects"  # Folder that has a folder for each object.
-    world = "/World"  # Prim of the scene.
-    object = "/Object"  # Prim of an object in its own file.
 
 
 def write_usd(layout: Layout, folder: Path) -> tuple[str, ...]:
@@ -44,27 +36,25 @@ def write_usd(layout: Layout, folder: Path) -> tuple[str, ...]:
         UnknownNameError: a mesh is missing.
         MeshError: it is damaged.
     """
-    names = LegalNames.of_usd(layout)
+    names = prim_names(layout)
     for name, entry in layout.entries.items():
-        write_usd_object(
-            layout.library, entry, folder / UsdPaths.objects_folder / name / "object.usdc"
-        )
-    stage = new_stage(folder / "scene.usda", UsdPaths.world)
+        write_usd_object(layout.library, entry, folder / "objects" / name / "object.usdc")
+    stage = new_stage(folder / "scene.usda", "/World")
     scene = UsdPhysics.Scene.Define(stage, "/PhysicsScene")
     scene.CreateGravityDirectionAttr(Gf.Vec3f(0.0, 0.0, -1.0))
     scene.CreateGravityMagnitudeAttr(9.81)
     for placed in layout.objects:
-        _add_object(stage, f"{UsdPaths.world}/{names[placed.name]}", placed)
+        _add_object(stage, f"/World/{names[placed.name]}", placed)
     for name, box in layout.boxes.items():
-        _add_box(stage, f"{UsdPaths.world}/{names[name]}", name, box)
+        _add_box(stage, f"/World/{names[name]}", name, box)
     stage.GetRootLayer().Save()
-    return names.notes
+    return renaming_notes(names)
 
 
 def _add_object(stage: Usd.Stage, path: str, placed: PlacedObject) -> None:
     prim = UsdGeom.Xform.Define(stage, path).GetPrim()
     prim.SetDisplayName(placed.name)
-    prim.GetReferences().AddReference(f"./{UsdPaths.objects_folder}/{placed.object}/object.usdc")
+    prim.GetReferences().AddReference(f"./objects/{placed.object}/object.usdc")
     set_pose(prim, placed.X_WO)
     if not placed.fixed:
         UsdPhysics.RigidBodyAPI.Apply(prim)
@@ -106,30 +96,29 @@ def write_usd_object(library: ObjectLibrary, entry: ObjectEntry, file: Path) -> 
         UnknownNameError: a mesh is missing.
         MeshError: it is damaged.
     """
-    stage = new_stage(file, UsdPaths.object)
+    stage = new_stage(file, "/Object")
     for i, part in enumerate(visual_parts(library, entry)):
         _add_visual(stage, f"visual_{i}", part, file.parent)
-    collision = UsdGeom.Scope.Define(stage, f"{UsdPaths.object}/collision")
+    collision = UsdGeom.Scope.Define(stage, "/Object/collision")
     collision.CreatePurposeAttr(UsdGeom.Tokens.guide)
     primitive = entry.contact.primitive
     if entry.contact.kind == "primitive" and primitive is not None:
-        shape = _add_primitive(stage, f"{UsdPaths.object}/collision/primitive", primitive)
+        shape = _add_primitive(stage, "/Object/collision/primitive", primitive)
         UsdPhysics.CollisionAPI.Apply(shape)
     else:
         for i, piece in enumerate(collision_meshes(entry)):
             hull = library.mesh(piece)
-            mesh = _add_mesh(
-                stage, f"{UsdPaths.object}/collision/piece_{i:03d}", hull.vertices, hull.faces
-            )
+            path = f"/Object/collision/piece_{i:03d}"
+            mesh = _add_mesh(stage, path, hull.vertices, hull.faces)
             UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
             collider = UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim())
             collider.CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
-    bind_friction(f"{UsdPaths.object}/friction", collision.GetPrim(), entry.friction)
+    bind_friction("/Object/friction", collision.GetPrim(), entry.friction)
     stage.GetRootLayer().Save()
 
 
 def _add_visual(stage: Usd.Stage, name: str, part: VisualPart, folder: Path) -> None:
-    mesh = _add_mesh(stage, f"{UsdPaths.object}/{name}", part.vertices, part.faces)
+    mesh = _add_mesh(stage, f"/Object/{name}", part.vertices, part.faces)
     mesh.CreateNormalsAttr(_vector_array(part.normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     texture = ""
@@ -140,7 +129,7 @@ def _add_visual(stage: Usd.Stage, name: str, part: VisualPart, folder: Path) -> 
             "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
         )
         primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(part.uv, dtype=np.float32)))
-    bind_color(f"{UsdPaths.object}/{name}_color", mesh.GetPrim(), part.rgba, texture)
+    bind_color(f"/Object/{name}_color", mesh.GetPrim(), part.rgba, texture)
 
 
 def _add_mesh(

@@ -1,7 +1,7 @@
 """Documents of other projects, read into plain data; needs nothing but `core`.
 
-Read `grasp_files` first; each format is a module of `grasps`, and libraries and scenes are in
-`collections`.
+Read `grasp_format` and `grasp_files` first; each grasp format is a module. `burg_toolkit` and `ycb`
+read object libraries and scenes.
 """
 
 import lazy_loader

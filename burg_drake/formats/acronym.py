@@ -24,6 +24,7 @@ Written files have further columns in `grasps/qualities/burg_drake`, next to `fl
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -55,19 +56,19 @@ from burg_drake.formats.grasp_conversion import (
     shareable_description,
     success_labels,
 )
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, ImportedGrasps, conversion_losses
+from burg_drake.formats.grasp_format import (
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    conversion_losses,
+    file_provenance,
+)
 from burg_drake.formats.pose_files import nearest_rigid
 
-
-class AcronymPaths:
-    """Acronym paths."""
-
-    transforms = "grasps/transforms"  # Data set of the poses (N, 4, 4).
-    qualities = "grasps/qualities"  # Group of the results of trials.
-    simulator = "flex"  # Subgroup of results of the simulator FleX.
-    own = "burg_drake"  # Subgroup of columns that burg_drake adds.
-
-
+TRANSFORMS = "grasps/transforms"
+"""Data set of the poses (N, 4, 4)."""
+QUALITIES = "grasps/qualities"
+"""Group of the results of trials: `flex` of the simulator, `burg_drake` of further columns."""
 ACRONYM_OBJECT_PROPERTIES: dict[str, tuple[ArrayShape, ...]] = {
     **dict.fromkeys(("mass", "friction", "density", "volume"), ((), (1,))),
     "com": ((3,),),
@@ -76,18 +77,13 @@ ACRONYM_OBJECT_PROPERTIES: dict[str, tuple[ArrayShape, ...]] = {
 """Properties of the object in a file, with their array shapes."""
 
 
-def _X_GF(gripper: Gripper) -> Array:
-    """The hand's base, x along the closing direction."""
-    return gripper.X_GB
-
-
 def recognise_acronym(path: Path) -> bool:
     """An HDF5 file with `grasps/transforms`."""
     try:
         if not is_hdf5(path):
             return False
         with open_hdf5(path) as file:
-            return AcronymPaths.transforms in file
+            return TRANSFORMS in file
     except (OSError, *READ_ERRORS):
         return False
 
@@ -104,7 +100,7 @@ def read_acronym(path: Path, gripper: Gripper) -> ImportedGrasps:
 
 def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
     notes: tuple[str, ...] = ()
-    X_OF, rounded = nearest_rigid(_read_poses(file), f"{path}: {AcronymPaths.transforms}")
+    X_OF, rounded = nearest_rigid(_read_poses(file), f"{path}: {TRANSFORMS}")
     mesh = _read_text(file, "object/file")
     scale = _read_number(file, "object/scale")
     if scale <= 0.0:
@@ -127,40 +123,34 @@ def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
     if success is not None and score is not success:
         columns[GRASP_SUCCESS_COLUMN] = success
     grasps = GraspSet.create(
-        X_OF @ inverse(_X_GF(gripper)),
+        X_OF @ inverse(gripper.X_GB),
         object=name,
         width=width,
         score=score,
         columns=columns,
-        provenance={
-            "format": ACRONYM_FORMAT.name,
-            "file": str(path.absolute()),
-            "object_files": {name: described},
-        },
+        provenance=file_provenance(ACRONYM_FORMAT, path, object_files={name: described}),
     )
     return ImportedGrasps(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
 
 
 def _read_poses(file: Hdf5File) -> NDArray[Any]:
-    if AcronymPaths.transforms not in file:
-        raise InvalidInputError(
-            f"{file.path}: {AcronymPaths.transforms} is missing; is it an ACRONYM file?"
-        )
-    stored = file.array(AcronymPaths.transforms)
-    stored.rows(4, 4)
+    if TRANSFORMS not in file:
+        raise InvalidInputError(f"{file.path}: {TRANSFORMS} is missing; is it an ACRONYM file?")
+    stored = file.array(TRANSFORMS)
+    stored.require_rows(4, 4)
     return stored.read("fiu")
 
 
 def _read_qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
     """(n,) values by column: of FleX and of us under their names, of others as `WHO.NAME`."""
     columns: dict[str, NDArray[Any]] = {}
-    if AcronymPaths.qualities not in file:
+    if QUALITIES not in file:
         return columns
-    for who in file.names(AcronymPaths.qualities):
-        for name in file.names(f"{AcronymPaths.qualities}/{who}"):
-            values = file.array(f"{AcronymPaths.qualities}/{who}/{name}").read(NUMBER_KINDS, (n,))
-            plain = who in (AcronymPaths.simulator, AcronymPaths.own) and name not in FIXED_COLUMNS
-            plain = plain or (who == AcronymPaths.own and name in ("score", "width"))
+    for who in file.names(QUALITIES):
+        for name in file.names(f"{QUALITIES}/{who}"):
+            values = file.array(f"{QUALITIES}/{who}/{name}").read(NUMBER_KINDS, (n,))
+            plain = who in ("flex", "burg_drake") and name not in FIXED_COLUMNS
+            plain = plain or (who == "burg_drake" and name in ("score", "width"))
             columns[name if plain else f"{who}.{name}"] = values.astype(float)
     return columns
 
@@ -202,40 +192,29 @@ def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, 
         file["gripper/type"] = foreign.get(gripper.name, gripper.name)
         file["gripper/configuration"] = np.array([gripper.opening[1] / 2.0])
         packed = {"compression": "gzip", "shuffle": True}
-        file.create_dataset(AcronymPaths.transforms, data=grasps.X_OG @ _X_GF(gripper), **packed)
+        file.create_dataset(TRANSFORMS, data=grasps.X_OG @ gripper.X_GB, **packed)
         for key, values in _quality_arrays(grasps, success).items():
-            file.create_dataset(f"{AcronymPaths.qualities}/{key}", data=values, **packed)
+            file.create_dataset(f"{QUALITIES}/{key}", data=values, **packed)
     atomic_write(path, buffer.getvalue())
     return notes
 
 
 def _quality_arrays(grasps: GraspSet, success: Array) -> dict[str, NDArray[Any]]:
     """Values by dataset below `grasps/qualities`."""
-    # Results of FleX other than `object_in_gripper`.
-    motion_columns = tuple(
-        f"object_motion_during_{phase}_{kind}"
-        for phase in ("closing", "shaking")
-        for kind in ("angular", "linear")
-    )
-    known = not np.isnan(success).any()
-    result: dict[str, NDArray[Any]] = {
-        f"{AcronymPaths.simulator}/{GRASP_SUCCESS_COLUMN}": success.astype(np.int64)
-        if known
-        else success
-    }
+    flags = success if np.isnan(success).any() else success.astype(np.int64)
+    result: dict[str, NDArray[Any]] = {f"flex/{GRASP_SUCCESS_COLUMN}": flags}
     if not np.array_equal(grasps.score, success, equal_nan=True):
-        result[f"{AcronymPaths.own}/score"] = grasps.score
+        result["burg_drake/score"] = grasps.score
     if not np.isnan(grasps.width).all():
-        result[f"{AcronymPaths.own}/width"] = grasps.width
+        result["burg_drake/width"] = grasps.width
     for name, values in grasps.columns.items():
         if name != GRASP_SUCCESS_COLUMN and values.dtype.kind in "fiub":
-            who, dot, rest = name.partition(".")
-            simulated = (
-                f"{AcronymPaths.simulator}/{name}"
-                if name in motion_columns
-                else f"{AcronymPaths.own}/{name}"
+            who, _, rest = name.partition(".")
+            simulated = re.fullmatch(
+                "object_motion_during_(closing|shaking)_(angular|linear)", name
             )
-            result[f"{who}/{rest}" if dot and who and rest else simulated] = values
+            own = f"{'flex' if simulated else 'burg_drake'}/{name}"
+            result[f"{who}/{rest}" if who and rest else own] = values
     return result
 
 
@@ -266,7 +245,7 @@ ACRONYM_FORMAT = GraspFormat(
     source="github.com/NVlabs/acronym, acronym_tools/acronym.py; Eppner et al., ICRA 2021",
     carries=("score as object_in_gripper", "width", "further numbers", "mesh, scale and mass"),
     cannot_carry=("ids", "several objects", "text columns", "provenance"),
-    X_GF=_X_GF,
+    X_GF=lambda gripper: gripper.X_GB,
     recognises=recognise_acronym,
     read=read_acronym,
     write=write_acronym,

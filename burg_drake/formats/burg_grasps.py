@@ -25,7 +25,6 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core import (
-    Array,
     GraspSet,
     InvalidInputError,
     make_pose,
@@ -34,7 +33,13 @@ from burg_drake.core import (
     require_grasp_count,
     write_npy,
 )
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, ImportedGrasps, conversion_losses
+from burg_drake.formats.grasp_format import (
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    conversion_losses,
+    file_provenance,
+)
 from burg_drake.formats.pose_files import nearest_rigid
 
 _X_GF = make_pose(np.diag([1.0, -1.0, -1.0]))
@@ -51,10 +56,6 @@ def _recognise(path: Path) -> bool:
 
 
 def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
-    translation = slice(0, 3)  # Columns of the translation.
-    rotation = slice(3, 12)  # Columns of the rotation matrix, row by row.
-    score_column = 12  # Column of the score.
-    width_column = 13  # Column of the width.
     with open_npy(path) as stored:
         if not _is_grasp_shape(stored.shape):
             raise InvalidInputError(
@@ -65,23 +66,16 @@ def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
     width = score = None
     where = str(path)
     if values.ndim == 2:
-        width, score = (
-            _values_if_set(values[:, width_column]),
-            _values_if_set(values[:, score_column]),
-        )
-        values = make_pose(values[:, rotation].reshape(-1, 3, 3), values[:, translation])
+        # BURG-Toolkit leaves scores and widths that it has not set at 0.
+        score, width = (v if v.any() else None for v in (values[:, 12], values[:, 13]))
+        values = make_pose(values[:, 3:12].reshape(-1, 3, 3), values[:, :3])
         where = f"{path}: columns 0 to 11"
     X_SF, notes = nearest_rigid(values, where)
-    provenance = {"format": BURG_TOOLKIT_FORMAT.name, "file": str(path.absolute())}
+    provenance = file_provenance(BURG_TOOLKIT_FORMAT, path)
     grasps = GraspSet.create(
         X_SF @ _X_GF, object="", width=width, score=score, provenance=provenance
     )
     return ImportedGrasps(grasps, BURG_TOOLKIT_FORMAT.frame, notes)
-
-
-def _values_if_set(values: Array) -> Array | None:
-    """Scores or widths; None if BURG-Toolkit has set none of them."""
-    return values if values.any() else None
 
 
 def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:

@@ -4,18 +4,14 @@
 `yaml_file_type` and `yaml_file_version` say what a file is, keys are sorted, what is not known is
 null, and paths are relative to the file, in the writer's spelling: with backslashes from Windows.
 
-Libraries, `object_library.yaml`: the layout is that of the code which writes it,
-`ObjectLibrary.to_yaml` in
-burg_toolkit/core.py and `YAMLObject.dump_yaml_data` in burg_toolkit/io.py
-(github.com/mrudorfer/burg-toolkit), and of a file that it wrote, object_library/object_library.yaml
-of github.com/mrudorfer/jogramop-framework:
+Libraries, `object_library.yaml`: the layout is that of `ObjectLibrary.to_yaml` in
+burg_toolkit/core.py, and of a file that it wrote, object_library/object_library.yaml of
+github.com/mrudorfer/jogramop-framework:
 
-- `yaml_file_type: ObjectLibrary` and `yaml_file_version: '1.0'` say what it is. `objects` is a
-  list, the keys of each object are sorted, what is not known is null. `scale` came later without a
-  new version number: some files do not have it.
+- `yaml_file_type` is ObjectLibrary. `objects` is a list. `scale` came later without a new version
+  number: some files do not have it.
 - A mass of 0, which is also what becomes of a missing one, fixes an object in space
   (`ObjectType.__init__`); here it has no mass. A friction coefficient of 0 or none becomes 0.24.
-- Paths are relative to the YAML file, in the writer's spelling: with backslashes from Windows.
 - `scale` belongs to the object, not to its mesh file: objects that share a mesh file differ in it,
   and mesh and convex pieces are scaled on loading (scripts/acronym/create_object_library.py;
   `save_urdf` in io.py writes it into `<mesh scale=...>`). Lengths of stable poses are therefore
@@ -24,9 +20,8 @@ of github.com/mrudorfer/jogramop-framework:
   with the support at z = 0; near-duplicates are kept (`compute_stable_poses` in
   mesh_processing.py). Their probabilities need not add up to 1.
 
-Scenes: the layout is that of the code which writes them, `Scene.to_yaml` in burg_toolkit/core.py
-(github.com/mrudorfer/burg-toolkit), and of files that it wrote, scenarios/*/scene.yaml of
-github.com/mrudorfer/jogramop-framework:
+Scenes: the layout is that of `Scene.to_yaml` in burg_toolkit/core.py, and of files that it wrote,
+scenarios/*/scene.yaml of github.com/mrudorfer/jogramop-framework:
 
 - The ground area extends from the origin to (ground_area_x, ground_area_y) in the plane z = 0, z
   up. That is our scene frame S on a board of that size.
@@ -42,7 +37,6 @@ github.com/mrudorfer/jogramop-framework:
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -74,15 +68,9 @@ class BurgReader(Reader):
         notes: what was left aside, one sentence each.
     """
 
-    def __init__(self, name: str, skipped: Collection[str] = ()) -> None:
-        """Begins to read a document.
-
-        Args:
-            name: of the file.
-            skipped: keys that are left aside without a note.
-        """
+    def __init__(self, name: str) -> None:
+        """Begins to read the document in the file `name`."""
         super().__init__(name)
-        self.skipped = skipped
         self.notes: list[str] = []
 
     def read_dataclass(self, node: yaml.Node, kind: type, where: str) -> Any:
@@ -93,12 +81,11 @@ class BurgReader(Reader):
                 if key in known:
                     pairs.append((key_node, value))
                     continue
-                if key in self.skipped:
-                    continue
-                place = f" {where}:" if where else ""
+                place = (
+                    f"{self.name}:{key_node.start_mark.line + 1}:{f' {where}:' if where else ''}"
+                )
                 self.notes.append(
-                    f"{self.name}:{key_node.start_mark.line + 1}:{place} unknown key "
-                    f"{key!r} was ignored; {suggest_names(key, known)}"
+                    f"{place} unknown key {key!r} was ignored; {suggest_names(key, known)}"
                 )
             node = yaml.MappingNode(node.tag, pairs, node.start_mark, node.end_mark)
         return super().read_dataclass(node, kind, where)
@@ -106,42 +93,36 @@ class BurgReader(Reader):
     def item_lines(self, node: yaml.Node, key: str) -> list[int]:
         """Where the items of a list of the document begin."""
         entries = self.entries(node, "")
-        return (
-            [item.start_mark.line + 1 for item in entries[key][1].value] if key in entries else []
-        )
+        items = entries[key][1].value if key in entries else []
+        return [item.start_mark.line + 1 for item in items]
 
-    def check_kind(
-        self, node: yaml.Node, type: str, version: str, title: str, hints: Mapping[str, str]
-    ) -> None:
-        """Refuses other files.
+    def check_kind(self, node: yaml.Node, type: str, title: str, other: str, hint: str) -> None:
+        """Refuses other files, and other versions than 1.0.
 
         Args:
             node: the document.
             type: expected `yaml_file_type`.
-            version: expected `yaml_file_version`.
             title: what such a file is, for people.
-            hints: what to do about files of other types.
+            other: the other `yaml_file_type` of BURG-Toolkit.
+            hint: what to do about files of that type.
 
         Raises:
             DocumentError: it is no such file, or of another version.
         """
         entries = self.entries(node, "")
-        for key, expected in (("yaml_file_type", type), ("yaml_file_version", version)):
+        for key, expected in (("yaml_file_type", type), ("yaml_file_version", "1.0")):
             if key not in entries:
                 raise self.fail(
                     node,
                     key,
                     f"missing; if this is {title} of an early BURG-Toolkit, which did not write"
-                    f" it, add the lines 'yaml_file_type: {type}' and"
-                    f" 'yaml_file_version: \"{version}\"'",
+                    f" it, add the lines 'yaml_file_type: {type}' and 'yaml_file_version: \"1.0\"'",
                 )
             value = entries[key][1]
             given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
             if given != expected:
-                hint = f"; {hints[given]}" if given in hints else ""
-                raise self.fail(
-                    value, key, f"{quote_value(given)} cannot be read; expected {expected!r}{hint}"
-                )
+                what = f"{quote_value(given)} cannot be read; expected {expected!r}"
+                raise self.fail(value, key, f"{what}; {hint}" if given == other else what)
 
 
 def locate_file(given: str | None, folder: Path) -> Path | None:
@@ -303,18 +284,17 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
         DocumentError: it is no such file or of another version, or a value cannot be used; the
             message names file, line and key.
     """
-    # What to do with other files of BURG-Toolkit.
-    hints = {"Scene": "give the object library that the scene names under object_library_fn"}
     path = Path(path)
     if path.is_dir():
         path = path / "object_library.yaml"
     node = load_yaml_node(path)
     reader = BurgReader(str(path))
-    reader.check_kind(node, "ObjectLibrary", "1.0", "an object library", hints)
+    hint = "give the object library that the scene names under object_library_fn"
+    reader.check_kind(node, "ObjectLibrary", "an object library", "Scene", hint)
     document = cast(_BurgLibraryDocument, reader.read(node, _BurgLibraryDocument, ""))
-    lines = reader.item_lines(node, "objects")
+    items = list(zip(document.objects, reader.item_lines(node, "objects"), strict=True))
     first: dict[str, int] = {}
-    for i, (item, line) in enumerate(zip(document.objects, lines, strict=True)):
+    for i, (item, line) in enumerate(items):
         if item.identifier in first:
             raise DocumentError(
                 f"{path}:{line}: objects[{i}].identifier: {item.identifier!r} is taken by the"
@@ -325,10 +305,7 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
         path=path,
         name=document.name or "",
         description=document.description or "",
-        objects=tuple(
-            _burg_object(item, path.parent, line)
-            for item, line in zip(document.objects, lines, strict=True)
-        ),
+        objects=tuple(_burg_object(item, path.parent, line) for item, line in items),
         notes=tuple(reader.notes),
     )
 
@@ -479,16 +456,11 @@ def read_burg_scene(path: str | Path) -> BurgScene:
             message names file, line and key.
         InvalidInputError: a pose is not a rigid transform; the message names file and line.
     """
-    # What to do with other files of BURG-Toolkit.
-    hints = {
-        "ObjectLibrary": (
-            "give the scene here; libraries are imported by `burg-drake library import-burg`"
-        )
-    }
     path = Path(path)
     node = load_yaml_node(path)
     reader = BurgReader(str(path))
-    reader.check_kind(node, "Scene", "1.0", "a scene", hints)
+    hint = "give the scene here; libraries are imported by `burg-drake library import-burg`"
+    reader.check_kind(node, "Scene", "a scene", "ObjectLibrary", hint)
     document = cast(_BurgSceneDocument, reader.read(node, _BurgSceneDocument, ""))
     notes = reader.notes
     ground_area = (document.ground_area_x, document.ground_area_y)

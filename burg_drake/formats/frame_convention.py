@@ -7,47 +7,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, inverse
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, PoseFrame
+from burg_drake.core import Array
+from burg_drake.formats.grasp_format import GraspFormat, Gripper
 
 
 @dataclass(frozen=True)
 class Convention:
-    """How a format says where a grasp is.
+    """The grasp frame F of a format for a hand.
 
     Attributes:
-        name, title: of the format.
         approach: the axis of its frame F that points where the hand moves, such as `+z`.
         closing: the axis of F along which the fingers close, such as `x`; either way, as fingers
             are exchangeable.
         origin: where F has its origin.
-        frame: what poses are measured in.
-        suffixes: of files.
-        cannot_carry: what gets lost when written.
     """
 
-    name: str
-    title: str
     approach: str
     closing: str
     origin: str
-    frame: PoseFrame
-    suffixes: tuple[str, ...]
-    cannot_carry: tuple[str, ...]
 
 
 def convention_of(format: GraspFormat, gripper: Gripper) -> Convention:
     """The convention of a format for a gripper."""
     X_GF = format.X_GF(gripper)
     return Convention(
-        name=format.name,
-        title=format.title,
         approach=axis_along(X_GF, (0.0, 0.0, 1.0)),
         closing=axis_along(X_GF, (1.0, 0.0, 0.0)).removeprefix("+").removeprefix("-"),
         origin=origin_in_words(X_GF[:3, 3], gripper),
-        frame=format.frame,
-        suffixes=format.suffixes,
-        cannot_carry=format.cannot_carry,
     )
 
 
@@ -93,24 +79,18 @@ def origin_in_words(p_GF: Array, gripper: Gripper) -> str:
         p_GF: (3,) [m].
         gripper: whose landmarks are named: H and the finger tips.
     """
+    x, y, z = p_GF
     places = []
-    if abs(p_GF[2]) >= 1e-6:
-        side = "ahead of" if p_GF[2] > 0.0 else "behind"
-        places.append(f"{_format_millimetres(p_GF[2])} {side} G")
-    for k in (0, 1):
-        if abs(p_GF[k]) >= 1e-6:
-            places.append(
-                f"{_format_millimetres(p_GF[k])} along {'-' if p_GF[k] < 0.0 else ''}{'xy'[k]} of G"
-            )
+    if abs(z) >= 1e-6:
+        places.append(f"{1e3 * abs(z):.4g} mm {'ahead of' if z > 0.0 else 'behind'} G")
+    for axis, offset in (("x", x), ("y", y)):
+        if abs(offset) >= 1e-6:
+            sign = "-" if offset < 0.0 else ""
+            places.append(f"{1e3 * abs(offset):.4g} mm along {sign}{axis} of G")
     if not places:
         return "G"
-    p_GT = np.array([0.0, 0.0, gripper.tip])
-    landmarks = {"H": inverse(gripper.X_HG)[:3, 3], "finger tips": p_GT}
+    landmarks = {"H": gripper.X_GH[:3, 3], "finger tips": np.array([0.0, 0.0, gripper.tip])}
     for name, p_GL in landmarks.items():
         if np.linalg.norm(p_GF - p_GL) < 1e-6:
             return f"{name}, {', '.join(places)}"
     return ", ".join(places)
-
-
-def _format_millimetres(length: float) -> str:
-    return f"{1e3 * abs(length):.4g} mm"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,7 @@ def require_single_object(grasps: GraspSet, kind: str) -> str:
             f"the grasps are of {len(names)} objects ({list_names(names)}), but a file of "
             f"{kind} holds those of one; choose one of them, or write a file for each"
         )
-    name: str = names[0]
-    return name
+    return str(names[0])
 
 
 def object_name(file: str) -> str:
@@ -56,39 +56,24 @@ def object_name(file: str) -> str:
 
     Meshes of our libraries are called alike and lie in a folder an object: `mug/mesh.obj`.
     """
-    # Suffixes of mesh and scene files.
-    mesh_suffixes = (
-        "obj",
-        "stl",
-        "ply",
-        "off",
-        "dae",
-        "glb",
-        "gltf",
-        "usd",
-        "usda",
-        "usdc",
-        "usdz",
-    )
     *folders, last = file.replace("\\", "/").rstrip("/").split("/")
     if last in (MESH_FILE, "surface.obj") and folders and folders[-1]:
         return folders[-1]
     stem, _, suffix = last.rpartition(".")
-    return stem if stem and suffix.lower() in mesh_suffixes else last
+    is_mesh = re.fullmatch("obj|stl|ply|off|dae|glb|gltf|usd[acz]?", suffix.lower())
+    return stem if stem and is_mesh else last
 
 
 def object_description(grasps: GraspSet, name: str) -> dict[str, Any]:
     """What is told of an object: its mesh `file`, its `scale` and more; empty if nothing is."""
-    found = _find_description(grasps.provenance, name) or {}
+    found = _find_description(grasps.provenance, name)
     return {key: value for key, value in found.items() if _is_description(key, value)}
 
 
 def shareable_description(grasps: GraspSet, name: str, path: Path) -> dict[str, Any]:
     """The same, with the mesh as a file at `path` refers to it."""
-    described: dict[str, Any] = with_shareable_references(
-        object_description(grasps, name), path.absolute().parent
-    )
-    return described
+    description = object_description(grasps, name)
+    return dict(with_shareable_references(description, path.absolute().parent))
 
 
 def _is_description(key: str, value: Any) -> bool:
@@ -101,14 +86,14 @@ def _is_description(key: str, value: Any) -> bool:
         return False
 
 
-def _find_description(provenance: Mapping[str, Any], name: str) -> dict[str, Any] | None:
+def _find_description(provenance: Mapping[str, Any], name: str) -> dict[str, Any]:
     files = provenance.get("object_files")
     if isinstance(files, Mapping) and isinstance(files.get(name), Mapping):
         return dict(files[name])
     for part in provenance_parts(provenance):
         if found := _find_description(part, name):
             return found
-    return None
+    return {}
 
 
 def success_labels(grasps: GraspSet) -> Array:

@@ -1,4 +1,4 @@
-"""Reads and writes grasp files: the list of formats, recognition by content, burg_drake's own format."""
+"""Reads and writes grasp files in all formats, recognises them, and has burg_drake's own one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 from burg_drake.core import (
     READ_ERRORS,
-    Array,
     FileLimits,
     GraspSet,
     GraspSetFormat,
@@ -69,21 +68,19 @@ def format_of(path: str | Path) -> GraspFormat:
         if format.recognises(path):
             return format
     if path.suffix in (".yaml", ".yml"):
-        for _ in checked_yaml_events(
-            read_text(path, FileLimits.grasp_file), str(path), FileLimits.grasp_file
-        ):
+        text, limits = read_text(path, FileLimits.grasp_file), FileLimits.grasp_file
+        for _ in checked_yaml_events(text, str(path), limits):
             pass  # says what is wrong with a file that is damaged or beyond the limits
     if path.suffix == ".json":
         load_json(path, FileLimits.grasp_file)
     if path.suffix.lower() == ".npz":
         GraspSet.load(path)
-    shape = npy_shape(path) if path.suffix.lower() == ".npy" else None
-    wanted = (
-        f" its array has shape {shape}; expected (N, 4, 4) or (N, 14) of BURG-Toolkit,"
-        " or (N, 17) of GraspNet;"
-        if shape is not None
-        else ""
-    )
+    wanted = ""
+    if path.suffix.lower() == ".npy" and (shape := npy_shape(path)) is not None:
+        wanted = (
+            f" its array has shape {shape}; expected (N, 4, 4) or (N, 14) of BURG-Toolkit,"
+            " or (N, 17) of GraspNet;"
+        )
     raise InvalidInputError(
         f"{path} is not a file of grasps in a known format ({', '.join(GRASP_FORMATS)});"
         f"{wanted} if it should be in one of them, name the format to see what is wrong"
@@ -135,10 +132,6 @@ def format_by_suffix(path: str | Path) -> GraspFormat:
     return fitting[0]
 
 
-def _X_GF(gripper: Gripper) -> Array:
-    return make_pose()
-
-
 def _recognise(path: Path) -> bool:
     try:
         if is_hdf5(path):
@@ -148,10 +141,6 @@ def _recognise(path: Path) -> bool:
             return {"header", "X_OG"} <= set(file.names)
     except (OSError, *READ_ERRORS):
         return False
-
-
-def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
-    return ImportedGrasps(GraspSet.load(path), "object")
 
 
 def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
@@ -167,12 +156,12 @@ BURG_DRAKE_FORMAT = GraspFormat(
     source="core/grasp_set.py of this project",
     carries=("everything",),
     cannot_carry=(),
-    X_GF=_X_GF,
+    X_GF=lambda gripper: make_pose(),
     recognises=_recognise,
-    read=_read,
+    read=lambda path, gripper: ImportedGrasps(GraspSet.load(path), "object"),
     write=_write,
 )
-"""The format of burg_drake's own files; see `core.grasps`."""
+"""The format of burg_drake's own files; see `GraspSet`."""
 
 GRASP_FORMATS: Mapping[str, GraspFormat] = {
     format.name: format

@@ -159,6 +159,11 @@ class GraspFormat:
         return np.broadcast_to(self.X_GF(gripper), (len(grasps), 4, 4))
 
 
+def file_provenance(format: GraspFormat, path: Path, **more: Any) -> dict[str, Any]:
+    """Provenance of grasps that are read of a file."""
+    return {"format": format.name, "file": str(path.absolute()), **more}
+
+
 def conversion_losses(grasps: GraspSet, carried: Collection[str], title: str) -> tuple[str, ...]:
     """A sentence about the columns that get lost, `id` among them; none if nothing gets lost.
 

@@ -51,23 +51,23 @@ from burg_drake.formats.grasp_conversion import (
     shareable_description,
     success_labels,
 )
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, ImportedGrasps, conversion_losses
+from burg_drake.formats.grasp_format import (
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    conversion_losses,
+    file_provenance,
+)
 from burg_drake.formats.pose_files import nearest_rigid
 
 _GRASPS_KEY = re.compile(rb'"grasps"\s*:\s*\{')  # The key `grasps` with a mapping, in JSON.
 
 
-def _X_GF(gripper: Gripper) -> Array:
-    """The hand's base, x along the closing direction."""
-    return gripper.X_GB
-
-
 def recognise_graspgen(path: Path) -> bool:
     """JSON with `grasps` as a mapping."""
-    header_size = 1 << 16  # Bytes at the start of a file that are read to recognise it.
     try:
         with open(path, "rb") as stream:
-            head = stream.read(header_size)
+            head = stream.read(1 << 16)
     except OSError:
         return False
     return head.lstrip().startswith(b"{") and _GRASPS_KEY.search(head) is not None
@@ -79,7 +79,11 @@ def read_graspgen(path: Path, gripper: Gripper) -> ImportedGrasps:
     Raises:
         InvalidInputError: no such file, or a value that cannot be used; the message says where.
     """
-    document = _load_document(path)
+    document = load_json(path, FileLimits.grasp_file)
+    if not isinstance(document, dict):
+        raise InvalidInputError(
+            f"{path}: the file holds a {type(document).__name__} instead of a mapping"
+        )
     grasps = _require_mapping(path, document, "grasps")
     given = grasps.get("transforms")
     if not isinstance(given, list):
@@ -89,31 +93,17 @@ def read_graspgen(path: Path, gripper: Gripper) -> ImportedGrasps:
     score = _read_success(path, grasps, len(X_OF))
     notes, offset = _gripper_offset(path, document, gripper)
     name, described, scaled = _read_object(path, document)
-    notes += (
-        () if score is not None else (f"The file has no {GRASP_SUCCESS_COLUMN}, hence no scores.",)
-    )
+    if score is None:
+        notes += (f"The file has no {GRASP_SUCCESS_COLUMN}, hence no scores.",)
     set_ = GraspSet.create(
-        X_OF @ offset @ inverse(_X_GF(gripper)),
+        X_OF @ offset @ inverse(gripper.X_GB),
         object=name,
         score=score,
-        provenance={
-            "format": GRASPGEN_FORMAT.name,
-            "file": str(path.absolute()),
-            "object_files": {name: described},
-        },
+        provenance=file_provenance(GRASPGEN_FORMAT, path, object_files={name: described}),
     )
     further = sorted(set(grasps) - {"transforms", GRASP_SUCCESS_COLUMN})
     left = (f"Ignored: grasps.{', grasps.'.join(further)}.",) if further else ()
     return ImportedGrasps(set_, "object", (*notes, *rounded, *scaled, *left))
-
-
-def _load_document(path: Path) -> dict[str, Any]:
-    document = load_json(path, FileLimits.grasp_file)
-    if not isinstance(document, dict):
-        raise InvalidInputError(
-            f"{path}: the file holds a {type(document).__name__} instead of a mapping"
-        )
-    return document
 
 
 def _require_mapping(path: Path, document: dict[str, Any], key: str) -> dict[str, Any]:
@@ -147,11 +137,8 @@ def _read_object(
 ) -> tuple[str, dict[str, Any], tuple[str, ...]]:
     """Its name, what the file says of it, and a note about its scale."""
     if "object" not in document:
-        return (
-            path.stem,
-            {},
-            ((f"The file names no object; the object is called {path.stem!r}, like the file."),),
-        )
+        note = f"The file names no object; the object is called {path.stem!r}, like the file."
+        return path.stem, {}, (note,)
     object = _require_mapping(path, document, "object")
     file, scale = object.get("file"), object.get("scale")
     if not isinstance(file, str) or not file:
@@ -171,16 +158,15 @@ def _gripper_offset(
     path: Path, document: dict[str, Any], gripper: Gripper
 ) -> tuple[tuple[str, ...], Array]:
     """Notes about the gripper, and (4, 4) what transforms are multiplied by."""
-    # Key of the pose of GraspGen's gripper frame in the asset's frame.
-    offset_key = "transform_offset_from_asset_to_graspgen_convention"
+    key = "transform_offset_from_asset_to_graspgen_convention"
     if "gripper" not in document:
         return (), np.eye(4)
     given = _require_mapping(path, document, "gripper")
     notes: tuple[str, ...] = ()
     if isinstance(given.get("name"), str):
         notes = check_gripper_name(given["name"], gripper, f"{path}: gripper.name")
-    where = f"{path}: gripper.{offset_key}"
-    offset = given.get(offset_key, np.eye(4).reshape(-1).tolist())
+    where = f"{path}: gripper.{key}"
+    offset = given.get(key, np.eye(4).reshape(-1).tolist())
     try:
         if len(offset) == 2:
             p, xyzw = (np.array(part, dtype=float) for part in offset)
@@ -213,7 +199,7 @@ def write_graspgen(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str,
             " is known"
         )
     file, scale = str(described.get("file", f"{name}.obj")), float(described.get("scale", 1.0))
-    content: dict[str, Any] = {"transforms": (grasps.X_OG @ _X_GF(gripper)).tolist()}
+    content: dict[str, Any] = {"transforms": (grasps.X_OG @ gripper.X_GB).tolist()}
     notes = []
     if "file" not in described:
         notes.append(
@@ -247,7 +233,7 @@ GRASPGEN_FORMAT = GraspFormat(
         "width",
         "further columns",
     ),
-    X_GF=_X_GF,
+    X_GF=lambda gripper: gripper.X_GB,
     recognises=recognise_graspgen,
     read=read_graspgen,
     write=write_graspgen,

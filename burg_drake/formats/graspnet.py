@@ -42,27 +42,16 @@ from burg_drake.formats.grasp_format import (
     Gripper,
     ImportedGrasps,
     conversion_losses,
+    file_provenance,
 )
 from burg_drake.formats.pose_files import nearest_rigid
 
-
-class GraspNetColumns:
-    """Grasp net columns."""
-
-    count = 17  # Numbers in a row.
-    score = 0  # Column of the score.
-    width = 1  # Column of the opening on arrival, in metres.
-    height = 2  # Column of the height of the fingers, in metres.
-    depth = 3  # Column of the depth of the finger tips, in metres.
-    object_id = 16  # Column of the object's number.
-
-
-class GraspNetDefaults:
-    """Grasp net defaults."""
-
-    height = 0.02  # Metres.
-    depth = 0.02  # Metres; labels and networks have depths of 0.01 to 0.04.
-    object_id = -1  # Object number of grasps without one.
+DEFAULT_HEIGHT = 0.02
+"""Metres."""
+DEFAULT_DEPTH = 0.02
+"""Metres; labels and networks have depths of 0.01 to 0.04."""
+NO_OBJECT_ID = -1
+"""Object number of grasps without one."""
 
 
 def graspnet_X_FG(depth: ArrayLike, gripper: Gripper) -> Array:
@@ -74,74 +63,64 @@ def graspnet_X_FG(depth: ArrayLike, gripper: Gripper) -> Array:
 
 
 def _X_GF(gripper: Gripper) -> Array:
-    return inverse(graspnet_X_FG(GraspNetDefaults.depth, gripper))
+    return inverse(graspnet_X_FG(DEFAULT_DEPTH, gripper))
 
 
 def _X_GF_each(grasps: GraspSet, gripper: Gripper) -> Array:
-    return inverse(
-        graspnet_X_FG(_column_or_default(grasps, "depth", GraspNetDefaults.depth), gripper)
-    )
+    return inverse(graspnet_X_FG(_column_or_default(grasps, "depth", DEFAULT_DEPTH), gripper))
 
 
 def _recognise(path: Path) -> bool:
     shape = npy_shape(path)
-    return shape is not None and len(shape) == 2 and shape[1] == GraspNetColumns.count
+    return shape is not None and len(shape) == 2 and shape[1] == 17
 
 
 def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
     with open_npy(path) as stored:
-        stored.rows(GraspNetColumns.count)
+        stored.require_rows(17)
         rows = stored.read("fiu").astype(float)
-    bad = ~np.isfinite(rows[:, GraspNetColumns.depth]) | (
-        np.abs(rows[:, GraspNetColumns.depth]) > 1.0
-    )
+    score, opening, height, depth = rows[:, :4].T
+    ids = rows[:, 16]
+    bad = ~np.isfinite(depth) | (np.abs(depth) > 1.0)
     if bad.any():
         i = int(np.argmax(bad))
-        raise InvalidInputError(
-            f"{path}: row {i} has depth {rows[i, GraspNetColumns.depth]:g}; depths must be in metres"
-        )
-    given = make_pose(rows[:, slice(4, 13)].reshape(-1, 3, 3), rows[:, slice(13, 16)])
+        raise InvalidInputError(f"{path}: row {i} has depth {depth[i]:g}; depths must be in metres")
+    given = make_pose(rows[:, 4:13].reshape(-1, 3, 3), rows[:, 13:16])
     X_CF, notes = nearest_rigid(given, f"{path}: columns 4 to 15")
-    ids = rows[:, GraspNetColumns.object_id]
     grasps = GraspSet.create(
-        X_CF @ graspnet_X_FG(rows[:, GraspNetColumns.depth], gripper),
+        X_CF @ graspnet_X_FG(depth, gripper),
         object="",
-        score=rows[:, GraspNetColumns.score],
-        provenance={"format": GRASPNET_FORMAT.name, "file": str(path.absolute())},
+        score=score,
+        provenance=file_provenance(GRASPNET_FORMAT, path),
         columns={
-            PREGRASP_WIDTH_COLUMN: rows[:, GraspNetColumns.width],
-            "height": rows[:, GraspNetColumns.height],
-            "depth": rows[:, GraspNetColumns.depth],
-            "object_id": np.where(np.isfinite(ids), ids, GraspNetDefaults.object_id).astype(
-                np.int64
-            ),
+            PREGRASP_WIDTH_COLUMN: opening,
+            "height": height,
+            "depth": depth,
+            "object_id": np.where(np.isfinite(ids), ids, NO_OBJECT_ID).astype(np.int64),
         },
     )
     return ImportedGrasps(grasps, GRASPNET_FORMAT.frame, notes)
 
 
 def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
-    n = len(grasps)
     carried = ("score", PREGRASP_WIDTH_COLUMN, "height", "depth", "object_id")
     opening, assumed = _arrival_openings(grasps, gripper)
-    notes = (
-        *conversion_losses(grasps, carried, GRASPNET_FORMAT.title),
-        *assumed,
-    )
+    notes = (*conversion_losses(grasps, carried, GRASPNET_FORMAT.title), *assumed)
     score = grasps.score
     if np.isnan(score).any():
         notes += (f"{int(np.isnan(score).sum())} grasps without a score got score 0.",)
-    depth = _column_or_default(grasps, "depth", GraspNetDefaults.depth)
+    depth = _column_or_default(grasps, "depth", DEFAULT_DEPTH)
     X_CF = grasps.X_OG @ inverse(graspnet_X_FG(depth, gripper))
-    rows = np.empty((n, GraspNetColumns.count))
-    rows[:, GraspNetColumns.score] = np.where(np.isnan(score), 0.0, score)
-    rows[:, GraspNetColumns.width] = opening
-    rows[:, GraspNetColumns.height] = _column_or_default(grasps, "height", GraspNetDefaults.height)
-    rows[:, GraspNetColumns.depth] = depth
-    rows[:, slice(4, 13)] = X_CF[:, :3, :3].reshape(n, 9)
-    rows[:, slice(13, 16)] = X_CF[:, :3, 3]
-    rows[:, GraspNetColumns.object_id] = _column_or_default(
-        grasps, "object_id", GraspNetDefaults.object_id
+    rows = np.column_stack(
+        [
+            np.where(np.isnan(score), 0.0, score),
+            opening,
+            _column_or_default(grasps, "height", DEFAULT_HEIGHT),
+            depth,
+            X_CF[:, :3, :3].reshape(-1, 9),
+            X_CF[:, :3, 3],
+            _column_or_default(grasps, "object_id", NO_OBJECT_ID),
+        ]
     )
     write_npy(path, rows.astype(np.float32))
     return (*notes, "Numbers are stored in single precision.")
@@ -175,7 +154,8 @@ def _column_or_default(grasps: GraspSet, name: str, default: float) -> Array:
         return np.full(len(grasps), default)
     if values.dtype.kind == "U":
         raise InvalidInputError(
-            f"column {name!r} holds text, but a file of {GRASPNET_FORMAT.title} can only have numbers"
+            f"column {name!r} holds text, but a file of {GRASPNET_FORMAT.title} can only have"
+            " numbers"
         )
     return np.where(np.isfinite(values), values, default).astype(float)
 

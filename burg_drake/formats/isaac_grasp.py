@@ -26,9 +26,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,43 +55,24 @@ from burg_drake.formats.grasp_format import (
     Gripper,
     ImportedGrasps,
     conversion_losses,
+    file_provenance,
 )
 
-
-class IsaacGraspKeys:
-    """Isaac grasp keys."""
-
-    closed_joints = "cspace_position"  # Key of the joint positions while the object is held.
-    open_joints = "pregrasp_cspace_position"  # Key of the joint positions on approach.
-    # Keys of the gripper frame, in Isaac Sim and in Isaac ROS.
-    gripper_frame = ("gripper_frame_link", "gripper_frame")
-    # Keys that name the object, the preferred one first.
-    object = ("object_file", "object_frame_link", "object_frame")
+CLOSED_JOINTS_KEY = "cspace_position"
+"""Key of the joint positions while the object is held."""
+OPEN_JOINTS_KEY = "pregrasp_cspace_position"
+"""Key of the joint positions on approach."""
+GRIPPER_FRAME_KEYS = ("gripper_frame_link", "gripper_frame")
+"""Keys of the gripper frame, in Isaac Sim and in Isaac ROS."""
+OBJECT_KEYS = ("object_file", "object_frame_link", "object_frame")
+"""Keys that name the object, the preferred one first."""
 
 
-@dataclass(frozen=True)
-class IsaacDialect:
-    """A way to write `isaac_grasp` YAML.
-
-    Attributes:
-        name: of the format.
-        title: of the format, for people.
-        X_GF: (4, 4) pose in G of what the file's poses are those of, for a gripper.
-        names_gripper_frame: whether it says which frames its poses relate, and where the joints
-            are.
-    """
-
-    name: str
-    title: str
-    X_GF: Callable[[Gripper], Array]
-    names_gripper_frame: bool
-
-
-def read_isaac_grasp(dialect: IsaacDialect, path: Path, gripper: Gripper) -> ImportedGrasps:
+def read_isaac_grasp(format: GraspFormat, path: Path, gripper: Gripper) -> ImportedGrasps:
     """The grasps of a file; `score` is the confidence.
 
     Args:
-        dialect: of the file.
+        format: of the file, Isaac Sim's or GraspGen's.
         path: the file.
         gripper: the hand of the grasps.
 
@@ -109,20 +89,20 @@ def read_isaac_grasp(dialect: IsaacDialect, path: Path, gripper: Gripper) -> Imp
         if not isinstance(grasp, dict):
             raise _value_error(path, f"grasps.{name}", grasp, "position and orientation")
     object, described = _read_object(path, document)
-    X_FG = inverse(dialect.X_GF(gripper))
+    X_FG = inverse(format.X_GF(gripper))
     columns: dict[str, NDArray[Any]] = {"name": np.array(list(grasps), dtype=str)}
-    width, note = _widths_from_joints(path, grasps, IsaacGraspKeys.closed_joints, gripper)
-    opening, _ = _widths_from_joints(path, grasps, IsaacGraspKeys.open_joints, gripper)
+    width, note = _widths_from_joints(path, grasps, CLOSED_JOINTS_KEY, gripper)
+    opening, _ = _widths_from_joints(path, grasps, OPEN_JOINTS_KEY, gripper)
     if not np.isnan(opening).all():
         columns[PREGRASP_WIDTH_COLUMN] = opening
     further, left = _extra_columns(grasps)
     notes: tuple[str, ...] = ()
-    if not any(key in document for key in IsaacGraspKeys.gripper_frame):
+    if not any(key in document for key in GRIPPER_FRAME_KEYS):
         axis = "xyz"[int(np.argmax(np.abs(X_FG[:3, 0])))]
         notes += (
             f"The file names no gripper frame; the fingers were taken to close along its {axis}.",
         )
-    if not any(document.get(key) for key in IsaacGraspKeys.object):
+    if not any(document.get(key) for key in OBJECT_KEYS):
         notes += (f"The file names no object; the object is called {object!r}.",)
     if "scale" in described:
         notes += (scale_note(object, str(described["file"]), float(described["scale"])),)
@@ -132,11 +112,7 @@ def read_isaac_grasp(dialect: IsaacDialect, path: Path, gripper: Gripper) -> Imp
         width=width,
         score=_read_confidences(path, grasps),
         columns={**further, **columns},
-        provenance={
-            "format": dialect.name,
-            "file": str(path.absolute()),
-            "object_files": {object: described},
-        },
+        provenance=file_provenance(format, path, object_files={object: described}),
     )
     return ImportedGrasps(set_, "object", (*notes, *note, *left))
 
@@ -153,7 +129,7 @@ def _check_format_version(path: Path, document: Any) -> None:
 
 
 def _check_gripper_link(path: Path, document: Mapping[str, Any], gripper: Gripper) -> None:
-    key = next((key for key in IsaacGraspKeys.gripper_frame if key in document), None)
+    key = next((key for key in GRIPPER_FRAME_KEYS if key in document), None)
     link = str(document[key]) if key is not None else ""
     if key is not None and object_name(link) != gripper.body:
         raise DocumentError(
@@ -166,7 +142,7 @@ def _check_gripper_link(path: Path, document: Mapping[str, Any], gripper: Grippe
 
 def _read_object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Its name, and what the file says of it."""
-    file = next((str(document[key]) for key in IsaacGraspKeys.object if document.get(key)), "")
+    file = next((str(document[key]) for key in OBJECT_KEYS if document.get(key)), "")
     described: dict[str, Any] = {"file": file} if "object_file" in document else {}
     if "object_file" in document and "object_scale" in document:
         scale = _parse_numbers(path, {"object_scale": document["object_scale"]}, (), "")[0]
@@ -178,15 +154,12 @@ def _read_object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str
 
 def _read_poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
     """(N, 4, 4) poses as written."""
-    norm_tolerance = 1e-3  # Largest deviation of a quaternion's length from 1, as of five decimals.
     positions = {
         name: _require_field(path, name, g, "position", list) for name, g in grasps.items()
     }
-    turned = {
-        name: _require_field(path, name, g, "orientation", dict) for name, g in grasps.items()
-    }
     quaternions = {}
-    for name, q in turned.items():
+    for name, grasp in grasps.items():
+        q = _require_field(path, name, grasp, "orientation", dict)
         if "w" not in q or not isinstance(q.get("xyz"), list):
             raise _value_error(
                 path, f"grasps.{name}.orientation", q, "{w: ..., xyz: [..., ..., ...]}"
@@ -195,7 +168,7 @@ def _read_poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
     p = _parse_numbers(path, positions, (3,), "position")
     q = _parse_numbers(path, quaternions, (4,), "orientation")
     length = np.linalg.norm(q, axis=1)
-    off = np.abs(length - 1.0) > norm_tolerance
+    off = np.abs(length - 1.0) > 1e-3  # as of five decimals
     if off.any():
         i = int(np.argmax(off))
         raise DocumentError(
@@ -249,17 +222,9 @@ def _extra_columns(
     grasps: Mapping[str, Mapping[str, Any]],
 ) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
     """Columns of single values under foreign keys, and a note about the rest."""
-    # Keys of a grasp that this reader interprets.
-    known_keys = (
-        "confidence",
-        "position",
-        "orientation",
-        IsaacGraspKeys.closed_joints,
-        IsaacGraspKeys.open_joints,
-    )
-    # Columns that keys of a file cannot fill.
+    interpreted = ("confidence", "position", "orientation", CLOSED_JOINTS_KEY, OPEN_JOINTS_KEY)
     reserved_columns = (*FIXED_COLUMNS, "name", PREGRASP_WIDTH_COLUMN)
-    keys = dict.fromkeys(key for g in grasps.values() for key in g if key not in known_keys)
+    keys = dict.fromkeys(key for g in grasps.values() for key in g if key not in interpreted)
     columns: dict[str, NDArray[Any]] = {}
     left = []
     for key in keys:
@@ -315,12 +280,12 @@ def _value_error(path: Path, where: str, given: Any, expected: str) -> DocumentE
 
 
 def write_isaac_grasp(
-    dialect: IsaacDialect, grasps: GraspSet, path: Path, gripper: Gripper
+    format: GraspFormat, grasps: GraspSet, path: Path, gripper: Gripper
 ) -> tuple[str, ...]:
     """Writes the grasps of one object; returns what the file cannot carry.
 
     Args:
-        dialect: of the file.
+        format: of the file; GraspGen's has neither frames nor joints.
         grasps: of one object.
         path: the file.
         gripper: the hand of the grasps.
@@ -328,49 +293,52 @@ def write_isaac_grasp(
     Raises:
         InvalidInputError: grasps of several objects, or the place cannot be written to.
     """
-    object = require_single_object(grasps, f"a file of {dialect.title}")
-    X_OF = grasps.X_OG @ dialect.X_GF(gripper)
+    object = require_single_object(grasps, f"a file of {format.title}")
+    X_OF = grasps.X_OG @ format.X_GF(gripper)
     q = quaternion_from_rotation(X_OF[:, :3, :3])
     closed = gripper.positions(grasps.width)
     opening = grasps.columns.get(PREGRASP_WIDTH_COLUMN, np.full(len(grasps), gripper.opening[1]))
     opened = gripper.positions(opening)
-    joints = dialect.names_gripper_frame
+    has_gripper = format is ISAAC_GRASP_FORMAT
     frames = [
         f"object_frame_link: {json.dumps(f'/World/{object}')}",
         f"gripper_frame_link: {json.dumps(f'/World/{gripper.body}')}",
     ]
-    lines = ["format: isaac_grasp", "format_version: 1.0", *(frames if joints else ()), "grasps:"]
+    lines = [
+        "format: isaac_grasp",
+        "format_version: 1.0",
+        *(frames if has_gripper else ()),
+        "grasps:",
+    ]
     for i, name in enumerate(_grasp_names(grasps)):
         score = grasps.score[i]
-        confidence = ".nan" if np.isnan(score) else _yaml_number(score)
         lines += [
             f"  {json.dumps(name)}:",
-            f"    confidence: {confidence}",
+            f"    confidence: {'.nan' if np.isnan(score) else _yaml_number(score)}",
             f"    position: {_yaml_list(X_OF[i, :3, 3])}",
             f"    orientation: {{w: {_yaml_number(q[i, 0])}, xyz: {_yaml_list(q[i, 1:])}}}",
         ]
-        if joints and not np.isnan(grasps.width[i]):
-            lines += [f"    {IsaacGraspKeys.closed_joints}:"]
-            lines += [f"      {joint}: {_yaml_number(p[i])}" for joint, p in closed.items()]
-        if joints and not np.isnan(opening[i]):
-            lines += [f"    {IsaacGraspKeys.open_joints}:"]
-            lines += [f"      {joint}: {_yaml_number(p[i])}" for joint, p in opened.items()]
+        joints = ((CLOSED_JOINTS_KEY, grasps.width, closed), (OPEN_JOINTS_KEY, opening, opened))
+        for key, width, positions in joints if has_gripper else ():
+            if not np.isnan(width[i]):
+                lines += [f"    {key}:"]
+                lines += [f"      {joint}: {_yaml_number(p[i])}" for joint, p in positions.items()]
     atomic_write(path, "\n".join(lines) + "\n")
-    beyond = _notes_on_widths(grasps.width, opening, gripper) if joints else ()
-    return (*beyond, *_notes_on_losses(grasps, dialect))
+    notes = _notes_on_widths(grasps.width, opening, gripper) if has_gripper else ()
+    return (*notes, *_notes_on_losses(grasps, format))
 
 
 def _notes_on_widths(width: Array, opening: Array, gripper: Gripper) -> tuple[str, ...]:
     """A note if the hand cannot open or close so far."""
-    opening_tolerance = 1e-6  # Metres by which single precision may exceed the hand's opening.
     low, high = gripper.opening
-    off = [(w < low - opening_tolerance) | (w > high + opening_tolerance) for w in (width, opening)]
+    tolerance = 1e-6  # metres, for widths in single precision
+    off = [(w < low - tolerance) | (w > high + tolerance) for w in (width, opening)]
     count = int((off[0] | off[1]).sum())
     limits = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
     return (f"widths of {count} grasps are outside {limits}",) if count else ()
 
 
-def _notes_on_losses(grasps: GraspSet, dialect: IsaacDialect) -> tuple[str, ...]:
+def _notes_on_losses(grasps: GraspSet, format: GraspFormat) -> tuple[str, ...]:
     notes = []
     known = grasps.score[~np.isnan(grasps.score)]
     if len(known) < len(grasps):
@@ -379,11 +347,11 @@ def _notes_on_losses(grasps: GraspSet, dialect: IsaacDialect) -> tuple[str, ...]
         notes.append(f"{whose} no score: confidence is .nan there.")
     if len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
         notes.append(
-            f"{dialect.title} expects a confidence from 0 to 1; the scores, {known.min():.3g} to"
+            f"{format.title} expects a confidence from 0 to 1; the scores, {known.min():.3g} to"
             f" {known.max():.3g}, are written as they are."
         )
-    of_hand = ("object", "width", PREGRASP_WIDTH_COLUMN) if dialect.names_gripper_frame else ()
-    return (*notes, *conversion_losses(grasps, ("score", "name", *of_hand), dialect.title))
+    of_hand = ("object", "width", PREGRASP_WIDTH_COLUMN) if format is ISAAC_GRASP_FORMAT else ()
+    return (*notes, *conversion_losses(grasps, ("score", "name", *of_hand), format.title))
 
 
 def _grasp_names(grasps: GraspSet) -> list[str]:
@@ -412,21 +380,10 @@ _GRIPPER_KEY = re.compile(
 """A key that describes the gripper or its joints."""
 
 
-def _isaac_X_GF(gripper: Gripper) -> Array:
-    """The hand's body."""
-    return gripper.X_GH
-
-
-def _has_gripper_frame(path: Path) -> bool:
-    """Text with `format: isaac_grasp` that says something of the gripper."""
-    return describes_gripper(path) is True
-
-
 def describes_gripper(path: Path) -> bool | None:
     """Whether text with the line `format: isaac_grasp` has a gripper frame, a gripper's file or
     joints, which GraspGen does not write; None for other files."""
-    # Bytes read at each end of a file; sorted keys have the gripper after the grasps.
-    block_size = 1 << 16
+    block_size = 1 << 16  # read at each end: sorted keys have the gripper after the grasps
     try:
         with path.open("rb") as stream:
             text = stream.read(block_size)
@@ -437,55 +394,32 @@ def describes_gripper(path: Path) -> bool | None:
     return _GRIPPER_KEY.search(text) is not None if _FORMAT_LINE.search(text) else None
 
 
-_ISAAC_DIALECT = IsaacDialect(
-    "isaac_grasp", "Isaac Sim grasp editor", _isaac_X_GF, names_gripper_frame=True
-)
-"""Files of Isaac Sim, with a gripper frame."""
-
-ISAAC_GRASP_FORMAT = GraspFormat(
-    name=_ISAAC_DIALECT.name,
-    title=_ISAAC_DIALECT.title,
+ISAAC_GRASP_FORMAT: GraspFormat = GraspFormat(
+    name="isaac_grasp",
+    title="Isaac Sim grasp editor",
     suffixes=(".yaml", ".yml"),
     frame="object",
     source="Isaac Sim manual, Grasp Editor; Isaac ROS manual, Isaac Grasp File",
     carries=("score as confidence", "width as finger joints", "names of grasps"),
     cannot_carry=("ids", "several objects", "further columns", "scale of the object"),
-    X_GF=_isaac_X_GF,
-    recognises=_has_gripper_frame,
-    read=partial(read_isaac_grasp, _ISAAC_DIALECT),
-    write=partial(write_isaac_grasp, _ISAAC_DIALECT),
+    X_GF=lambda gripper: gripper.X_GH,
+    recognises=lambda path: describes_gripper(path) is True,
+    read=lambda path, gripper: read_isaac_grasp(ISAAC_GRASP_FORMAT, path, gripper),
+    write=lambda grasps, path, hand: write_isaac_grasp(ISAAC_GRASP_FORMAT, grasps, path, hand),
     one_object=True,
 )
-"""The format of Isaac Sim's grasp editor."""
+"""The format of Isaac Sim's grasp editor, with a gripper frame: the hand's body."""
 
-
-def _graspgen_X_GF(gripper: Gripper) -> Array:
-    """The hand's base, x along the closing direction."""
-    return gripper.X_GB
-
-
-def _lacks_gripper_frame(path: Path) -> bool:
-    """`isaac_grasp` YAML without a gripper frame."""
-    return describes_gripper(path) is False
-
-
-_GRASPGEN_DIALECT = IsaacDialect(
-    "graspgen_yaml", "GraspGen predictions", _graspgen_X_GF, names_gripper_frame=False
-)
-"""Predictions of GraspGen, without a gripper frame."""
-
-GRASPGEN_YAML_FORMAT = GraspFormat(
-    name=_GRASPGEN_DIALECT.name,
-    title=_GRASPGEN_DIALECT.title,
-    suffixes=(".yaml", ".yml"),
-    frame="object",
+GRASPGEN_YAML_FORMAT: GraspFormat = replace(
+    ISAAC_GRASP_FORMAT,
+    name="graspgen_yaml",
+    title="GraspGen predictions",
     source="github.com/NVlabs/GraspGen, grasp_gen/dataset/eval_utils.py",
     carries=("score as confidence", "names of grasps"),
     cannot_carry=("ids", "several objects", "the object's name", "width", "further columns"),
-    X_GF=_graspgen_X_GF,
-    recognises=_lacks_gripper_frame,
-    read=partial(read_isaac_grasp, _GRASPGEN_DIALECT),
-    write=partial(write_isaac_grasp, _GRASPGEN_DIALECT),
-    one_object=True,
+    X_GF=lambda gripper: gripper.X_GB,
+    recognises=lambda path: describes_gripper(path) is False,
+    read=lambda path, gripper: read_isaac_grasp(GRASPGEN_YAML_FORMAT, path, gripper),
+    write=lambda grasps, path, hand: write_isaac_grasp(GRASPGEN_YAML_FORMAT, grasps, path, hand),
 )
-"""The format of GraspGen's predictions."""
+"""The format of GraspGen's predictions: the hand's base, x along the closing direction."""

@@ -42,14 +42,13 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     Raises:
         InvalidInputError: wrong shape, not finite, not rigid; the message names the first one.
     """
-    # Largest deviation of R' R from identity, as of files with 3 to 4 decimals.
-    max_rounding = 1e-3
-    note_threshold = 1e-6  # Deviations above it are reported in a note.
+    max_rounding = 1e-3  # of R' R from identity, as of files with 3 to 4 decimals
+    note_threshold = 1e-6
     try:
         poses = np.asarray(X, dtype=float)
     except (TypeError, ValueError) as error:
-        what = f"must hold (N, 4, 4) numbers: {short_message(error)}"
-        raise InvalidInputError(f"{where} {what}") from error
+        message = f"{where} must hold (N, 4, 4) numbers: {short_message(error)}"
+        raise InvalidInputError(message) from error
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise InvalidInputError(f"{where} has shape {poses.shape}; expected (N, 4, 4)")
     _reject_poses(~np.isfinite(poses).all(axis=(1, 2)), where, "has NaN or infinite numbers")
@@ -127,6 +126,5 @@ def _read_pose(reference: str) -> Array:
     poses = poses.reshape(-1, 4, 4)
     if index >= len(poses):
         raise InvalidInputError(f"{path} has poses 0 to {len(poses) - 1}; there is no {index}")
-    checked, _ = nearest_rigid(poses[index : index + 1], f"{path}: pose {index}")
-    X: Array = checked[0]
-    return X
+    (X,), _ = nearest_rigid(poses[index : index + 1], f"{path}: pose {index}")
+    return np.asarray(X)

@@ -45,72 +45,58 @@ from burg_drake.core import (
     rotation_from_quaternion,
     shorten_text,
 )
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, ImportedGrasps, conversion_losses
+from burg_drake.formats.grasp_format import (
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    conversion_losses,
+    file_provenance,
+)
 
-
-class VgnFile:
-    """Vgn file."""
-
-    quaternion = ("qx", "qy", "qz", "qw")  # Columns of the rotation, scalar last.
-    position = ("x", "y", "z")  # Columns of the position, in metres.
-    finger_depth = 0.05  # Metres from the origin of a grasp to the finger tips.
-    header_size = 1 << 16  # Bytes of the first line that are read to recognise a file.
-    norm_tolerance = 1e-3  # Largest deviation of a quaternion's length from 1.
-
-
-VGN_COLUMNS = (
-    "scene_id",
-    *VgnFile.quaternion,
-    *VgnFile.position,
-    "width",
-    "label",
-)  # All columns of a file.
-VGN_REQUIRED_COLUMNS = (*VgnFile.quaternion, *VgnFile.position)
-"""Columns of a pose; files of predictions may have no others."""
+POSE_COLUMNS = ("qx", "qy", "qz", "qw", "x", "y", "z")
+"""Rotation and position in metres; files of predictions may have no other columns."""
+VGN_COLUMNS = ("scene_id", *POSE_COLUMNS, "width", "label")
+"""All columns of a file."""
 
 
 def _X_GF(gripper: Gripper) -> Array:
-    return make_pose(rot_z(-np.pi / 2), (0.0, 0.0, gripper.tip - VgnFile.finger_depth))
+    finger_depth = 0.05  # metres from the origin of a grasp to the finger tips
+    return make_pose(rot_z(-np.pi / 2), (0.0, 0.0, gripper.tip - finger_depth))
 
 
 def _recognise(path: Path) -> bool:
     try:
         with open_regular(path) as stream:
-            header = next(
-                csv.reader([stream.readline(VgnFile.header_size).decode("utf-8-sig")]), []
-            )
+            line = stream.readline(1 << 16).decode("utf-8-sig")
+        header = next(csv.reader([line]), [])
     except (InvalidInputError, UnicodeDecodeError, csv.Error):
         return False
     names = {name.strip() for name in header}
-    return set(VGN_REQUIRED_COLUMNS) <= names and "X_OG" not in names
+    return set(POSE_COLUMNS) <= names and "X_OG" not in names
 
 
 def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
     cells, lines = _read_cells(path)
-    missing = [name for name in VGN_REQUIRED_COLUMNS if name not in cells]
+    missing = [name for name in POSE_COLUMNS if name not in cells]
     if missing:
         raise InvalidInputError(
             f"{path} has no column {', '.join(missing)}; a file of VGN has the columns "
             f"{','.join(VGN_COLUMNS)}"
         )
-    xyzw = np.stack(
-        [_parse_numbers(path, name, cells[name], lines) for name in VgnFile.quaternion], axis=-1
-    )
+    pose = [_parse_numbers(path, name, cells[name], lines) for name in POSE_COLUMNS]
+    xyzw, p_VF = np.stack(pose[:4], axis=-1), np.stack(pose[4:], axis=-1)
     length = np.linalg.norm(xyzw, axis=-1)
-    bad = ~(np.abs(length - 1.0) < VgnFile.norm_tolerance)
+    bad = ~(np.abs(length - 1.0) < 1e-3)
     if bad.any():
         i = int(np.argmax(bad))
         raise InvalidInputError(
             f"{path}:{lines[i]}: qx, qy, qz, qw have length {length[i]:g}; a rotation has length 1"
         )
-    p_VF = np.stack(
-        [_parse_numbers(path, name, cells[name], lines) for name in VgnFile.position], axis=-1
-    )
     X_VF = make_pose(rotation_from_quaternion(np.roll(xyzw, 1, axis=-1)), p_VF)
     columns: dict[str, NDArray[Any]] = {
         name: np.array(texts) if name == "scene_id" else _parse_column(texts)
         for name, texts in cells.items()
-        if name not in (*VGN_REQUIRED_COLUMNS, "width")
+        if name not in (*POSE_COLUMNS, "width")
     }
     width: Array | None = None
     notes: tuple[str, ...] = ()
@@ -121,7 +107,7 @@ def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
         X_VF @ inverse(_X_GF(gripper)),
         object="",
         width=width,
-        provenance={"format": VGN_FORMAT.name, "file": str(path.absolute())},
+        provenance=file_provenance(VGN_FORMAT, path),
         columns=columns,
     )
     return ImportedGrasps(grasps, VGN_FORMAT.frame, notes)
@@ -196,7 +182,7 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     if failed.any():
         widest = f"{gripper.opening[1]:g} m"
         notes += (
-            (f"{int(failed.sum())} failed grasps got the hand's opening of {widest} as width."),
+            f"{int(failed.sum())} failed grasps got the hand's opening of {widest} as width.",
         )
     widths = np.where(failed, gripper.opening[1], grasps.width)
     if np.isnan(widths).any():

@@ -22,82 +22,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import InvalidInputError, data_root, load_plain_yaml
 
 YCB_MASS_SOURCE = "Calli et al. 2015 (IEEE RAM 22(3), object table)"
 """Publication that the masses are from."""
 
-YCB_MASSES = {
-    "001_chips_can": 0.205,
-    "002_master_chef_can": 0.414,
-    "003_cracker_box": 0.411,
-    "004_sugar_box": 0.514,
-    "005_tomato_soup_can": 0.349,
-    "006_mustard_bottle": 0.603,
-    "007_tuna_fish_can": 0.171,
-    "008_pudding_box": 0.187,
-    "009_gelatin_box": 0.097,
-    "010_potted_meat_can": 0.370,
-    "011_banana": 0.066,
-    "012_strawberry": 0.018,
-    "013_apple": 0.068,
-    "014_lemon": 0.029,
-    "015_peach": 0.033,
-    "016_pear": 0.049,
-    "017_orange": 0.047,
-    "018_plum": 0.025,
-    "019_pitcher_base": 0.178,
-    "021_bleach_cleanser": 1.131,
-    "022_windex_bottle": 1.022,
-    "023_wine_glass": 0.133,
-    "024_bowl": 0.147,
-    "025_mug": 0.118,
-    "026_sponge": 0.0062,
-    "027_skillet": 0.950,
-    "028_skillet_lid": 0.652,
-    "029_plate": 0.279,
-    "030_fork": 0.034,
-    "031_spoon": 0.030,
-    "032_knife": 0.031,
-    "033_spatula": 0.0515,
-    "035_power_drill": 0.895,
-    "036_wood_block": 0.729,
-    "037_scissors": 0.082,
-    "038_padlock": 0.304,
-    "039_key": 0.0101,
-    "040_large_marker": 0.0158,
-    "041_small_marker": 0.0082,
-    "042_adjustable_wrench": 0.252,
-    "043_phillips_screwdriver": 0.097,
-    "044_flat_screwdriver": 0.0984,
-    "046_plastic_bolt": 0.0036,
-    "047_plastic_nut": 0.001,
-    "048_hammer": 0.665,
-    "049_small_clamp": 0.0192,
-    "050_medium_clamp": 0.059,
-    "051_large_clamp": 0.125,
-    "052_extra_large_clamp": 0.202,
-    "053_mini_soccer_ball": 0.123,
-    "054_softball": 0.191,
-    "055_baseball": 0.148,
-    "056_tennis_ball": 0.058,
-    "057_racquetball": 0.041,
-    "058_golf_ball": 0.046,
-    "059_chain": 0.098,
-    "061_foam_brick": 0.028,
-    "062_dice": 0.0052,
-    "065-a_cups": 0.013,
-    "065-b_cups": 0.014,
-    "065-c_cups": 0.017,
-    "065-d_cups": 0.019,
-    "065-e_cups": 0.021,
-    "065-f_cups": 0.026,
-    "065-g_cups": 0.028,
-    "065-h_cups": 0.031,
-    "065-i_cups": 0.035,
-    "065-j_cups": 0.038,
-    "076_timer": 0.102,
-    "077_rubiks_cube": 0.094,
+YCB_MASSES: dict[str, float] = {
+    name: float(mass)
+    for name, mass in load_plain_yaml(data_root() / "models/ycb_masses.yaml").items()
 }
 """Published mass of each object, in kg; see the module's docstring."""
 
@@ -116,12 +48,11 @@ YCB_NAMES = {name.split("_", 1)[0]: name for name in (*YCB_MASSES, *YCB_OBJECTS_
 YCB_VARIANTS = ("google_16k", "google_64k", "google_512k", "", "poisson", "tsdf")
 """Scans of an object, best first; empty if no folder names the scan."""
 
-
-_VARIANT_SUFFIX = re.compile(
-    r"_(google_16k|google_64k|google_512k|poisson|tsdf|berkeley_meshes|textured_simple|textured"
-    r"|nontextured)$"
+_VARIANT_SUFFIXES = re.compile(
+    r"(_(google_16k|google_64k|google_512k|poisson|tsdf|berkeley_meshes|textured_simple|textured"
+    r"|nontextured))+$"
 )
-"""Suffix of a name that tells the scan or the kind of mesh."""
+"""Suffixes of a name that tell the scan or the kind of mesh."""
 _NUMBERED_NAME = re.compile(r"(?:ycb_)?(\d{3})(?:[-_]([a-z]))?_(.+)")
 """YCB number, optional letter, and name."""
 
@@ -155,7 +86,7 @@ def find_ycb(folder: str | Path) -> list[YcbObject]:
 
     Returns:
         One entry an object, by number; of several meshes of an object the one that suits best, see
-        `YCB_VARIANTS`, `STEMS` and `SUFFIXES`.
+        `YCB_VARIANTS` and `_identify_mesh`.
 
     Raises:
         InvalidInputError: there is no such folder, or no object of the set in it.
@@ -172,11 +103,9 @@ def find_ycb(folder: str | Path) -> list[YcbObject]:
             archives.append(file)
             continue
         described = _identify_mesh(file)
-        if described is None:
-            continue
-        name, rank = described
-        if name not in found or rank < found[name][0]:
-            found[name] = (rank, file)
+        if described is not None:
+            name, rank = described
+            found[name] = min((rank, file), found.get(name, (rank, file)))
     if not found:
         raise InvalidInputError(_nothing_found(folder, archives))
     return [_make_object(name, *found[name]) for name in sorted(found)]
@@ -184,7 +113,7 @@ def find_ycb(folder: str | Path) -> list[YcbObject]:
 
 def find_ycb_name(text: str) -> str | None:
     """The object that a file or folder is named after, such as `003_cracker_box_google_16k`."""
-    match = _NUMBERED_NAME.fullmatch(_strip_variant_suffixes(text))
+    match = _NUMBERED_NAME.fullmatch(_VARIANT_SUFFIXES.sub("", text.lower()))
     if match is None:
         return None
     digits, letter, rest = match.groups()
@@ -193,38 +122,27 @@ def find_ycb_name(text: str) -> str | None:
 
 
 def _make_object(name: str, rank: tuple[int | str, ...], mesh: Path) -> YcbObject:
-    mass = YCB_MASSES.get(name)
     return YcbObject(
         number=name.split("_", 1)[0],
         name=name,
         mesh=mesh,
         variant=YCB_VARIANTS[int(rank[0])],
-        mass=mass,
-        mass_source=YCB_MASS_SOURCE if mass is not None else "",
+        mass=YCB_MASSES.get(name),
+        mass_source=YCB_MASS_SOURCE if name in YCB_MASSES else "",
     )
 
 
-def _strip_variant_suffixes(text: str) -> str:
-    """Without what layouts add to a name."""
-    text = text.lower()
-    while (shorter := _VARIANT_SUFFIX.sub("", text)) != text:
-        text = shorter
-    return text
-
-
 def _walk_files(folder: Path) -> Iterator[Path]:
-    # Folders of the downloads without surface meshes.
-    ignored_folders = {"clouds", "masks", "poses", "urdf"}
+    without_meshes = {"clouds", "masks", "poses", "urdf"}
     for place, folders, files in os.walk(folder):
-        folders[:] = sorted(f for f in folders if f not in ignored_folders and f[0] != ".")
+        folders[:] = sorted(f for f in folders if f not in without_meshes and f[0] != ".")
         yield from (Path(place, file) for file in sorted(files))
 
 
 def _identify_mesh(file: Path) -> tuple[str, tuple[int | str, ...]] | None:
     """The object that a file shows, and a rank (lower is better); None for any other file."""
-    # File names without suffix, best first; empty: the object's own name.
-    stems = ("textured", "", "textured_simple", "nontextured")
-    suffixes = (".obj", ".ply", ".stl", ".glb", ".gltf")  # Suffixes of mesh files, best first.
+    stems = ("textured", "", "textured_simple", "nontextured")  # best first; "": the object's name
+    suffixes = (".obj", ".ply", ".stl", ".glb", ".gltf")  # best first
     suffix = file.suffix.lower()
     if suffix not in suffixes:
         return None
@@ -258,4 +176,7 @@ def _nothing_found(folder: Path, archives: list[Path]) -> str:
     if archives:
         more = f" and {len(archives) - 1} more" if len(archives) > 1 else ""
         return f"{message} there are archives ({archives[0].name}{more}): unpack them there"
-    return f"{message} nothing is downloaded: get the meshes from https://www.ycbbenchmarks.com/object-models and unpack them there"
+    return (
+        f"{message} nothing is downloaded: get the meshes from"
+        " https://www.ycbbenchmarks.com/object-models and unpack them there"
+    )

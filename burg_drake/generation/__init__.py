@@ -1,6 +1,6 @@
 """Scenes by the thousand: drawn from a recipe, settled, accepted or not, kept in a folder.
 
-Read `sample` first, then `many` and `folder`.
+Read `scene_sampling` first, then `scene_folder`.
 """
 
 import lazy_loader

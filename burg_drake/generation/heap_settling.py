@@ -1,4 +1,4 @@
-"""Settles a heap of objects; objects beyond the board's edge, or still creeping, are dropped again."""
+"""Settles a heap of objects; what lies beyond the board's edge, or creeps, is dropped again."""
 
 from __future__ import annotations
 
@@ -59,24 +59,27 @@ def settle_heap(
         SimulationError: Drake cannot step the scene.
     """
     max_drops = 10  # Times that objects are dropped again.
-    max_margin = 0.03  # Metres within the board's edge: objects still shift when they relax.
-    margin_share = 0.07  # The same as a share of the board's shorter side.
     settler = _HeapSettler(station, check, shapes)
     falling: Collection[str] = scene.instances
-    margin = min(max_margin, margin_share * min(scene.board.size))
+    # Objects still shift when they relax.
+    margin = min(0.03, 0.07 * min(scene.board.size))
     for drops in range(max_drops + 1):
         try:
             dropped = drop_onto_scene(scene, station, falling, shapes, margin)
             lost = scene.instances.keys() - dropped.instances.keys()
             scene = _restore_missing(dropped, scene)
-            scene, faulty = (scene, lost) if lost else settler.settled_or_faulty(scene)
+            scene, faulty = (scene, lost) if lost else settler.settle(scene)
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             raise SimulationError(
                 f"{scene.path}: the heap cannot be simulated: {' '.join(str(error).split())}"
             ) from error
         if not faulty or drops == max_drops:
             break
-        scene, falling, margin = settler.raised_again(scene, faulty, rng), faulty, BOARD_EDGE_MARGIN
+        scene, falling, margin = (
+            settler.raise_faulty_objects(scene, faulty, rng),
+            faulty,
+            BOARD_EDGE_MARGIN,
+        )
     return SettledHeap(scene, tuple(sorted(faulty)), drops)
 
 
@@ -88,17 +91,17 @@ class _HeapSettler:
     check: SceneCheck
     shapes: ObjectShapes
 
-    def settled_or_faulty(self, scene: Scene) -> tuple[Scene, Collection[str]]:
+    def settle(self, scene: Scene) -> tuple[Scene, Collection[str]]:
         """A heap that was relaxed, and what is wrong with it, if anything."""
         # Shares of friction while objects relax: at first, and when they creep.
         friction_shares = (0.25, 0.15, 0.1)
-        faulty = self._misplaced(scene)
+        faulty = self._misplaced_objects(scene)
         if faulty:
             return scene, faulty
         slack, moving = dict.fromkeys(scene.instances, friction_shares[0]), [*scene.instances]
         for share in (*friction_shares[1:], None):
-            scene = self._relaxed(scene, slack, moving)
-            faulty = self._misplaced(scene)
+            scene = self._relax(scene, slack, moving)
+            faulty = self._misplaced_objects(scene)
             if faulty:
                 return scene, faulty
             built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING_ENGINE)
@@ -108,7 +111,7 @@ class _HeapSettler:
             slack |= dict.fromkeys(moving, share)
         return scene, moving
 
-    def raised_again(
+    def raise_faulty_objects(
         self, scene: Scene, faulty: Collection[str], rng: np.random.Generator
     ) -> Scene:
         """The scene with its faulty objects where there is room above the others, large ones
@@ -129,18 +132,16 @@ class _HeapSettler:
         document = replace(scene.document, instances=tuple(found.values()))
         return Scene(document, scene.library, scene.path)
 
-    def _relaxed(self, scene: Scene, slack: Mapping[str, float], moving: Collection[str]) -> Scene:
+    def _relax(self, scene: Scene, slack: Mapping[str, float], moving: Collection[str]) -> Scene:
         """A scene whose objects have come to rest with shares of their friction."""
-        max_time = 1.0  # Seconds of simulation per round of relaxing.
         built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING_ENGINE)
         reduce_friction_of(built, {built.free[name]: share for name, share in slack.items()})
-        guard = BoardEdgeGuard(
-            built, self.shapes, margin=BOARD_EDGE_MARGIN, share=1.0
-        )  # what gets slower is stopped
-        relaxed = relax(built, moving, max_time, before_window=guard.push_back)
+        # The guard stops what gets slower.
+        guard = BoardEdgeGuard(built, self.shapes, margin=BOARD_EDGE_MARGIN, share=1.0)
+        relaxed = relax(built, moving, 1.0, before_window=guard.push_back)
         return _restore_missing(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 
-    def _misplaced(self, scene: Scene) -> set[str]:
+    def _misplaced_objects(self, scene: Scene) -> set[str]:
         """Objects that are where a scene may have nothing."""
         return {issue.instance for issue in self.check.issues(scene) if issue.is_error}
 

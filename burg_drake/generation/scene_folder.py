@@ -8,10 +8,9 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, fields
+from functools import lru_cache, partial
 from pathlib import Path
-from types import TracebackType
 
 from burg_drake.core import (
     DocumentError,
@@ -35,7 +34,7 @@ from burg_drake.generation.scene_sampling import (
 )
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.scene import SamplingProvenance, SceneDocument, SceneRecipe, save_scene
-from burg_drake.station import Station, StationLike, as_station, load_station
+from burg_drake.station import StationLike, as_station, load_station
 
 
 @dataclass(frozen=True)
@@ -76,38 +75,31 @@ class SceneRow:
     def text(self) -> str:
         """A line of the table."""
         line = io.StringIO()
+        accepted, missing = "yes" if self.accepted else "no", " ".join(self.missing)
         reasons = "; ".join(f"{count} x {reason}" for reason, count in sorted(self.refused.items()))
         csv.writer(line, lineterminator="\n").writerow(
-            [
-                self.scene,
-                "yes" if self.accepted else "no",
-                self.objects,
-                " ".join(self.missing),
-                self.attempts,
-                self.tries,
-                reasons,
-            ]
+            [self.scene, accepted, self.objects, missing, self.attempts, self.tries, reasons]
         )
         return line.getvalue()
 
     @classmethod
-    def read(cls, fields: Mapping[str, str]) -> SceneRow:
+    def read(cls, cells: Mapping[str, str]) -> SceneRow:
         """Reads a line.
 
         Raises:
             ValueError, KeyError, TypeError: it was not written by `text`.
         """
         refused = {}
-        for part in filter(None, fields["refused"].split("; ")):
+        for part in filter(None, cells["refused"].split("; ")):
             count, _, reason = part.partition(" x ")
             refused[reason] = int(count)
         return cls(
-            int(fields["scene"]),
-            {"yes": True, "no": False}[fields["accepted"]],
-            int(fields["objects"]),
-            tuple(fields["missing"].split()),
-            int(fields["attempts"]),
-            int(fields["tries"]),
+            int(cells["scene"]),
+            {"yes": True, "no": False}[cells["accepted"]],
+            int(cells["objects"]),
+            tuple(cells["missing"].split()),
+            int(cells["attempts"]),
+            int(cells["tries"]),
             refused,
         )
 
@@ -150,9 +142,9 @@ class SceneFolder:
         else:
             save_document(provenance, recipe, "What the scenes of this folder were made with.")
         self._table = self.path / "scenes.csv"
-        self.rows = {row.scene: row for row in read_scene_table(self._table)}
+        rows = read_scene_table(self._table)
         self.rows = {
-            n: row for n, row in self.rows.items() if not row.accepted or self.file(n).is_file()
+            row.scene: row for row in rows if not row.accepted or self.file(row.scene).is_file()
         }
         for number, row in self.rows.items():
             if row.accepted:
@@ -184,21 +176,15 @@ class SceneFolder:
 
     def sort(self) -> None:
         """Writes the table in the order of the scenes."""
-        columns = ("scene", "accepted", "objects", "missing", "attempts", "tries", "refused")
         rows = [self.rows[number].text() for number in sorted(self.rows)]
-        text = ",".join(columns) + "\n" + "".join(rows)
+        text = ",".join(field.name for field in fields(SceneRow)) + "\n" + "".join(rows)
         if not self._table.is_file() or self._table.read_bytes() != text.encode():
             atomic_write(self._table, text)
 
     def __enter__(self) -> SceneFolder:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._lock.release()
 
 
@@ -215,16 +201,15 @@ def read_scene_table(path: Path) -> list[SceneRow]:
     Raises:
         InvalidInputError: it is not a file, or cannot be read.
     """
-    max_bytes = 1 << 28  # A row has some hundred bytes.
     if not path.exists():
         return []
     with open_regular(path) as stream:
-        text = stream.read(max_bytes).decode(errors="replace")
+        text = stream.read(1 << 28).decode(errors="replace")
     whole = text[: text.rfind("\n") + 1]
     rows = []
-    for fields in csv.DictReader(io.StringIO(whole)):
+    for cells in csv.DictReader(io.StringIO(whole)):
         try:
-            rows.append(SceneRow.read(fields))
+            rows.append(SceneRow.read(cells))
         except (ValueError, KeyError, TypeError, AttributeError):
             continue
     return rows
@@ -246,14 +231,6 @@ class SamplingInputs:
     station: Path
     contents: tuple[str, str]
     folder: Path
-
-
-@dataclass(frozen=True)
-class SceneTask:
-    """A scene to sample: where, and its number."""
-
-    inputs: SamplingInputs
-    number: int
 
 
 @dataclass(frozen=True)
@@ -307,19 +284,20 @@ def sample_scenes(
     require_possible_recipe(recipe, library, station)
     provenance = sampling_provenance(recipe, library, station)
     with SceneFolder(folder, provenance) as opened:
-        inputs = _sampling_inputs(provenance, library, station, opened.path)
-        todo = [SceneTask(inputs, number) for number in range(count) if number not in opened.rows]
+        contents = (provenance.library_content, provenance.station_content)
+        inputs = SamplingInputs(recipe, library.root, station.path, contents, opened.path)
+        todo = [number for number in range(count) if number not in opened.rows]
         if known is not None:
             known(count - len(todo))
         new: list[int] = []
         failed: dict[int, str] = {}
         try:
-            for work, outcome in map_unordered(run_scene_task, todo, workers):
+            for number, outcome in map_unordered(partial(run_scene_task, inputs), todo, workers):
                 if isinstance(outcome, BaseException):
-                    failed[work.number] = one_line(outcome)
+                    failed[number] = one_line(outcome)
                     continue
                 opened.add(outcome)
-                new.append(work.number)
+                new.append(number)
                 if progress is not None:
                     progress(outcome)
         finally:
@@ -328,24 +306,17 @@ def sample_scenes(
     return SampledFolder(rows, tuple(sorted(new)), failed)
 
 
-def run_scene_task(work: SceneTask) -> SampledScene:
-    """Samples one scene.
+def run_scene_task(inputs: SamplingInputs, number: int) -> SampledScene:
+    """Samples the scene of a number, in a worker.
 
     Raises:
         SimulationError: Drake ended by a failed condition.
         Exception: what cannot be simulated is one failure.
     """
     try:
-        return _worker_sampler(work.inputs).sample(work.number, work.inputs.folder)
+        return _worker_sampler(inputs).sample(number, inputs.folder)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
         raise SimulationError(f"Drake failed: {error}") from error
-
-
-def _sampling_inputs(
-    provenance: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
-) -> SamplingInputs:
-    contents = (provenance.library_content, provenance.station_content)
-    return SamplingInputs(provenance.recipe, library.root, station.path, contents, folder)
 
 
 @lru_cache(maxsize=1)

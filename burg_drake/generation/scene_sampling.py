@@ -80,15 +80,12 @@ def find_broken_rule(scene: Scene, station: Station, recipe: SceneRecipe) -> str
         BurgError: the arm collides in its home posture, for example; see
             `evaluation.grasp_sets.clear_counts`.
     """
-    min_visible = 0.5  # Share of an object's silhouette that the camera must see.
-    min_sampled = 50  # Grasps that are sampled for each object.
-    per_clear_grasp = 2  # Grasps that are sampled for each one that has to be clear.
     if recipe.visible_from:
         seen = visible_from(scene, station, recipe.visible_from)
-        if min(seen.values(), default=0.0) < min_visible:
+        if min(seen.values(), default=0.0) < 0.5:  # of an object's silhouette
             return HIDDEN_REASON
     if recipe.clear_grasps:
-        sampled = max(min_sampled, per_clear_grasp * recipe.clear_grasps)
+        sampled = max(50, 2 * recipe.clear_grasps)
         clear = clear_grasp_counts(scene, station, grasps_per_object=sampled)
         if min(clear.values(), default=0) < recipe.clear_grasps:
             return FEW_GRASPS_REASON
@@ -139,8 +136,8 @@ class SceneSampler:
     def __init__(self, recipe: SceneRecipe, library: ObjectLibrary, station: Station) -> None:
         """
         Raises:
-            UnknownNameError, InvalidInputError: see `require_possible_recipe`; or the station's robot
-                cannot be built.
+            UnknownNameError, InvalidInputError: see `require_possible_recipe`; or the station's
+                robot cannot be built.
         """
         require_possible_recipe(recipe, library, station)
         self.recipe, self.library, self.station = recipe, library, station
@@ -171,12 +168,14 @@ class SceneSampler:
         tries = 0
         best: tuple[Scene, tuple[str, ...]] | None = None
         for attempt in range(1, self.recipe.attempts + 1):
-            scene, missing, used = self._draw(number, attempt, folder or Path())
+            scene, missing, used = self._draw_scene(number, attempt, folder or Path())
             tries += used
             enough = not missing or (self.recipe.fewer and bool(scene.instances))
             again = rng_from("dropped again", self._content, number, attempt)
             reason, scene = (
-                self._settled(scene, again) if enough else ("an object found no place", scene)
+                self._settle_or_refuse(scene, again)
+                if enough
+                else ("an object found no place", scene)
             )
             if not reason:
                 scene = self._with_origin(scene, number, attempt)
@@ -191,7 +190,9 @@ class SceneSampler:
             best[0], number, False, best[1], self.recipe.attempts, tries, dict(reasons)
         )
 
-    def _draw(self, number: int, attempt: int, folder: Path) -> tuple[Scene, tuple[str, ...], int]:
+    def _draw_scene(
+        self, number: int, attempt: int, folder: Path
+    ) -> tuple[Scene, tuple[str, ...], int]:
         """An attempt before it is settled, what is missing in it, and the tries that it took."""
         recipe = self.recipe
         first = 1 if attempt <= attempts_with_same_objects(recipe) else attempt
@@ -217,28 +218,28 @@ class SceneSampler:
         scene = Scene(document, self.library, folder / f"{name}.yaml")
         return scene, laid_out.missing, laid_out.tries
 
-    def _settled(self, scene: Scene, rng: np.random.Generator) -> tuple[str, Scene]:
+    def _settle_or_refuse(self, scene: Scene, rng: np.random.Generator) -> tuple[str, Scene]:
         """The first reason to refuse a scene, if any, and the scene at rest."""
         moving_reason = "an object did not come to rest"
-        found = self._faults(scene)
+        found = self._find_issue_reason(scene)
         if found:
             return found, scene
         if self.recipe.settle and self.recipe.layout == "heap":
             heap = settle_heap(scene, self.station, self._check, self._shapes, rng)
             scene = heap.scene
             if heap.faulty:
-                return self._faults(scene) or moving_reason, scene
+                return self._find_issue_reason(scene) or moving_reason, scene
         elif self.recipe.settle:
             settled = settle_scene(scene, self.station)
             if settled.fallen or settled.moving:
                 return "an object fell off the table" if settled.fallen else moving_reason, scene
             scene = settled.scene
-            found = self._faults(scene)
+            found = self._find_issue_reason(scene)
             if found:
                 return found, scene
         return find_broken_rule(scene, self.station, self.recipe), scene
 
-    def _faults(self, scene: Scene) -> str:
+    def _find_issue_reason(self, scene: Scene) -> str:
         """What keeps a scene from being built as its document says; "" if nothing does.
 
         A heap is too dear to be dropped again for surfaces that overlap.
@@ -255,9 +256,7 @@ class SceneSampler:
 
 def attempts_with_same_objects(recipe: SceneRecipe) -> int:
     """Number of attempts in which a scene keeps the objects that were drawn for it."""
-    # Share of attempts with the same objects, so that often refused ones do not get rare.
-    same_objects_share = 0.8
-    return max(1, round(same_objects_share * recipe.attempts))
+    return max(1, round(0.8 * recipe.attempts))  # so that often refused objects do not get rare
 
 
 def sample_scene(

@@ -113,7 +113,7 @@ class Body:
             ]
             asked = pairs[chosen]
             floor = np.maximum(depth[asked.grasp], CONTACT_TOLERANCE)
-            found = self._measured(hand, asked, piece[chosen], floor, faces_only)
+            found = self._exact_depths(hand, asked, piece[chosen], floor, faces_only)
             np.maximum.at(depth, asked.grasp, np.where(found > floor, found, 0.0))
         return depth
 
@@ -138,7 +138,7 @@ class Body:
         left = np.flatnonzero(bound > CONTACT_TOLERANCE)
         return pair[left], piece[left], bound[left]
 
-    def _measured(
+    def _exact_depths(
         self, hand: HandParts, pairs: HandBodyPairs, piece: Indices, floor: Array, faces_only: bool
     ) -> Array:
         """(L,) depths of pairs with one piece each [m]; below the floor (L,) some number that is
@@ -151,10 +151,10 @@ class Body:
             for k in range(0, len(chosen), block):
                 some = chosen[k : k + block]
                 one = int(piece[some[0]])
-                found[some] = self._of_piece(hand, pairs[some], one, floor[some], faces_only)
+                found[some] = self._piece_depths(hand, pairs[some], one, floor[some], faces_only)
         return found
 
-    def _of_piece(
+    def _piece_depths(
         self, hand: HandParts, pairs: HandBodyPairs, piece: int, floor: Array, faces_only: bool
     ) -> Array:
         """The same for one piece, and for one part or any number of boxes."""
@@ -194,7 +194,6 @@ def swept_shape(shape: Shape, shift_B: Array) -> list[Shape]:
         One shape in B, or three for a ball: a cylinder and the balls at its ends. They are exact,
         but for a cylinder that is swept across its axis: see `SWEPT_CYLINDER_SIDES`.
     """
-    parallel_sine = 1e-9  # Largest sine between the axis and a parallel path.
     length = float(np.linalg.norm(shift_B))
     if length == 0.0:
         return [shape]
@@ -206,7 +205,7 @@ def swept_shape(shape: Shape, shift_B: Array) -> list[Shape]:
             tube = Shape.cylinder(make_pose(R_BC, middle[:3, 3]), radius, length / 2)
             return [shape, Shape.ball(make_pose(p_AB=shift_B) @ X_BP, radius), tube]
         case Cylinder(radius=radius, half_length=half_length):
-            if np.linalg.norm(np.cross(R_BP[:, 2], shift_B / length)) <= parallel_sine:
+            if np.linalg.norm(np.cross(R_BP[:, 2], shift_B / length)) <= 1e-9:  # along its axis
                 return [Shape.cylinder(middle, radius, half_length + length / 2)]
             prism = Polytope.prism(
                 radius / np.cos(np.pi / SWEPT_CYLINDER_SIDES), half_length, SWEPT_CYLINDER_SIDES

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, Indices, transform_points
-from burg_drake.geometry.convex_shapes import Ball, Cylinder, Shape
+from burg_drake.geometry.convex_shapes import Ball, Cylinder, Shape, dot
 from burg_drake.geometry.poses import Poses
 
 DISTANCE_TOLERANCE = 1e-9
@@ -72,7 +72,7 @@ class ShapeBatch:
         discs = np.flatnonzero(self.disc[shape])
         if len(discs):
             u1, u2 = (u[:, shape[discs]] for u in self.across)
-            h1, h2 = _dot(d[:, discs], u1), _dot(d[:, discs], u2)
+            h1, h2 = dot(d[:, discs], u1), dot(d[:, discs], u2)
             length = np.sqrt(h1 * h1 + h2 * h2)
             length[length == 0.0] = np.inf
             found[:, discs] += self.disc[shape[discs]] * (h1 / length * u1 + h2 / length * u2)
@@ -109,8 +109,8 @@ def shape_distances(
         ceiling: (L,) distances above it need not be known [m].
 
     Returns:
-        (L,) distances [m], to within `DISTANCE_TOLERANCE`; inf for some that are above the ceiling. Shapes
-        that touch or overlap are at most `DISTANCE_TOLERANCE` apart.
+        (L,) distances [m], to within `DISTANCE_TOLERANCE`; inf for some that are above the ceiling.
+        Shapes that touch or overlap are at most `DISTANCE_TOLERANCE` apart.
     """
     found = np.empty(len(shape))
     limit = np.broadcast_to(ceiling, found.shape)
@@ -149,21 +149,21 @@ class _DistanceSearch:
         v = self._support(live, self._direction)
         corners = np.stack([v, v, v], axis=1)
         for _ in range(max_steps):
-            length = np.sqrt(_dot(v, v))
+            length = np.sqrt(dot(v, v))
             found[live] = length
             w = self._support(live, v)
-            reach = _dot(v, w)  # no point of the difference is nearer to the plane across v
+            reach = dot(v, w)  # no point of the difference is nearer to the plane across v
             with np.errstate(invalid="ignore"):  # inf times 0, which is not far
                 far = reach > (ceiling[live] + balls[live]) * length
             found[live[far]] = np.inf
             left = ~far & (reach < (length - DISTANCE_TOLERANCE) * length)
             live, v, w, corners = live[left], v[:, left], w[:, left], corners[..., left]
             nearer, corners = _nearest_point(w, corners, reach[left] < 0.0)
-            better = _dot(nearer, nearer) < _dot(v, v)  # else rounding is all that is left
+            better = dot(nearer, nearer) < dot(v, v)  # else rounding is all that is left
             live, v, corners = live[better], nearer[:, better], corners[..., better]
             if not len(live):
                 break
-        found[live] = np.sqrt(_dot(v, v))
+        found[live] = np.sqrt(dot(v, v))
         return np.asarray(np.maximum(found - balls, 0.0))
 
     def _support(self, pair: Indices, v: Array) -> Array:
@@ -188,7 +188,7 @@ def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> 
     """
     e = corners - w[:, None]
     f = e[:, [1, 2, 0]]
-    ee, ef, we = _dot(e, e), _dot(e, f), _dot(w[:, None], e)
+    ee, ef, we = dot(e, e), dot(e, f), dot(w[:, None], e)
     ff, wf = ee[[1, 2, 0]], we[[1, 2, 0]]
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(ee > 0.0, np.clip(-we / ee, 0.0, 1.0), 0.0)
@@ -196,7 +196,7 @@ def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> 
         r, s = (ef * wf - ff * we) / area, (ef * we - ee * wf) / area
         on_face = (r > 0.0) & (s > 0.0) & (r + s < 1.0)
         points = w[:, None] + np.concatenate([t * e, np.where(on_face, r * e + s * f, 0.0)], axis=1)
-    best = _dot(points, points).argmin(axis=0)
+    best = dot(points, points).argmin(axis=0)
     pair = np.arange(w.shape[1])
     first = best % 3
     second = np.where(best >= 3, (first + 1) % 3, first)
@@ -211,15 +211,10 @@ def _contains_origin(w: Array, e: Array) -> NDArray[np.bool_]:
     """Whether the origin is inside of tetrahedra (L,) with a corner w (3, L) and edges e (3, 3, L)
     from there."""
     n = [_cross(e[:, k - 2], e[:, k - 1]) for k in range(3)]
-    volume = _dot(e[:, 0], n[0])
-    shares = [-_dot(w, normal) * np.sign(volume) for normal in n]
+    volume = dot(e[:, 0], n[0])
+    shares = [-dot(w, normal) * np.sign(volume) for normal in n]
     inside = (shares[0] > 0.0) & (shares[1] > 0.0) & (shares[2] > 0.0)
     return np.asarray(inside & (shares[0] + shares[1] + shares[2] < np.abs(volume)))
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Inner products of vectors (3, ...)."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -27,20 +27,20 @@ class Convex(Protocol):
     `vertices` its vertices, (M, V), all in B.
     """
 
-    def some(self, pairs: NDArray[np.intp]) -> Convex:
+    def select(self, pairs: NDArray[np.intp]) -> Convex:
         """The shape of some of the pairs."""
         ...
 
-    def reach(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
+    def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
         """How far the shape reaches against directions `a`: largest `-a . p` [m]. They are (M, K),
         or (L,) with the pairs (L,) that they belong to."""
         ...
 
-    def along_own_faces(self, vertices: Components) -> Array:
+    def own_face_overlap(self, vertices: Components) -> Array:
         """(M,) smallest overlap along normals of the shape's own faces [m]."""
         ...
 
-    def along_edges(self, one: Polytope, normals: Components, vertices: Components) -> Array:
+    def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
         """(M,) smallest overlap along directions that come of edges of both shapes, or of its
         curved surface [m]."""
         ...
@@ -56,21 +56,21 @@ class Boxes:
 
     half: Array
 
-    def some(self, pairs: NDArray[np.intp]) -> Boxes:
+    def select(self, pairs: NDArray[np.intp]) -> Boxes:
         return Boxes(self.half[pairs])
 
-    def reach(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
+    def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
         x, y, z = self.half[:, :, None].swapaxes(0, 1) if pair is None else self.half[pair].T
         return np.abs(a[0]) * x + np.abs(a[1]) * y + np.abs(a[2]) * z
 
-    def along_own_faces(self, vertices: Components) -> Array:
+    def own_face_overlap(self, vertices: Components) -> Array:
         slabs = [
             np.minimum(half + v.max(axis=1), half - v.min(axis=1))
             for half, v in zip(self.half.T, vertices, strict=True)
         ]
         return np.minimum(np.minimum(slabs[0], slabs[1]), slabs[2])
 
-    def along_edges(self, one: Polytope, normals: Components, vertices: Components) -> Array:
+    def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
         found = [silhouette_overlap(self, one, u, normals, vertices) for u in np.eye(3)]
         return np.minimum(np.minimum(found[0], found[1]), found[2])
 
@@ -85,13 +85,13 @@ class Hull:
 
     polytope: Polytope
 
-    def some(self, pairs: NDArray[np.intp]) -> Hull:
+    def select(self, pairs: NDArray[np.intp]) -> Hull:
         return self
 
-    def reach(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
+    def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
         return max_projection((-a[0], -a[1], -a[2]), self.polytope.vertices)
 
-    def along_own_faces(self, vertices: Components) -> Array:
+    def own_face_overlap(self, vertices: Components) -> Array:
         found = np.full(len(vertices[0]), np.inf)
         for normal, offset in zip(self.polytope.normals, self.polytope.offsets, strict=True):
             np.minimum(
@@ -99,7 +99,7 @@ class Hull:
             )
         return found
 
-    def along_edges(self, one: Polytope, normals: Components, vertices: Components) -> Array:
+    def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
         found = np.full(len(vertices[0]), np.inf)
         for u in self._edge_directions():
             np.minimum(found, silhouette_overlap(self, one, u, normals, vertices), out=found)
@@ -125,16 +125,16 @@ class Ball:
 
     radius: float
 
-    def some(self, pairs: NDArray[np.intp]) -> Ball:
+    def select(self, pairs: NDArray[np.intp]) -> Ball:
         return self
 
-    def reach(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
+    def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
         return np.full_like(a[0], self.radius)
 
-    def along_own_faces(self, vertices: Components) -> Array:
+    def own_face_overlap(self, vertices: Components) -> Array:
         return np.full(len(vertices[0]), np.inf)
 
-    def along_edges(self, one: Polytope, normals: Components, vertices: Components) -> Array:
+    def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
         """Along the way from the nearest point of each edge to the centre."""
         first, second = one.edge_vertices.T
         start = map_components(lambda v: v[:, first], vertices)
@@ -156,17 +156,17 @@ class Cylinder:
     radius: float
     half_length: float
 
-    def some(self, pairs: NDArray[np.intp]) -> Cylinder:
+    def select(self, pairs: NDArray[np.intp]) -> Cylinder:
         return self
 
-    def reach(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
+    def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
         return self.radius * np.sqrt(a[0] * a[0] + a[1] * a[1]) + self.half_length * np.abs(a[2])
 
-    def along_own_faces(self, vertices: Components) -> Array:
+    def own_face_overlap(self, vertices: Components) -> Array:
         z = vertices[2]
         return self.half_length + np.minimum(z.max(axis=1), -z.min(axis=1))
 
-    def along_edges(self, one: Polytope, normals: Components, vertices: Components) -> Array:
+    def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
         """Across the axis, away from edges and from vertices; and where edges meet a rim."""
         across = silhouette_overlap(self, one, np.eye(3)[2], normals, vertices)
         x, y, z = vertices
@@ -181,8 +181,8 @@ def map_components(f: Callable[..., Array], *vectors: Components) -> Components:
     return x, y, z
 
 
-def dot(a: Components, b: Components) -> Array:
-    """Inner products of vectors of the same shape."""
+def dot(a: Components | Array, b: Components | Array) -> Array:
+    """Inner products of vectors of the same shape, whose components come first."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -218,7 +218,7 @@ def silhouette_overlap(
     a = map_components(lambda n: (1.0 - t) * n[pair, first] + t * n[pair, second], normals)
     end = one.edge_vertices[edge, 0]
     q = map_components(lambda v: v[pair, end], vertices)
-    overlap = (dot(a, q) + other.reach(a, pair)) / np.sqrt(dot(a, a))
+    overlap = (dot(a, q) + other.support_distance(a, pair)) / np.sqrt(dot(a, a))
     start = np.flatnonzero(np.diff(pair, prepend=-1))
     found[pair[start]] = np.minimum.reduceat(overlap, start)
     return found
@@ -237,7 +237,7 @@ def edge_arc_overlap(
 
     def overlap(t: Array | float) -> Array:
         a = map_components(lambda x, y: (1.0 - t) * x + t * y, n1, n2)
-        return np.asarray((dot(a, q) + other.reach(a)) / np.sqrt(dot(a, a)))
+        return np.asarray((dot(a, q) + other.support_distance(a)) / np.sqrt(dot(a, a)))
 
     samples = np.linspace(0.0, 1.0, n_samples)
     best = np.argmin([overlap(t) for t in samples], axis=0)
@@ -336,14 +336,14 @@ def penetration_depths(
     normals = _rotate_components(X_BA.R, one.normals)
     p = X_BA.p[:, :, None].swapaxes(0, 1)
     vertices = map_components(np.add, _rotate_components(X_BA.R, one.vertices), (p[0], p[1], p[2]))
-    overlap = dot(normals, (p[0], p[1], p[2])) + one.offsets + other.reach(normals)
-    depth = np.minimum(overlap.min(axis=1), other.along_own_faces(vertices))
+    overlap = dot(normals, (p[0], p[1], p[2])) + one.offsets + other.support_distance(normals)
+    depth = np.minimum(overlap.min(axis=1), other.own_face_overlap(vertices))
     left = np.flatnonzero(depth > floor)
     if len(left) and not faces_only:
         normals, vertices = (
             map_components(lambda v: v[left], part) for part in (normals, vertices)
         )
-        edges = other.some(left).along_edges(one, normals, vertices)
+        edges = other.select(left).edge_overlap(one, normals, vertices)
         depth[left] = np.minimum(depth[left], edges)
     return depth
 

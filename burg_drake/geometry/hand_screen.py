@@ -31,9 +31,12 @@ class SceneBoxes:
 
     Attributes:
         X_BW: (B,) poses of the world in the bodies.
+        parts, pieces: the parts of the hand, and the pieces of all bodies.
     """
 
     def __init__(self, hand: HandParts, bodies: Sequence[Body]) -> None:
+        self.parts = ShapeBatch.of(hand.shapes)
+        self.pieces = ShapeBatch.of([piece for body in bodies for piece in body.pieces])
         self._X_GH = hand.X_HG.inverse()
         self._hand_half, self._radius = hand.half, hand.radius
         inverses = [body.X_WB.inverse() for body in bodies]
@@ -98,47 +101,31 @@ def _signed_box_distance(x: Array, y: Array, z: Array) -> Array:
     return np.asarray(distance + np.minimum(np.maximum(np.maximum(x, y), z), 0.0))
 
 
-class NearestBody:
-    """Finds the body that is nearest to the open hand.
+class _NearestSearch:
+    """The search for the body that is nearest to the open hand.
 
     Args:
-        hand: convex parts of the open hand.
-        bodies: at least one.
+        X_WG: N grasps at which the hand overlaps nothing.
+        boxes: of the scene, which has at least one body.
+
+    Attributes:
+        nearest, distance: (N,) indices of the nearest bodies and their distances [m], as far as is
+            known.
     """
 
-    def __init__(self, hand: HandParts, bodies: Sequence[Body]) -> None:
-        self._boxes = SceneBoxes(hand, bodies)
-        self._parts = ShapeBatch.of(hand.shapes)
-        self._pieces = ShapeBatch.of([piece for body in bodies for piece in body.pieces])
-
-    def measure(self, X_WG: Array) -> tuple[Indices, Array]:
-        """The nearest body at each grasp.
-
-        Args:
-            X_WG: (N, 4, 4) grasps at which the hand overlaps nothing.
-
-        Returns:
-            Indices (N,) of bodies and distances (N,) [m].
-        """
-        search = _NearestSearch(Poses.of(X_WG), self._boxes, self._parts, self._pieces)
-        bound = self._boxes.around_bodies(search.X_WG)
-        first = bound <= np.maximum(bound.min(axis=(1, 2), keepdims=True), 0.0)
-        search.go_on(np.nonzero(first))
-        search.go_on(np.nonzero(~first & (bound < search.distance[:, None, None])))
-        return search.nearest, search.distance
-
-
-class _NearestSearch:
-    """The nearest bodies (N,) of N grasps and their distances (N,) [m] as far as is known."""
-
-    def __init__(
-        self, X_WG: Poses, boxes: SceneBoxes, parts: ShapeBatch, pieces: ShapeBatch
-    ) -> None:
-        self.X_WG, self._boxes, self._parts, self._pieces = X_WG, boxes, parts, pieces
+    def __init__(self, X_WG: Poses, boxes: SceneBoxes) -> None:
+        self.X_WG, self._boxes = X_WG, boxes
         self.nearest = np.zeros(len(X_WG.p), dtype=np.intp)
         self.distance = np.full(len(X_WG.p), np.inf)
 
-    def go_on(self, pairs: Pairs) -> None:
+    def run(self) -> None:
+        """Measures the pairs with the lowest bounds first, then those that may be nearer."""
+        bound = self._boxes.around_bodies(self.X_WG)
+        first = bound <= np.maximum(bound.min(axis=(1, 2), keepdims=True), 0.0)
+        self._measure_pairs(np.nonzero(first))
+        self._measure_pairs(np.nonzero(~first & (bound < self.distance[:, None, None])))
+
+    def _measure_pairs(self, pairs: Pairs) -> None:
         """Takes pairs of parts and bodies into account, in the order of the grasps."""
         place, pieces, bound = self._boxes.around_pieces(self.X_WG, pairs)
         grasp, part, body = pairs
@@ -166,7 +153,8 @@ class _NearestSearch:
         grasp, body = asked.grasp, asked.body
         X_BG = self._boxes.X_BW[body] @ self.X_WG[grasp]
         found = shape_distances(
-            *(self._parts, asked.part, self._pieces, asked.piece, X_BG), self.distance[grasp]
+            *(self._boxes.parts, asked.part, self._boxes.pieces, asked.piece, X_BG),
+            self.distance[grasp],
         )
         order = np.lexsort((found, grasp))
         best = order[np.diff(grasp[order], prepend=-1) != 0]
@@ -223,7 +211,7 @@ class HandScreen:
         max_pairs = 2**20  # Bounding boxes in a batch; bounds the memory to some 100 MB.
         self._hand = HandParts(hand)
         self.bodies = dict(bodies)
-        self._nearest = NearestBody(self._hand, list(bodies.values())) if bodies else None
+        self._boxes = SceneBoxes(self._hand, list(bodies.values())) if bodies else None
         sizes = [body.size for body in bodies.values()]
         self._chunk = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sizes, default=1))))
         self._chunk_of_all = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sum(sizes), 1))))
@@ -237,7 +225,7 @@ class HandScreen:
             X_WG: (N, 4, 4) grasps in the world.
             order: names of all bodies that count.
             faces_only: take for overlaps what no face separates, and upper bounds for depths; see
-                `penetration.penetration_depths`.
+                `penetration_depths`.
 
         Returns:
             Names (N,) of the bodies, "" where the hand overlaps none of them, and depths (N,) of
@@ -262,17 +250,18 @@ class HandScreen:
             X_WG: (N, 4, 4) grasps in the world at which the hand overlaps nothing.
 
         Returns:
-            Names (N,) of the bodies and distances (N,) [m], to within `distance.TOLERANCE`; ""
+            Names (N,) of the bodies and distances (N,) [m], to within `DISTANCE_TOLERANCE`; ""
             and inf in a scene without bodies.
         """
         names, distances = np.full(len(X_WG), "", dtype=object), np.full(len(X_WG), np.inf)
-        if self._nearest is None:
+        if self._boxes is None:
             return names, distances
         every = np.array(list(self.bodies), dtype=object)
         for k in range(0, len(X_WG), self._chunk_of_all):
             chunk = slice(k, k + self._chunk_of_all)
-            body, distances[chunk] = self._nearest.measure(X_WG[chunk])
-            names[chunk] = every[body]
+            search = _NearestSearch(Poses.of(X_WG[chunk]), self._boxes)
+            search.run()
+            names[chunk], distances[chunk] = every[search.nearest], search.distance
         return names, distances
 
 

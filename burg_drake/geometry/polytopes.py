@@ -67,10 +67,8 @@ def reduced_hull(points: Array, max_vertices: int = 64, tolerance: float = 2e-4)
     Raises:
         scipy.spatial.QhullError: the points lie in a plane.
     """
-    small_hull = 16  # Vertices up to which a hull is not reduced.
-    n_added = 4  # Vertices added between two computations of the hull.
     candidates = points[np.sort(convex_hull(points).vertices)]
-    if len(candidates) <= min(small_hull, max_vertices):
+    if len(candidates) <= min(16, max_vertices):
         return hull_mesh(candidates)
     directions = np.array(
         [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z]
@@ -84,9 +82,10 @@ def reduced_hull(points: Array, max_vertices: int = 64, tolerance: float = 2e-4)
         farthest = [i for i in np.argsort(-outside, kind="stable") if outside[i] > tolerance]
         if not farthest:
             break
-        # one vertex a facet, as each brings down the distances of its neighbours
+        # One vertex a facet, as each brings down the distances of its neighbours, and at most four
+        # between two computations of the hull.
         _, first = np.unique(facet[farthest], return_index=True)
-        new = [int(farthest[i]) for i in np.sort(first)[:n_added]]
+        new = [int(farthest[i]) for i in np.sort(first)[:4]]
         chosen += new[: max_vertices - len(chosen)]
     return hull_mesh(candidates[sorted(chosen)])
 

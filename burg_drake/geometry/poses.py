@@ -1,4 +1,4 @@
-"""Poses in batches by elementwise arithmetic: the result for a pose does not depend on its batch."""
+"""Poses in batches by elementwise arithmetic: results do not depend on the batch."""
 
 from __future__ import annotations
 

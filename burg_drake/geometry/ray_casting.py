@@ -1,4 +1,4 @@
-"""Rays against triangle meshes on embree's bounding volume hierarchy, and sampling of mesh surfaces."""
+"""Rays against triangle meshes, by embree's bounding volume hierarchy, and sampling of surfaces."""
 
 from __future__ import annotations
 
@@ -33,14 +33,12 @@ class RayCaster:
             vertices: (V, 3) [m].
             faces: (F, 3) indices of their corners, F >= 1.
         """
-        # Share of the mesh's bounding radius, so that rays miss the face that they start on.
-        start_offset = 1e-5
         used = np.zeros(len(vertices), bool)
         used[faces] = True
         lower, upper = vertices[used].min(axis=0), vertices[used].max(axis=0)
         self._center = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower)) or 1.0
-        self.offset = start_offset * self._radius
+        self.offset = 1e-5 * self._radius  # so that rays miss the face that they start on
         self._scene = EmbreeScene(robust=True)
         scaled = ((vertices - self._center) / self._radius).astype(np.float32)
         self._geometry = TriangleMesh(

@@ -1,6 +1,7 @@
 """Grasps without time stepping: sampled, screened, scored and compared.
 
-`sampling` and `clearance` are on the main road; `similarity` is what `comparison` rests on.
+`antipodal_sampling` draws grasps, `hand_clearance` screens the open hand, `quality_metrics` scores
+contacts. `grasp_distance` defines the distance that `set_comparison` and `neighbour_search` use.
 """
 
 import lazy_loader

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class ContactPairSettings:
-    """Contact pair settings."""
+    """Room that fingers need, and how many lines are drawn at a time."""
 
     finger_clearance = 0.001  # Metres that each open finger keeps to its contact.
     min_width = 1e-4  # Metres. Closer contacts are the two sides of a surface without thickness.
@@ -48,7 +48,7 @@ class ContactPairSettings:
 
 
 class PairRejection:
-    """Pair rejection."""
+    """Why a line gives no pair of contacts, or a pair no grasp."""
 
     too_long = "too long"  # The line leaves the material nowhere within the hand's opening.
     slanted = "slanted"  # A normal is outside of the friction cone about the line.
@@ -77,7 +77,8 @@ class ContactPairs:
 def draw_pairs(
     surface: Surface, rng: np.random.Generator, friction: float, opening: tuple[float, float]
 ) -> Iterator[ContactPairs]:
-    """The pairs of `ContactPairSettings.lines_per_chunk` random lines, `ContactPairSettings.rays_per_block` lines at a time.
+    """The pairs of `ContactPairSettings.lines_per_chunk` random lines, in blocks of
+    `ContactPairSettings.rays_per_block` lines.
 
     First contacts have the density of `Surface.draw`, lines are uniform in the solid angle of the
     friction cone about the inward normal, and every pair of a line counts that fingers can close
@@ -90,10 +91,11 @@ def draw_pairs(
         friction: coefficient; the cone's half angle is its arctangent.
         opening: smallest and largest distance between the fingers [m].
     """
-    p, face = surface.draw(ContactPairSettings.lines_per_chunk, rng)
+    count, size = ContactPairSettings.lines_per_chunk, ContactPairSettings.rays_per_block
+    p, face = surface.draw(count, rng)
     line = _directions_in_cone(-surface.normals[face], np.arctan(friction), rng)
-    for start in range(0, ContactPairSettings.lines_per_chunk, ContactPairSettings.rays_per_block):
-        block = slice(start, start + ContactPairSettings.rays_per_block)
+    for start in range(0, count, size):
+        block = slice(start, start + size)
         yield _pairs_along(surface, p[block], face[block], line[block], friction, opening)
 
 
@@ -165,7 +167,7 @@ SAMPLER_VERSION = 3
 
 
 class SamplingEffort:
-    """Sampling effort."""
+    """When sampling ends although fewer grasps have been found than are wanted."""
 
     min_rays = 2**18  # Rays after which sampling may end.
     rays_per_grasp = 20_000  # Further rays for each grasp found.
@@ -192,7 +194,7 @@ class AntipodalSettings:
             Anywhere if there are none. Approaches are uniform among the directions that a pair's
             closing line leaves; pairs whose line leaves none give no grasp.
         standoffs: every pose is given once with each of these distances between G and the contacts
-            [m]. Above 0 the hand stays back, as in `frames.pregrasp`, and holds with its finger
+            [m]. Above 0 the hand stays back, as in `core.pregrasp`, and holds with its finger
             tips; below 0 it goes further, and holds with what is behind the middle of its pads.
         pad: from where to where the pads reach along z of G [m]; bounds of the standoffs.
         diverse: of this many times n grasps those n are kept that `farthest_points` selects, in its
@@ -281,11 +283,10 @@ def sample_antipodal(
         object: name for the set's `object` column.
 
     Returns:
-        n grasps, or fewer where the object has (almost) no more; see `SamplingEffort.min_rays` and
-        `SamplingEffort.min_tests`. `width` is the distance of the contacts; `score` is the share of the
-        friction that is left over, from 0 to 1 for a line along both normals. The provenance has
-        the parameters, the state of rng, how many `rays` and grasps `tried` it took, and why the
-        others were `left_out_sentence`.
+        n grasps, or fewer where the object has (almost) no more; see `SamplingEffort`. `width` is
+        the distance of the contacts; `score` is the share of the friction that is left over, from 0
+        to 1 for a line along both normals. The provenance has the parameters, the state of rng,
+        how many `rays` and grasps `tried` it took, and why the others were `left_out`.
 
     Raises:
         InvalidInputError: a parameter is out of range, or the weights do not fit the mesh.
@@ -347,15 +348,13 @@ def _collect_grasps(
     kept = tried = rays = 0
     left_out: Counter[str] = Counter()
 
-    def worth_testing() -> bool:
-        bound = SamplingEffort.min_tests + min(
-            SamplingEffort.tests_per_accepted * kept, SamplingEffort.tests_per_wanted * n
-        )
-        return kept < n and tried < bound
+    effort = SamplingEffort
 
-    while (
-        worth_testing() and rays < SamplingEffort.min_rays + SamplingEffort.rays_per_grasp * tried
-    ):
+    def worth_testing() -> bool:
+        further = min(effort.tests_per_accepted * kept, effort.tests_per_wanted * n)
+        return kept < n and tried < effort.min_tests + further
+
+    while worth_testing() and rays < effort.min_rays + effort.rays_per_grasp * tried:
         for pairs in draw_pairs(surface, rng, settings.friction, settings.opening):
             block = _grasps_on(pairs, settings, rng)
             tried += len(block.X_OG)
@@ -365,14 +364,9 @@ def _collect_grasps(
             left_out += pairs.left_out + block.left_out
             if not worth_testing():
                 break
-    return _GraspBatch(
-        np.concatenate([part.X_OG for part in parts])[:n],
-        np.concatenate([part.width for part in parts])[:n],
-        np.concatenate([part.score for part in parts])[:n],
-        rays,
-        tried,
-        left_out,
-    )
+    columns = zip(*((part.X_OG, part.width, part.score) for part in parts), strict=True)
+    X_OG, width, score = (np.concatenate(column)[:n] for column in columns)
+    return _GraspBatch(X_OG, width, score, rays, tried, left_out)
 
 
 def _grasps_on(

@@ -46,7 +46,7 @@ AP_VERSION = 1
 
 
 class GraspNetSettings:
-    """Grasp net settings."""
+    """Constants of graspnetAPI."""
 
     frictions = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)  # Friction coefficients at which grasps are judged.
     top = 50  # Length of the list of best grasps.
@@ -319,16 +319,13 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
 
 def _are_colliding(grasps: GraspSet) -> NDArray[np.bool_] | None:
     """(N,) whether some column tells that the hand collides; None if none tells anything."""
-    outcome_columns = ("screened", "outcome")  # Columns with outcomes.
     known = colliding = np.full(len(grasps), False)
     for name, values in grasps.columns.items():
         if name == "clearance" and values.dtype.kind == "f":
             known, colliding = known | ~np.isnan(values), colliding | (values < 0.0)
-        elif name in outcome_columns and values.dtype.kind == "U":
-            known, colliding = (
-                known | (values != ""),
-                colliding | np.isin(values, COLLISION_OUTCOMES),
-            )
+        elif name in ("screened", "outcome") and values.dtype.kind == "U":
+            known = known | (values != "")
+            colliding = colliding | np.isin(values, COLLISION_OUTCOMES)
     return colliding if known.any() else None
 
 
@@ -344,12 +341,9 @@ def _judge_by_column(
             best = Outcome.LIFTED if tried else Outcome.REACHABLE
             return (best.value,), values != "", (values == best)[:, None]
     elif name == FRICTION_NEEDED:
-        names = tuple(f"mu {mu:g}" for mu in GraspNetSettings.frictions)
-        return (
-            names,
-            np.full(len(values), True),
-            values[:, None] <= np.array(GraspNetSettings.frictions),
-        )
+        limits = GraspNetSettings.frictions
+        names = tuple(f"mu {mu:g}" for mu in limits)
+        return names, np.full(len(values), True), values[:, None] <= np.array(limits)
     elif np.isin(values[~np.isnan(values)], (0, 1)).all():
         return (name,), ~np.isnan(values), (values == 1)[:, None]
     raise InvalidInputError(

@@ -45,17 +45,13 @@ def pair_angle(G: Array, F: Array) -> Array:
     The finger form with the larger trace of the relative rotation is the nearer one. Its angle
     comes from sine and cosine both, which is exact to rounding at 0 and at pi, too.
     """
-    x_row = 0  # First row of the x axis in the components of a grasp.
-    y_row = 3  # First row of the y axis.
-    z_row = 6  # First row of the z axis.
-    xx_yy = _dot(G, x_row, F, x_row) + _dot(G, y_row, F, y_row)
+    x, y, z = 0, 3, 6  # first rows of the axes in the components of a grasp
+    xx_yy = _dot(G, x, F, x) + _dot(G, y, F, y)
     sign = np.where(xx_yy < 0.0, -1.0, 1.0)  # of the x and y axes of F
-    a = sign * _dot(G, z_row, F, y_row) - _dot(G, y_row, F, z_row)
-    b = _dot(G, x_row, F, z_row) - sign * _dot(G, z_row, F, x_row)
-    c = _dot(G, y_row, F, x_row) - _dot(G, x_row, F, y_row)
-    return np.arctan2(
-        np.sqrt(a * a + b * b + c * c), np.abs(xx_yy) + _dot(G, z_row, F, z_row) - 1.0
-    )
+    a = sign * _dot(G, z, F, y) - _dot(G, y, F, z)
+    b = _dot(G, x, F, z) - sign * _dot(G, z, F, x)
+    c = _dot(G, y, F, x) - _dot(G, x, F, y)
+    return np.arctan2(np.sqrt(a * a + b * b + c * c), np.abs(xx_yy) + _dot(G, z, F, z) - 1.0)
 
 
 def check_lever(lever: float) -> None:

@@ -64,11 +64,10 @@ class HandClearance:
         self._graph_context = station_diagram.scene_graph.GetMyContextFromRoot(self._context)
         self._station_diagram = station_diagram
         self._hand.place(self._plant_context, np.eye(4))
-        self._screen = HandScreen(
-            *read_shapes(
-                station_diagram, self._plant_context, self._query(), self._bodies, self._names
-            )
+        shapes, others = read_shapes(
+            station_diagram, self._plant_context, self._query(), self._bodies, self._names
         )
+        self._screen = HandScreen(shapes, others)
 
     def check(self, instance: str, X_WG: Array) -> Clearance:
         """Screens one grasp: the same to the last bit as in a batch.
@@ -110,7 +109,7 @@ class HandClearance:
         Returns:
             N verdicts. Where several bodies are overlapped, the one decides that would be in the
             way in an emptier scene, too: the target, then the table, then background, then
-            clutter. What is no deeper than `body.TOUCHING` is no overlap. Where nothing is
+            clutter. What is no deeper than `CONTACT_TOLERANCE` is no overlap. Where nothing is
             overlapped, but the nearest body is nearer than the margin, that one decides.
 
         Raises:
@@ -167,13 +166,11 @@ class HandClearance:
             X_WG: (4, 4) grasp at which the open hand is clear.
 
         Returns:
-            0 (open) to 1 (pads together), to within the last of `TRAVEL_STEPS`; the fingers are
-            clear there and on the way.
+            0 (open) to 1 (pads together), to within 0.025; the fingers are clear there and on the
+            way.
         """
-        # Shares of the finger travel: 5 mm and 1 mm of the Panda hand.
-        travel_steps = (0.125, 0.025)
         closed = 0.0
-        for step in travel_steps:
+        for step in (0.125, 0.025):  # 5 mm and 1 mm of the Panda hand's travel
             while closed + step <= 1.0 and not self.touched(X_WG, closed + step):
                 closed += step
         return closed

@@ -34,7 +34,7 @@ row has looked; returns which rows stay open."""
 
 
 class NeighbourSearchSettings:
-    """Neighbour search settings."""
+    """Size of the steps of the search, and the errors it allows for."""
 
     candidates = 4  # Points seen at first; four times as many in each further round.
     max_pairs = 200_000  # Pairs in one step. Bounds the memory to some ten megabytes.
@@ -94,7 +94,7 @@ def find_nearest(
     """The nearest grasp by combined distance.
 
     Args:
-        G: (12, N) `components` of the grasps that search.
+        G: (12, N) `grasp_components` of the grasps that search.
         F: (12, M) of those that are found.
         lever: weight of the angle [m/rad].
         same: G and F are one set, and a grasp does not find itself.
@@ -119,11 +119,8 @@ def find_nearest(
         row, d = rows[i[first]], best
         better = (d < distance[row]) | ((d == distance[row]) & (column < nearest[row]))
         distance[row[better]], nearest[row[better]] = d[better], column[better]
-        least = (
-            reach * (1.0 - NeighbourSearchSettings.rounding)
-            - lever * NeighbourSearchSettings.angle_error
-            - NeighbourSearchSettings.rounding
-        )
+        rounding = NeighbourSearchSettings.rounding
+        least = reach * (1.0 - rounding) - lever * NeighbourSearchSettings.angle_error - rounding
         return (least <= distance[rows]) & (distance[rows] > 0.0)
 
     for tree in _build_trees(F, 1.0, lever):
@@ -135,7 +132,7 @@ def find_within(G: Array, F: Array, tolerance: Tolerance) -> NDArray[np.bool_]:
     """Whether any grasp is near enough.
 
     Args:
-        G: (12, N) `components` of the grasps that search.
+        G: (12, N) `grasp_components` of the grasps that search.
         F: (12, M) of those that are found.
         tolerance: what counts as near.
 
@@ -171,10 +168,8 @@ def _match_radius(tolerance: Tolerance) -> tuple[float, float, float]:
         angle = distance / lever
     per_metre = 1.0 / max(min(tolerance.translation, distance), 1e-9)
     per_radian = 1.0 / max(angle, 1e-6)
-    slack = (
-        per_metre * NeighbourSearchSettings.rounding
-        + per_radian * NeighbourSearchSettings.angle_error
-    )
+    slack = per_metre * NeighbourSearchSettings.rounding
+    slack += per_radian * NeighbourSearchSettings.angle_error
     return per_metre, per_radian, (1.0 if sum_decides else math.sqrt(2.0)) + slack
 
 
@@ -197,10 +192,9 @@ class _GraspTree:
 
 
 def _build_trees(F: Array, per_metre: float, per_radian: float) -> Iterator[_GraspTree]:
-    for start in range(0, F.shape[1], NeighbourSearchSettings.tree_size):
-        points = _grasp_points(
-            F[:, start : start + NeighbourSearchSettings.tree_size], per_metre, per_radian
-        )
+    size = NeighbourSearchSettings.tree_size
+    for start in range(0, F.shape[1], size):
+        points = _grasp_points(F[:, start : start + size], per_metre, per_radian)
         x, y, z, w = points[:, 3:].T
         swapped = np.hstack([points[:, :3], np.stack([y, -x, w, -z], axis=1)])  # times (0, 0, 1, 0)
         forms = np.vstack([points, swapped])
@@ -226,9 +220,8 @@ def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: Se
     while len(rows):
         size = max(1, NeighbourSearchSettings.max_pairs // count)
         parts = [rows[k : k + size] for k in range(0, len(rows), size)]
-        rows = np.concatenate(
-            [_search_round(tree, G, part, radius, count, settle) for part in parts]
-        )
+        found = [_search_round(tree, G, part, radius, count, settle) for part in parts]
+        rows = np.concatenate(found)
         if count == tree.points.n:
             return
         count = min(4 * count, tree.points.n)
@@ -252,7 +245,7 @@ def farthest_points(
     """Indices of n diverse grasps: each is the one farthest from all before it.
 
     Greedy farthest-point selection (T. F. Gonzalez, Theoretical Computer Science 38, 1985) under
-    the combined distance of `similarity`. At every length the selection covers the set with a
+    the combined distance. At every length the selection covers the set with a
     radius of at most twice the smallest that so many grasps can have. Depends on the physical
     grasps alone, not on their finger form; of equally far grasps the first one is taken, and
     duplicates come last, in order.

@@ -122,14 +122,14 @@ def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
         (N, 2, K) indentations, from 0 [m], and (N, 2) how far the object moves along x for each
         metre along y and z: its angles about -z and y [rad].
     """
-    iterations = 10  # Newton steps. With more, fewer than one grasp in a thousand changes.
     max_angle = 0.35  # Radians. Small-angle formulas are 6 % off there.
     y, z = (np.ascontiguousarray(np.stack([yz[0], -yz[1]])[..., c]) for c in (0, 1))
     resistance = TURN_RESISTANCE * float((yz[0] ** 2).sum())
     angle, share = np.zeros((len(gap), 2)), np.ones(len(gap))
     best, depth = _press_in(gap, total)
     least = _energy(best, depth, total)
-    for _ in range(iterations):
+    # With more than 10 Newton steps, fewer than one grasp in a thousand changes.
+    for _ in range(10):
         step = share[:, None] * _newton_step(best, y, z, angle, resistance)
         trial = np.clip(angle + step, -max_angle, max_angle)
         pressed, depth = _press_in(gap - _rise_of_springs(trial, y, z), total)
@@ -311,7 +311,6 @@ class _PadTouch:
 
     @classmethod
     def of(cls, surface: Surface, X_OG: Array, jaws: Jaws) -> _PadTouch:
-        no_contact_distance = 1e3  # Metres.
         yz, cell = _springs(jaws)
         face, distance = _cast_springs(surface, X_OG, yz, jaws)
         first = distance.min(axis=2)
@@ -320,7 +319,7 @@ class _PadTouch:
         touching &= width > max(jaws.opening[0], surface.rays.offset)
         face, distance, first = face[touching], distance[touching], first[touching]
         met = face >= 0
-        gap = np.where(met, distance, no_contact_distance) - first[:, :, None]
+        gap = np.where(met, distance, 1e3) - first[:, :, None]
         pressed, slope = press_pads(gap, yz, jaws.force / (jaws.foundation * cell))
         weight = pressed / pressed.sum(axis=2, keepdims=True)
         x = (0.5 * jaws.opening[1] - np.where(met, distance, 0.0)) * np.array([[1.0], [-1.0]])
@@ -432,12 +431,12 @@ def slide_to_rest(
 def _slide_direction(contacts: Contacts) -> Array:
     """(N, 3) unit vectors in O along which pads of equal force push the object; zero where they do
     not."""
-    min_cosine = 0.1  # Between normal and closing line. It only bears on the direction.
     line = contacts.p_OC[:, 1] - contacts.p_OC[:, 0]
     line /= np.linalg.norm(line, axis=1, keepdims=True)
     towards = np.stack([line, -line], axis=1)
     along = (contacts.normal * towards).sum(axis=-1, keepdims=True)
-    push = contacts.normal / np.maximum(along, min_cosine)  # by each pad, for a unit along the line
+    # The least cosine between normal and closing line only bears on the direction.
+    push = contacts.normal / np.maximum(along, 0.1)  # by each pad, for a unit along the line
     across = (push - (push * towards).sum(axis=-1, keepdims=True) * towards).sum(axis=1)
     size = np.linalg.norm(across, axis=1, keepdims=True)
     return np.asarray(across / np.where(size > 0.0, size, 1.0))

@@ -41,7 +41,6 @@ QUALITY_VERSION = 3
 STANDARD_GRAVITY = 9.81
 """m/s^2, as in Drake."""
 
-
 DEFAULT_METRIC = "load_margin"
 """It has the weight, the grip force, the lever of the centre of mass and the size of the patches in
 it, and a natural scale: at 1 the grip just bears the object. Epsilon depends on an arbitrary
@@ -103,7 +102,7 @@ class Quality:
         antipodal_angle: larger of the angles between the closing direction of the grasp, before the
             object turns, and the inward normals [rad].
         slide: how far the object slides in the hand until it is in force closure [m]: 0 where it is
-            so at once, infinite where it never is, see `sliding`.
+            so at once, infinite where it never is, see `slide_to_rest`.
         epsilon: radius of the largest ball about the origin within the wrench space [-] (Ferrari
             and Canny, ICRA 1992): soft-finger contacts, normal forces that add up to one, torques
             about the centre of mass over the largest distance between it and the surface. 0 where
@@ -160,7 +159,6 @@ def check_metric(name: str) -> None:
 
 def score_of(values: NDArray[Any], metric: str) -> Array:
     """Scores (N,) of the values of a metric: higher is better."""
-    # Metrics whose negative is the score.
     lower_is_better = ("friction_needed", "antipodal_angle", "slide", "contact_offset")
     scores = np.asarray(values, float)
     return -scores if metric in lower_is_better else scores

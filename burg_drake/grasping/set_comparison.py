@@ -130,7 +130,11 @@ def coverage(
     Raises:
         InvalidInputError: a bound is negative or NaN.
     """
-    tolerance = Tolerance(translation, angle, distance, lever)
+    return _matches(reference, grasps, Tolerance(translation, angle, distance, lever))
+
+
+def _matches(reference: GraspSet, grasps: GraspSet, tolerance: Tolerance) -> Matches:
+    """Which grasps of a reference have one of `grasps` within a tolerance."""
     matched = np.zeros(len(reference), dtype=bool)
     for rows, columns in by_shared_target(reference, grasps):
         G, F = grasp_components(reference.X_OG[rows]), grasp_components(grasps.X_OG[columns])
@@ -155,9 +159,7 @@ def precision(
     Raises:
         InvalidInputError: a bound is negative or NaN.
     """
-    return coverage(
-        grasps, reference, translation=translation, angle=angle, distance=distance, lever=lever
-    )
+    return _matches(grasps, reference, Tolerance(translation, angle, distance, lever))
 
 
 def nearest_grasps(grasps: GraspSet, others: GraspSet, *, lever: float = DISTANCE_LEVER) -> Nearest:
@@ -345,12 +347,10 @@ def compare_grasps(
         tolerance: what counts as a match, and the lever of distances; the default one if None.
     """
     tolerance = tolerance or Tolerance()
-    bounds = {name: getattr(tolerance, name) for name in ("translation", "angle", "distance")}
-    lever = tolerance.lever
-    covered = coverage(reference, grasps, **bounds, lever=lever).matched
-    precise = coverage(grasps, reference, **bounds, lever=lever).matched
-    nearest = nearest_grasps(reference, grasps, lever=lever)
-    back = nearest_grasps(grasps, reference, lever=lever).distance
+    covered = _matches(reference, grasps, tolerance).matched
+    precise = _matches(grasps, reference, tolerance).matched
+    nearest = nearest_grasps(reference, grasps, lever=tolerance.lever)
+    back = nearest_grasps(grasps, reference, lever=tolerance.lever).distance
 
     def part(of: Mask, others: Mask) -> ObjectComparison:
         return ObjectComparison(

@@ -96,9 +96,8 @@ def wrench_reaches(space: WrenchSpace, goals: Sequence[WrenchObjective]) -> list
     for i in range(0, len(space), chunk_size):
         part = slice(i, i + chunk_size)
         some = [goal.select(part) for goal in goals]
-        for whole, values in zip(
-            found, _largest_over_polar_set(space.select(part), some), strict=True
-        ):
+        largest = _largest_over_polar_set(space.select(part), some)
+        for whole, values in zip(found, largest, strict=True):
             whole[part] = values
     with np.errstate(divide="ignore"):
         return [
@@ -111,16 +110,14 @@ def _largest_over_polar_set(
     space: WrenchSpace, goals: Sequence[WrenchObjective]
 ) -> Iterator[Array]:
     """(N,) largest values of each goal over the polar set."""
-    coarse_subdivisions = 0  # Of the polytope whose face normals are the coarse directions.
     # (starts, steps) of each round: the best coarse pairs, then the best of these.
     full_schedule = ((6, 5), (2, 18))
     linear_schedule = ((4, 5), (2, 12))  # Linear objectives have one peak.
-    coarse = triangulated_ball(coarse_subdivisions)
+    coarse = triangulated_ball(0)
     for goal, values in zip(goals, _pair_values(space, goals, coarse.normals), strict=True):
         race = linear_schedule if goal.linear else full_schedule
-        climb = WrenchAscent.start(
-            coarse.normals[_best_local_peaks(values, coarse.neighbors, race[0][0])]
-        )
+        peaks = _best_local_peaks(values, coarse.neighbors, race[0][0])
+        climb = WrenchAscent.start(coarse.normals[peaks])
         for starts, steps in race:
             climb = climb.leaders(starts)
             many, often = space.select(np.tile(np.arange(len(space)), starts)), goal.repeat(starts)
@@ -177,9 +174,9 @@ def _pair_values(
     space: WrenchSpace, goals: Sequence[WrenchObjective], nu: Array, distance: Array | float = 1.0
 ) -> list[Array]:
     """(N, M, M) values for each goal of all pairs of nu, (M, 3) or (N, 2, M, 3); -inf: no u."""
-    min_independence = 1e-7  # Pairs whose equations are closer to dependent are left out.
     slides = space.slides(nu, distance)
-    alpha, beta, extreme = slides.pairs(min_independence)
+    # Pairs whose equations are closer to dependent are left out.
+    alpha, beta, extreme = slides.pairs(1e-7)
     one, two = slides.u[:, 0], slides.u[:, 1]
     with np.errstate(invalid="ignore", over="ignore"):
         values = [goal.of_pairs(one, two, slides.u0, alpha, beta) for goal in goals]
@@ -204,13 +201,12 @@ def _best_local_peaks(values: Array, neighbors: NDArray[np.int64], count: int) -
 def _along_rims(space: WrenchSpace, goal: WrenchObjective) -> Array:
     """(N,) largest values where one contact does not slide at all; -inf where it always does."""
     angle_count = 32  # Angles evaluated on a circle.
-    refinements = 5  # Times that the neighbourhood of the best angle is searched again.
     best = np.full(len(space), -np.inf)
     for sliding in (0, 1):
         rim = space.rim(sliding)
         step = 2.0 * np.pi / angle_count
         angle = np.broadcast_to(step * np.arange(angle_count), (len(space), angle_count))
-        for _ in range(1 + refinements):
+        for _ in range(6):  # first all angles, then the neighbourhood of the best one
             value = goal.of(rim.u(angle))
             value = np.where(np.isnan(value), -np.inf, value)
             best = np.maximum(best, value.max(axis=1))

@@ -156,7 +156,7 @@ class WrenchSpace:
         """Some of the grasps."""
         return WrenchSpace(self.basis[index], self.pseudo[index], self.null[index])
 
-    def slides(self, direction: Array, distance: Array | float) -> Slides:
+    def slides(self, direction: Array, distance: Array | float) -> ContactSlides:
         """What each contact contributes to u where it slides against given vectors.
 
         Args:
@@ -171,7 +171,7 @@ class WrenchSpace:
         u, zero = (y @ m.transpose(0, 1, 3, 2) for m in (self.pseudo, self.null))
         u0, right = self.pseudo[..., 0].sum(axis=1), -self.null[..., 0].sum(axis=1)
         turn = right[:, None, None, 0] * zero[..., 1] - right[:, None, None, 1] * zero[..., 0]
-        return Slides(u, zero, np.where(turn == 0.0, positive_zero, turn), u0)
+        return ContactSlides(u, zero, np.where(turn == 0.0, positive_zero, turn), u0)
 
     def rim(self, sliding: int) -> Rim:
         """The extreme u at which one contact does not slide at all.
@@ -200,7 +200,7 @@ class WrenchSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class Slides:
+class ContactSlides:
     """Contributions of M slides of each contact to u = u0 + alpha_1 u_1 + alpha_2 u_2.
 
     Attributes:

@@ -1,8 +1,8 @@
 """Whether and how the arm can bring the hand to a grasp, and away with the object.
 
-`reach` says whether, `planner` how fast. On the way, `ik` gives postures, `proximity` and
-`collision` say which are free, `lines` has the straight parts and `transit` the way there from
-home.
+Read `arm_reach` first: it decides whether the arm can execute a grasp. `planner` times the motion.
+`hand_sweep` checks the hand alone, `line_search` finds the straight segments, `motion_search` joins
+them to the home posture by `home_tree`. `clearance_bounds` and `arm_collision` say what is free.
 """
 
 import lazy_loader

@@ -32,6 +32,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame
 from pydrake.planning import CollisionCheckerContext, RobotDiagram, SceneGraphCollisionChecker
+from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, suggest_names
 from burg_drake.station import PLACEMENT_FRAME_NAME, VERTICAL_JOINT_NAME, StationDiagram
@@ -65,8 +66,11 @@ def anchor_geometry(
     ]
     body_of: dict[GeometryId, BodyIndex] = {}
 
-    def anchor(body: BodyIndex, context: CollisionCheckerContext) -> None:
-        graph_context = context.scene_graph_context()
+    def anchor(_: RobotDiagram, context: CollisionCheckerContext) -> None:
+        for body in bodies:
+            anchor_body(body, context.scene_graph_context())
+
+    def anchor_body(body: BodyIndex, graph_context: Context) -> None:
         X_WB = plant.EvalBodyPoseInWorld(plant_context, plant.get_body(body))
         anchored = []
         for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body)):
@@ -81,11 +85,7 @@ def anchor_geometry(
         declaration.ExcludeBetween(GeometrySet(anchored), GeometrySet(never))
         graph.collision_filter_manager(graph_context).Apply(declaration)
 
-    def anchor_all(_: RobotDiagram, context: CollisionCheckerContext) -> None:
-        for body in bodies:
-            anchor(body, context)
-
-    checker.PerformOperationAgainstAllModelContexts(anchor_all)
+    checker.PerformOperationAgainstAllModelContexts(anchor)
     return body_of
 
 
@@ -140,9 +140,8 @@ class CarriedInstances:
         for name, body in station_diagram.free.items():
             model = plant.get_body(body).model_instance()
             if plant.HasJointNamed(VERTICAL_JOINT_NAME, model):
-                self._height[name] = plant.GetJointByName(
-                    VERTICAL_JOINT_NAME, model
-                ).position_start()
+                joint = plant.GetJointByName(VERTICAL_JOINT_NAME, model)
+                self._height[name] = joint.position_start()
                 self._place[name] = cast(
                     FixedOffsetFrame, plant.GetFrameByName(PLACEMENT_FRAME_NAME, model)
                 )
@@ -201,11 +200,8 @@ class InstanceShifts:
         self._checker.PerformOperationAgainstAllModelContexts(shift)
 
 
-NO_DISPLACEMENT = (
-    0.0,
-    0.0,
-    0.0,
-)  # Displacement of a target that is where the document places it, in metres.
+NO_DISPLACEMENT = (0.0, 0.0, 0.0)
+"""Metres. Displacement of a target that is where the document places it."""
 
 
 @dataclass(frozen=True)
@@ -234,7 +230,8 @@ class ArmCollision:
 
     Attributes:
         checker: Drake's checker of the diagram as it is, for other questions. Configurations are
-            those of the whole plant, fingers included. Clones of it answer here: see `anchoring`.
+            those of the whole plant, fingers included. Clones of it answer here, see
+            `anchor_geometry`.
         joints: the arm's joints from base to hand.
     """
 
@@ -253,7 +250,6 @@ class ArmCollision:
         Raises:
             InvalidInputError: the diagram has no arm.
         """
-        edge_step = 0.05  # Radians between the checked configurations of an edge.
         if station_diagram.robot != "arm":
             raise InvalidInputError(
                 f"the diagram was built with robot={station_diagram.robot!r}; build it with 'arm'"
@@ -264,7 +260,7 @@ class ArmCollision:
             self.checker = SceneGraphCollisionChecker(
                 model=station_diagram.diagram,
                 robot_model_instances=[plant.GetModelInstanceByName(n) for n in ("arm", "hand")],
-                edge_step_size=edge_step,
+                edge_step_size=0.05,  # radians
                 implicit_context_parallelism=Parallelism(1),
             )
         self.joints = station_diagram.arm_joints
@@ -279,7 +275,6 @@ class ArmCollision:
         self._carrying: dict[str, tuple[SceneGraphCollisionChecker, InstanceShifts]] = {}
         self._anchored: dict[GeometryId, BodyIndex] = {}
         self._in_base = self._overlapping_base()
-        hand = plant.GetModelInstanceByName("hand")
         self._in_hand = set(plant.GetBodyIndices(hand))
         body = plant.GetBodyByName(station_diagram.station.hand.body, hand)
         fingers = self._in_hand - {body.index()}  # which may be asked about closed, too

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -104,14 +103,9 @@ class HandPaths:
     width: Array
     retreats: bool
 
-    def __getitem__(self, chosen: Indices) -> Self:
-        return type(self)(
-            self.sweep,
-            self.instance[chosen],
-            self.X_both[chosen],
-            self.width[chosen],
-            self.retreats,
-        )
+    def __getitem__(self, chosen: Indices) -> HandPaths:
+        own = self.instance[chosen], self.X_both[chosen], self.width[chosen]
+        return HandPaths(self.sweep, *own, self.retreats)
 
     def before_lift(self) -> HandVerdicts:
         """Approach and retreat."""
@@ -136,22 +130,17 @@ class HandPaths:
     def _to_check(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
         """Targets, ways to put the fingers, and the grasps that are free so far."""
         flips = (0,) if self.sweep.symmetric else (0, 1)
+        free = found.clearance >= 0.0
         return [
-            (
-                name,
-                flip,
-                np.flatnonzero((self.instance == name) & (found.clearance[:, flip] >= 0.0)),
-            )
+            (name, flip, np.flatnonzero((self.instance == name) & free[:, flip]))
             for name in dict.fromkeys(self.instance.tolist())
             for flip in flips
         ]
 
     def _mirrored(self, found: HandVerdicts) -> HandVerdicts:
         if self.sweep.symmetric:
-            found.clearance[:, 1], found.blocked_by[:, 1] = (
-                found.clearance[:, 0],
-                found.blocked_by[:, 0],
-            )
+            found.clearance[:, 1] = found.clearance[:, 0]
+            found.blocked_by[:, 1] = found.blocked_by[:, 0]
         return found
 
 
@@ -164,11 +153,9 @@ LevelIsFree = Callable[[int, Indices], Booleans]
 
 
 def lift_heights(least: float, most: float) -> Array:
-    """What is tried, rising from `least` by `STEP` to `most` [m]."""
-    height_step = 0.01  # Metres between the heights that are tried.
-    decimals = 9  # Of heights in metres. Sums of steps have rounding errors.
-    rising = np.arange(least, most - 1e-9, height_step)
-    rising[1:] = np.round(rising[1:], decimals)
+    """Heights to try, rising from `least` to `most` in steps of 1 cm [m]."""
+    rising = np.arange(least, most - 1e-9, 0.01)
+    rising[1:] = np.round(rising[1:], 9)  # sums of steps have rounding errors
     return np.append(rising, most)
 
 
@@ -392,10 +379,10 @@ class ArmReach:
                 corners.
             width: distance between the pads that carry it [m]; NaN if the hand is open.
         """
-        blocked = self._tree.edges.first_blocked(
-            q, hand=hand, carried=carried, moved_W=moved_W, width=width
+        edges = self._tree.edges
+        return (
+            edges.first_blocked(q, hand=hand, carried=carried, moved_W=moved_W, width=width) is None
         )
-        return blocked is None
 
     def shortcut(self, q: Array) -> Array:
         """A collision-free path (M, n) with the same ends as one from home that is no longer."""
@@ -405,9 +392,7 @@ class ArmReach:
         """Verdicts on N grasps with a lift to one height [m]."""
         max_poses = 12 * GRASPS_PER_BATCH  # Poses of their ways. Bounds the memory to about 130 MB.
         hand = paths.lifted(before, height)
-        found: dict[int, Reach] = {
-            int(k): hand.refusal(int(k)) for k in np.flatnonzero(hand.blocked)
-        }
+        found = {k: hand.refusal(k) for k in np.flatnonzero(hand.blocked).tolist()}
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
             self._searches[height] = self._search.lifted(height)

@@ -37,41 +37,36 @@ from burg_drake.motion.self_clearance import (
 )
 from burg_drake.station import StationDiagram
 
+BALL_ARRAYS = ("center", "outer", "inner")
+"""Arrays of `Balls`."""
+NODE_ARRAYS = ("frame", "centers", "outer", "inner", "child")
+"""Arrays of `BallTrees`."""
+
 
 def shape_to_arrays(trees: BallTrees, itself: SelfClearance) -> Arrays:
     """All that `shape_from_arrays` needs but for the numbers that the bodies have in a diagram."""
     bodies = trees.bodies
     balls = Balls.joined([body.balls for body in bodies])
     arrays: dict[str, NDArray[Any]] = {
-        "body_frame": np.array([body.frame for body in bodies]),
-        "body_center": np.array([body.center for body in bodies]),
-        "body_radius": np.array([body.radius for body in bodies]),
-        "body_root": np.array([body.root for body in bodies]),
         "body_end": np.cumsum([len(body.balls.outer) for body in bodies]),
-        "ball_center": balls.center,
-        "ball_outer": balls.outer,
-        "ball_inner": balls.inner,
-        "node_frame": trees.frame,
-        "node_centers": trees.centers,
-        "node_outer": trees.outer,
-        "node_inner": trees.inner,
-        "node_child": trees.child,
         "pairs": _pairs_to_array(itself.pairs),
         "apart": _pairs_to_array(itself.apart),
     }
+    for name in ("frame", "center", "radius", "root"):
+        arrays[f"body_{name}"] = np.array([getattr(body, name) for body in bodies])
+    arrays |= {f"ball_{name}": getattr(balls, name) for name in BALL_ARRAYS}
+    arrays |= {f"node_{name}": getattr(trees, name) for name in NODE_ARRAYS}
     for k, (table, pairs) in enumerate(itself.tables):
         grid = table.grid
         arrays |= {
             f"table{k}_pairs": _pairs_to_array(pairs),
             f"table{k}_joints": np.array(grid.joints, dtype=np.intp),
-            f"table{k}_low": grid.low,
-            f"table{k}_step": grid.step,
-            f"table{k}_count": grid.count,
             f"table{k}_whole": np.array(grid.whole, dtype=bool),
-            f"table{k}_lever": grid.lever,
             f"table{k}_lower": table.lower,
             f"table{k}_upper": table.upper,
         }
+        for name in ("low", "step", "count", "lever"):
+            arrays[f"table{k}_{name}"] = getattr(grid, name)
     return arrays
 
 
@@ -84,13 +79,12 @@ def shape_from_arrays(arrays: Arrays) -> tuple[BallTrees, SelfClearance]:
             int(arrays["body_frame"][k]),
             arrays["body_center"][k],
             float(arrays["body_radius"][k]),
-            Balls(*(arrays[f"ball_{name}"][first:end] for name in ("center", "outer", "inner"))),
+            Balls(*(arrays[f"ball_{name}"][first:end] for name in BALL_ARRAYS)),
             int(arrays["body_root"][k]),
         )
         for k, (first, end) in enumerate(zip([0, *ends], ends, strict=False))
     )
-    nodes = (arrays[f"node_{name}"] for name in ("frame", "centers", "outer", "inner", "child"))
-    trees = BallTrees(bodies, *nodes)
+    trees = BallTrees(bodies, *(arrays[f"node_{name}"] for name in NODE_ARRAYS))
     count = sum(name.endswith("_joints") for name in arrays)
     tables = [_read_table(arrays, f"table{k}_") for k in range(count)]
     return trees, SelfClearance(
@@ -147,13 +141,10 @@ class ArmShape:
         Raises:
             InvalidInputError: the robot has a shape or a joint that is not known.
         """
-        max_kept = 16  # Shapes of robots kept in memory.
         links = ArmLinks.from_diagram(station_diagram)
+        joints = station_diagram.arm_joints
         limits = np.array(
-            [
-                (joint.position_lower_limits()[0], joint.position_upper_limits()[0])
-                for joint in station_diagram.arm_joints
-            ]
+            [(j.position_lower_limits()[0], j.position_upper_limits()[0]) for j in joints]
         )
         key = content_hash(*_arm_content(station_diagram, links), limits)
         if key not in _kept:
@@ -165,7 +156,7 @@ class ArmShape:
                 )
 
             _kept[key] = shape_from_arrays(cached("robot", key, make))
-        while len(_kept) > max_kept:
+        while len(_kept) > 16:  # shapes of robots kept in memory
             _kept.popitem(last=False)
         trees, itself = _kept[key]
         own = dict(zip(bodies_with_shape(station_diagram, links), trees.bodies, strict=True))

@@ -34,8 +34,8 @@ from burg_drake.motion.arm_links import ArmLinks, LinkPoses
 from burg_drake.station import StationDiagram
 
 
-class BallCoverSettings:
-    """Ball cover settings."""
+class Cover:
+    """Accuracy of the balls that cover a shape."""
 
     cell_size = 1.8  # Size of a cell over the overshoot.
     max_cells = 2_000  # Cells of a shape. Larger shapes are cut more coarsely.
@@ -131,14 +131,14 @@ def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
 
 def _affordable_cells(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
     """(3,) numbers of cells along a shape, and the overshoot that goes with them [m]."""
-    while np.prod(count := cells(overshoot)) > BallCoverSettings.max_cells:
-        overshoot *= BallCoverSettings.coarsening
+    while np.prod(count := cells(overshoot)) > Cover.max_cells:
+        overshoot *= Cover.coarsening
     return count.astype(int), overshoot
 
 
 def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
     count, overshoot = _affordable_cells(
-        lambda s: np.ceil(2.0 * half / (BallCoverSettings.cell_size * s)), overshoot
+        lambda s: np.ceil(2.0 * half / (Cover.cell_size * s)), overshoot
     )
     ticks = [np.linspace(-h, h, 2 * n + 1) for h, n in zip(half, count, strict=True)]
     lattice = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
@@ -152,7 +152,7 @@ def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: 
     sides = np.array([2.0 * np.pi * radius, radius, 2.0 * half_length])
     least = np.array([8, 1, 1])  # sectors, rings, layers
     (sectors, rings, layers), overshoot = _affordable_cells(
-        lambda s: np.maximum(least, np.ceil(sides / (BallCoverSettings.cell_size * s))), overshoot
+        lambda s: np.maximum(least, np.ceil(sides / (Cover.cell_size * s))), overshoot
     )
     angle = np.pi * np.arange(2 * sectors + 1) / sectors
     rho = radius / np.cos(np.pi / sectors) * np.linspace(0.0, 1.0, 2 * rings + 1)
@@ -197,10 +197,10 @@ def _choose_balls(
         given: balls that are there already.
     """
     cells = _cell_corners(nodes)
-    depth = np.minimum(depth, BallCoverSettings.max_inner_radius)
+    depth = np.minimum(depth, Cover.max_inner_radius)
     outer = depth + overshoot
     reach = np.linalg.norm(cells - centers[: cells.shape[1]], axis=-1).max(axis=0)
-    outer[: len(reach)] = np.maximum(outer[: len(reach)], reach + BallCoverSettings.rounding)
+    outer[: len(reach)] = np.maximum(outer[: len(reach)], reach + Cover.rounding)
     left = ~_are_cells_covered(nodes, given.center, given.outer).any(axis=0)
     covers = _are_cells_covered(nodes, centers, outer)[:, left]
     picked = []
@@ -225,9 +225,7 @@ def _are_cells_covered(nodes: Array, centers: Array, radii: Array) -> NDArray[np
     """(C, cells) whether balls cover cells."""
     flat = nodes.reshape(-1, 3)
     square = (centers**2).sum(axis=1)[:, None] + (flat**2).sum(axis=1) - 2.0 * centers @ flat.T
-    covers = (square <= ((radii - BallCoverSettings.rounding / 2) ** 2)[:, None]).reshape(
-        -1, *nodes.shape[:3]
-    )
+    covers = (square <= ((radii - Cover.rounding / 2) ** 2)[:, None]).reshape(-1, *nodes.shape[:3])
     for axis in (1, 2, 3):
         covers = np.moveaxis(covers, axis, 0)
         covers = np.moveaxis(covers[:-1] & covers[1:], 0, axis)
@@ -288,22 +286,18 @@ class BallTrees:
     @classmethod
     def of(cls, station_diagram: StationDiagram, links: ArmLinks) -> BallTrees:
         """Covers the robot of a diagram."""
-        arm_overshoot = 8e-3  # Metres that balls stick out of moving links.
-        hand_overshoot = 8e-3  # Metres.
+        overshoot = 8e-3  # Metres that balls stick out of moving links and the hand.
         base_overshoot = 25e-3  # Metres, of links that do not move. Only the arm can hit them.
-        tree_depth = 3  # Levels of a tree.
         plant = station_diagram.plant
         inspector = station_diagram.scene_graph.model_inspector()
-        hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
         bodies: list[BodyBalls] = []
         nodes: list[_Node] = []
         for body in bodies_with_shape(station_diagram, links):
             geometries = plant.GetCollisionGeometriesForBody(plant.get_body(body))
             frame = links.frame_of[body]
-            overshoot = hand_overshoot if body in hand else arm_overshoot
             balls = cover_body(inspector, geometries, overshoot if frame else base_overshoot)
             balls = balls.moved(links.X_FB[body])
-            root = _append_tree(nodes, balls, frame, tree_depth)
+            root = _append_tree(nodes, balls, frame, depth=3)
             bodies.append(BodyBalls(body, frame, *_enclosing_ball(balls), balls, root))
         width = max(len(node.balls.outer) for node in nodes)
         centers = np.zeros((3, width, len(nodes)), dtype=np.float32)

@@ -19,8 +19,8 @@ from burg_drake.motion.distance_field import DistanceField, ProximitySolid, soli
 from burg_drake.station import StationDiagram
 
 
-class ClearanceBoundsSettings:
-    """Clearance bounds settings."""
+class Bounding:
+    """Accuracy and batch sizes of the bounds."""
 
     rounding = 1e-5  # Metres. Far above single precision within some metres.
     block_size = 2**12  # Configurations evaluated together. They fit a processor's caches.
@@ -67,9 +67,7 @@ class DisplacementBound:
         self._reach = joint_reaches(links, trees.bodies, limits)
         frames = [body.frame for body in trees.bodies]  # rising
         self._first_beyond = np.searchsorted(frames, np.arange(len(links.turns)), side="right")
-        self._radius = np.array(
-            [body.radius + ClearanceBoundsSettings.rounding for body in trees.bodies]
-        )[:, None]
+        self._radius = np.array([body.radius + Bounding.rounding for body in trees.bodies])[:, None]
 
     def between(self, q_a: Array, q_b: Array) -> Array:
         """Upper bounds (K,) [m] for segments from `q_a` to `q_b` (K, n) within the limits."""
@@ -135,7 +133,7 @@ class ClearanceBounds:
     @property
     def likely_free(self) -> np.ndarray:
         """(N,) the best guess, where Drake is not to be asked."""
-        return (self.lower > ClearanceBoundsSettings.likely_free_above) & ~self.blocked
+        return (self.lower > Bounding.likely_free_above) & ~self.blocked
 
 
 class ArmProximity:
@@ -192,12 +190,10 @@ class ArmProximity:
         q = np.asarray(q, dtype=float)
         lower = np.empty(len(q))
         upper = np.empty(len(q))
-        for start in range(0, len(q), ClearanceBoundsSettings.block_size):
-            block = slice(start, start + ClearanceBoundsSettings.block_size)
+        for start in range(0, len(q), Bounding.block_size):
+            block = slice(start, start + Bounding.block_size)
             lower[block], upper[block] = self._bounds(q[block], hand)
-        return ClearanceBounds(
-            lower - ClearanceBoundsSettings.rounding, upper + ClearanceBoundsSettings.rounding
-        )
+        return ClearanceBounds(lower - Bounding.rounding, upper + Bounding.rounding)
 
     def displacement(self, q_a: Array, q_b: Array) -> Array:
         """How far any point of the robot moves at most, the hand's open fingers included.
@@ -214,8 +210,8 @@ class ArmProximity:
         """
         q_a, q_b = np.asarray(q_a, dtype=float), np.asarray(q_b, dtype=float)
         found = np.empty(len(q_a))
-        for start in range(0, len(q_a), ClearanceBoundsSettings.block_size):
-            block = slice(start, start + ClearanceBoundsSettings.block_size)
+        for start in range(0, len(q_a), Bounding.block_size):
+            block = slice(start, start + Bounding.block_size)
             found[block] = self._displacement.between(q_a[block], q_b[block])
         return found
 
@@ -224,29 +220,27 @@ class ArmProximity:
         centers = self._trees.roots_placed(poses)
         counted = self._moving if hand else self._arm
         bound = self.field.lower_at(centers[:, counted]) - self._radius[counted]
-        row, which = np.nonzero(bound < ClearanceBoundsSettings.refine_below)
+        row, which = np.nonzero(bound < Bounding.refine_below)
         bound[row, which] = np.inf
         lower = bound.min(axis=0, initial=np.inf)
         upper = np.full_like(lower, np.inf)
         self._descend(poses, which, self._roots[counted[row]], lower, upper)
-        low, up = self._itself.bounds(q, poses, centers, upper >= -ClearanceBoundsSettings.rounding)
+        low, up = self._itself.bounds(q, poses, centers, upper >= -Bounding.rounding)
         lower, upper = np.minimum(lower, low), np.minimum(upper, up)
-        return lower, np.where(upper < -ClearanceBoundsSettings.rounding, upper, np.float32(np.inf))
+        return lower, np.where(upper < -Bounding.rounding, upper, np.float32(np.inf))
 
     def _descend(
         self, poses: LinkPoses, which: Indices, node: Indices, lower: Single, upper: Single
     ) -> None:
         """Brings in how far nodes of the trees are from the scene in configurations `which`."""
         trees = self._trees
-        for start in range(0, len(which), ClearanceBoundsSettings.chunk_size):
-            k, at = (
-                which[start : start + ClearanceBoundsSettings.chunk_size],
-                node[start : start + ClearanceBoundsSettings.chunk_size],
-            )
+        for start in range(0, len(which), Bounding.chunk_size):
+            part = slice(start, start + Bounding.chunk_size)
+            k, at = which[part], node[part]
             places = trees.placed(at, poses, k)
             bound = self.field.lower_at(places) - trees.outer.take(at, axis=1)
             if trees.child[0, at[0]] >= 0:
-                i, f = np.nonzero(bound < ClearanceBoundsSettings.refine_below)
+                i, f = np.nonzero(bound < Bounding.refine_below)
                 bound[i, f] = np.inf
                 self._descend(poses, k[f], trees.child[i, at[f]], lower, upper)
             else:

@@ -28,7 +28,7 @@ GridPlace = tuple[PostureGrid, int]
 
 
 class ChainSearchSettings:
-    """Chain search settings."""
+    """How thoroughly chains are looked for."""
 
     max_explained = 3  # Postures that a failure names as being in the way.
     rows_per_layer = 5  # Rows of a chain from one layer to the next; 1 cm apart.
@@ -165,7 +165,7 @@ class _FoundChain:
 
 
 class _ClosedFormBatch:
-    """See `line_search.LineSearch`."""
+    """See `LineSearchBatch`."""
 
     def __init__(self, search: ClosedFormLineSearch, X_AG: Array, clearance: Array) -> None:
         self._search, self._X_AG = search, X_AG
@@ -297,11 +297,9 @@ class _ClosedFormBatch:
         grasp = np.array([g for g, *_ in rows])
         flip = np.array([place.flip for *_, place in rows])
         X_AG = self._X_AG[grasp, flip]
+        layers = np.arange(count)
         corners = np.array(
-            [
-                grid.q[:, np.arange(count), i, p.flip, p.branch, p.parameter].T
-                for _, grid, i, p in rows
-            ]
+            [grid.q[:, layers, i, p.flip, p.branch, p.parameter].T for _, grid, i, p in rows]
         )
         tolerance = np.clip(0.5 * self._tolerance[grasp, flip], *search.settings.deviation)
         straight = search.straight(X_AG, corners, at, tolerance)
@@ -327,16 +325,8 @@ class _ClosedFormBatch:
             self._farthest[grasp] = max(self._farthest[grasp], layer[broken][0])
             self._failed[grasp] += 1
             return None
-        length = np.interp(layer, np.arange(len(self._search.layers)), self._search.layers)
-        return Chain(
-            flip=found.place.flip,
-            q=rows.q[own],
-            at_grasp=int(np.searchsorted(layer, self._search.at_grasp)),
-            at_retreated=int(np.searchsorted(layer, self._search.lines.at_retreated)),
-            moved_W=self._search.lines.carried(self._X_AG[grasp, found.place.flip], length),
-            lower=lower[own],
-            place=found,
-        )
+        flip = found.place.flip
+        return self._search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, found)
 
     def _exclude(self, grasp: int, found: _FoundChain, layer: float) -> None:
         """Puts the posture at a layer out of the search, or the step between two.

@@ -177,7 +177,7 @@ def solid_of(shape: Shape, X_WB: Array) -> ProximitySolid:
 
 
 class DistanceFieldSettings:
-    """Distance field settings."""
+    """The grid of a distance field."""
 
     cell_size = 5e-3  # Metres. Side of a cell.
     max_cells = 3_000_000  # Cells become larger above this number.
@@ -208,25 +208,16 @@ class DistanceField:
     @classmethod
     def of(cls, solids: list[ProximitySolid]) -> DistanceField:
         """The field of solids in the world; of solids seen before, from the user's cache."""
-        boxes = tuple(
-            s
-            for s in solids
-            if isinstance(s, BoxSolid) and 2 * max(s.half) >= DistanceFieldSettings.large_side
-        )
+        large = DistanceFieldSettings.large_side
+        boxes = tuple(s for s in solids if isinstance(s, BoxSolid) and 2 * max(s.half) >= large)
         small = [s for s in solids if s not in boxes]
         if not small:
             far = np.full(1, np.inf, dtype=np.float32)
             return cls(np.zeros(3), DistanceFieldSettings.cell_size, (1, 1, 1), far, far, boxes)
         arrays = cached("distances", solids_hash(small), lambda: _grid_arrays(small))
         nx, ny, nz = (int(n) for n in arrays["shape"])
-        return cls(
-            arrays["origin"],
-            float(arrays["cell"]),
-            (nx, ny, nz),
-            arrays["lower"],
-            arrays["upper"],
-            boxes,
-        )
+        bounds = arrays["lower"], arrays["upper"]
+        return cls(arrays["origin"], float(arrays["cell"]), (nx, ny, nz), *bounds, boxes)
 
     def index(self, p: Single) -> NDArray[np.intp]:
         """Cells of points (3, ...); of points beyond the grid the nearest cell."""
@@ -264,16 +255,11 @@ def _grid_arrays(small: list[ProximitySolid]) -> Arrays:
     """The grid around solids."""
     low = np.min([s.low for s in small], axis=0)
     high = np.max([s.high for s in small], axis=0)
-    low -= (
-        DistanceFieldSettings.margin,
-        DistanceFieldSettings.margin,
-        np.clip(low[2] + DistanceFieldSettings.cell_size, 0.0, DistanceFieldSettings.margin),
-    )
-    high += DistanceFieldSettings.margin
-    cell = max(
-        DistanceFieldSettings.cell_size,
-        float(np.cbrt(np.prod(high - low) / DistanceFieldSettings.max_cells)),
-    )
+    margin, smallest = DistanceFieldSettings.margin, DistanceFieldSettings.cell_size
+    low -= margin, margin, np.clip(low[2] + smallest, 0.0, margin)
+    high += margin
+    affordable = float(np.cbrt(np.prod(high - low) / DistanceFieldSettings.max_cells))
+    cell = max(smallest, affordable)
     shape = np.ceil((high - low) / cell).astype(int) + 1
     ticks = [a + cell * np.arange(n) for a, n in zip(low, shape, strict=True)]
     lower, upper = _grid_bounds(ticks, cell, small)

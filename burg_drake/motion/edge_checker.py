@@ -26,7 +26,7 @@ from burg_drake.motion.clearance_bounds import ArmProximity
 
 
 class EdgeCheckSettings:
-    """Edge check settings."""
+    """Lengths down to which segments are divided, and how often Drake is asked."""
 
     coarse_length = 0.08  # Metres of displacement. Longest stretch at the beginning.
     fine_length = 0.003  # Metres of displacement. Longest stretch left undecided.
@@ -143,17 +143,12 @@ def screen_edges(
         if not len(edge) or displacement.max() <= fine:
             return EdgeBounds(length, blocked_at, doubted_at, edge, start, end)
         c_start, c_end = c_start[keep], c_end[keep]
-        places = (
-            start[:, None]
-            + np.arange(EdgeCheckSettings.pieces + 1)
-            / EdgeCheckSettings.pieces
-            * (end - start)[:, None]
-        )
+        count = EdgeCheckSettings.pieces
+        places = start[:, None] + np.arange(count + 1) / count * (end - start)[:, None]
         places[:, -1] = end
-        inside = lower(
-            np.repeat(edge, EdgeCheckSettings.pieces - 1), places[:, 1:-1].ravel()
-        ).reshape(len(edge), -1)
-        edge = np.repeat(edge, EdgeCheckSettings.pieces)
+        inside = lower(np.repeat(edge, count - 1), places[:, 1:-1].ravel())
+        inside = inside.reshape(len(edge), -1)
+        edge = np.repeat(edge, count)
         start, end = places[:, :-1].ravel(), places[:, 1:].ravel()
         clearance = np.column_stack([c_start, inside, c_end])
         c_start, c_end = clearance[:, :-1].ravel(), clearance[:, 1:].ravel()

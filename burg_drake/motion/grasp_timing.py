@@ -8,11 +8,11 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.motion.joint_limits import ArmLimits
-from burg_drake.motion.line_timing import HandSpeed, time_line
+from burg_drake.motion.line_timing import HandSpeed, PathMotion, time_line
 from burg_drake.motion.motion_settings import TimingSettings
 from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.plan_files import Plan
-from burg_drake.motion.polyline_timing import IsFree, time_polyline
+from burg_drake.motion.polyline_timing import Cubics, IsFree, time_polyline
 from burg_drake.motion.reach_verdict import Witness
 from burg_drake.motion.trajectory import Motion, Trajectory
 from burg_drake.station import GraspMotion
@@ -78,36 +78,22 @@ def time_motion(
         deviation=settings.corner_deviation,
         is_free=checks.transfer,
     )
+
+    def timed_line(
+        name: str, rows: Array, hand: HandSpeed, is_free: IsFree | None
+    ) -> PathMotion | Cubics:
+        rows = _require_within_limits(rows, limits, name)
+        return time_line(
+            rows, kinematics, gentle, hand, lines, is_free=is_free, limit_margin=limit_margin
+        )
+
     slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
-    approach = time_line(
-        _require_within_limits(witness.approach, limits, "approach"),
-        kinematics,
-        gentle,
-        slow,
-        lines,
-        is_free=checks.approach,
-        limit_margin=limit_margin,
-    )
-    lift = time_line(
-        _require_within_limits(witness.lift, limits, "lift"),
-        kinematics,
-        gentle,
-        _lift_speed(_hand_path_length(witness.lift, kinematics), settings),
-        lines,
-        is_free=checks.lift,
-        limit_margin=limit_margin,
-    )
+    approach = timed_line("approach", witness.approach, slow, checks.approach)
+    rising = _lift_speed(_hand_path_length(witness.lift, kinematics), settings)
+    lift = timed_line("lift", witness.lift, rising, checks.lift)
     retreat = None
     if witness.retreat is not None:
-        back = time_line(
-            _require_within_limits(witness.retreat, limits, "retreat"),
-            kinematics,
-            gentle,
-            _retreat_speed(settings),
-            lines,
-            is_free=checks.retreat,
-            limit_margin=limit_margin,
-        )
+        back = timed_line("retreat", witness.retreat, _retreat_speed(settings), checks.retreat)
         retreat = _sample_motion(back, witness.retreat, limits, settings)
     return Plan(
         _sample_motion(transfer, witness.transfer, limits, settings),
@@ -129,8 +115,8 @@ def _require_within_limits(q: Array, limits: ArmLimits, name: str) -> Array:
 
 
 def _lift_speed(height: float, settings: TimingSettings) -> HandSpeed:
-    """Half of the time full acceleration, half of it full braking, as over `REFERENCE_LIFT_HEIGHT`: what the hand
-    holds feels the same load on any height."""
+    """Half of the time full acceleration and half of it full braking, as hard as over
+    `REFERENCE_LIFT_HEIGHT`: what the hand holds feels the same load at any height."""
     time = settings.lift_time * np.sqrt(height / REFERENCE_LIFT_HEIGHT)
     acceleration = 4.0 * REFERENCE_LIFT_HEIGHT / settings.lift_time**2
     return HandSpeed(float(acceleration * time / 2.0), acceleration, settings.ramp)
@@ -154,17 +140,16 @@ def _sample_motion(
     motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
 ) -> Trajectory:
     """Samples that keep the limits, by their differences, too."""
-    limit_tolerance = 1e-6  # Relative excess of samples over a limit.
-    slowdown_margin = 1.0005  # Samples miss the peaks, so the motion is slowed down a little more.
     max_slowdowns = 20  # Times that a motion is slowed down.
     motion, kept = motion.time_scaled(1.0 / settings.speed), limits.slowed(settings.speed)
     for _ in range(max_slowdowns):
         trajectory = Trajectory.of(motion, path[0], path[-1], settings.rate)
         factor = kept.time_scale(trajectory.peaks())
-        if factor <= 1.0 + limit_tolerance:
+        if factor <= 1.0 + 1e-6:
             return trajectory
-        motion = motion.time_scaled(slowdown_margin * factor)
+        # Samples miss the peaks, so the motion is slowed down by 0.05 % more.
+        motion = motion.time_scaled(1.0005 * factor)
     raise InvalidInputError(
-        f"a motion still exceeds the limits of the arm after it was slowed down {max_slowdowns} times, to"
-        f" {motion.duration:g} s"
+        f"a motion still exceeds the limits of the arm after it was slowed down {max_slowdowns}"
+        f" times, to {motion.duration:g} s"
     )

@@ -115,20 +115,16 @@ def read_hand_parts(
 
 def is_hand_symmetric(parts: Sequence[HandPart]) -> bool:
     """Whether a hand occupies the same space when it is turned by half a turn about its approach:
-    by how far its shapes reach in `DIRECTIONS` directions."""
-    direction_count = 64  # Directions in which the symmetry of a hand is checked.
-    tolerance = 1e-9  # Metres.
+    by how far its shapes reach in 64 directions."""
     rng = rng_from("burg_drake directions")
-    directions = rng.normal(size=(direction_count, 3))
+    directions = rng.normal(size=(64, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     shapes = [shape for part in parts for shape in part.shapes]
     reach = np.array([_support_distance(shape, directions) for shape in shapes])
-    turned = np.array(
-        [_support_distance(shape, directions * (-1.0, -1.0, 1.0)) for shape in shapes]
-    )
-    return bool(
-        np.abs(np.sort(reach, axis=0) - np.sort(turned, axis=0)).max(initial=0.0) < tolerance
-    )
+    about_z = directions * (-1.0, -1.0, 1.0)
+    turned = np.array([_support_distance(shape, about_z) for shape in shapes])
+    gap = np.sort(reach, axis=0) - np.sort(turned, axis=0)
+    return bool(np.abs(gap).max(initial=0.0) < 1e-9)
 
 
 def _support_distance(shape: Shape, directions: Array) -> Array:
@@ -137,7 +133,7 @@ def _support_distance(shape: Shape, directions: Array) -> Array:
     along = directions @ shape.X_BP[:3, 3]
     if isinstance(shape.convex, (Ball, Cylinder)):
         components = (d_P[:, 0], d_P[:, 1], d_P[:, 2])
-        return np.asarray(along + shape.convex.reach(components))
+        return np.asarray(along + shape.convex.support_distance(components))
     assert shape.polytope is not None  # all others are polytopes
     return np.asarray(along + (d_P @ shape.polytope.vertices.T).max(axis=1))
 
@@ -174,7 +170,6 @@ def deepest_overlap_along_path(
         is so short that no place of the finest grid has it.
     """
     steps = (0.02, 0.002)  # Metres. The second step is used where the first finds no overlap.
-    min_step = 0.5e-3  # Metres. Accuracy of the place of the deepest overlap.
     depth, at = np.zeros(len(X_WG)), np.full(len(X_WG), np.nan)
     for step in steps:
         left = np.flatnonzero(depth == 0.0)
@@ -184,7 +179,8 @@ def deepest_overlap_along_path(
         depth[left], at[left] = found.max(axis=1), places[found.argmax(axis=1)]
     step = steps[0] / 2
     found_any = np.flatnonzero(depth > 0.0)
-    while step > min_step and len(found_any):
+    # The place of the deepest overlap is found to within 0.5 mm.
+    while step > 0.5e-3 and len(found_any):
         i = found_any
         s = np.clip(at[i, None] + np.array((-step, step)), 0.0, length)
         found = _overlap_depths(screen, X_WG[i], names[i], u_W[i], s)
@@ -220,7 +216,7 @@ class SweepResult:
         blocker: (N,) name of the body that is; "" where the way is free.
         clearance: (N,) smallest signed distance on the way [m]. Where it is free, that of the hand
             from other bodies: a lower bound, exact where no cylinder is swept across its axis (see
-            `geometry.bodies.SIDES`). Where not, minus the depth of the overlap with the blocker.
+            `geometry.swept_shape`). Where not, minus the depth of the overlap with the blocker.
         at: (N,) how far from the grasp that depth is met [m]; NaN where the way is free, or the
             overlap too short to be found.
     """

@@ -19,8 +19,8 @@ class HomeClearance:
     """How near the arm at home is to anything, itself included.
 
     Attributes:
-        distance: of the nearest pair of bodies [m]; `FAR` if none is nearer.
-        link, other: their names; empty if none is nearer than `FAR`.
+        distance: of the nearest pair of bodies, at most 1 [m].
+        link, other: their names; empty if none is that near.
     """
 
     distance: float
@@ -70,15 +70,13 @@ def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) 
 
 
 def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
-    """What the arm's base is in deeper than `BASE_TOLERANCE` and may not be in by `arm.stands_in`;
-    the checks of configurations leave that out, as neither of the two can move.
+    """What the arm's base is in by more than 5 mm although `arm.stands_in` does not allow it; the
+    checks of configurations leave that out, as neither of the two can move.
 
     Returns:
         By shapes of the base and what they are in (table, obstacles, fixed instances), the deepest
         first.
     """
-    max_base_depth = 5e-3  # Metres. The feet of an arm are modelled roughly.
-    min_upward_z = 0.99  # z of a unit vector that points up.
     plant, arm = station_diagram.plant, _arm_document(station_diagram)
     model = plant.GetModelInstanceByName("arm")
     base = plant.GetFrameByName(arm.base, model).body()
@@ -91,10 +89,10 @@ def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
         others = plant.GetCollisionGeometriesForBody(plant.get_body(around[name]))
         for (link, shape), other in product(shapes, others):
             pair = query.ComputeSignedDistancePairClosestPoints(shape, other)
-            if -pair.distance > max_base_depth:
+            if -pair.distance > 5e-3:  # the feet of an arm are modelled roughly
                 normal = pair.nhat_BA_W if pair.id_A == shape else -pair.nhat_BA_W
                 shape_name = query.inspector().GetName(shape).split("::")[-1]
-                upwards = bool(normal[2] > min_upward_z)
+                upwards = bool(normal[2] > 0.99)
                 depth = float(-pair.distance)
                 found.append(BaseOverlap(name, depth, link, shape_name, upwards))
     return tuple(sorted(found, key=lambda overlap: (-overlap.depth, str(overlap))))
@@ -115,13 +113,11 @@ def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
         rise = np.ceil(depth) / 1e3
         moves = f"raise the base by {1e3 * rise:.0f} mm (arm.X_WA.translation: "
         moves += f"[{x:g}, {y:g}, {z + rise:g}])"
-    allowed = [*arm.stands_in, name] if arm is not None else [name]
-    stated = name == "table" or name in station.document.background
-    let_in = (
-        f", or write arm.stands_in: [{', '.join(allowed)}] if the base is mounted inside it"
-        if stated
-        else ""
-    )
+    allowed, let_in = [*arm.stands_in, name] if arm is not None else [name], ""
+    if name == "table" or name in station.document.background:
+        let_in = (
+            f", or write arm.stands_in: [{', '.join(allowed)}] if the base is mounted inside it"
+        )
     return (
         f"arm.X_WA puts the arm's base {depth:.0f} mm deep into {name!r} by its collision shapes"
         f" ({listed}{more}); {moves}{let_in}"
@@ -137,13 +133,10 @@ def home_clearance(station_diagram: StationDiagram) -> HomeClearance:
     hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
     robot, names = set(station_diagram.robot_bodies), station_diagram.body_names
     nearest = HomeClearance(max_distance)
-    for pair in _default_query(station_diagram).ComputeSignedDistancePairwiseClosestPoints(
-        max_distance
-    ):
-        a, b = (
-            plant.GetBodyFromFrameId(inspector.GetFrameId(g)).index()
-            for g in (pair.id_A, pair.id_B)
-        )
+    query = _default_query(station_diagram)
+    for pair in query.ComputeSignedDistancePairwiseClosestPoints(max_distance):
+        frames = (inspector.GetFrameId(geometry) for geometry in (pair.id_A, pair.id_B))
+        a, b = (plant.GetBodyFromFrameId(frame).index() for frame in frames)
         if a not in robot:
             a, b = b, a
         if pair.distance < nearest.distance and a in robot and not {a, b} <= hand:
@@ -154,8 +147,7 @@ def home_clearance(station_diagram: StationDiagram) -> HomeClearance:
 def _default_query(station_diagram: StationDiagram) -> QueryObject:
     """Distances in the default context, in which the arm is at home."""
     context = station_diagram.diagram.CreateDefaultContext()
-    query = station_diagram.diagram.GetOutputPort("geometry_query").Eval(context)
-    return query
+    return station_diagram.diagram.GetOutputPort("geometry_query").Eval(context)
 
 
 def _arm_document(station_diagram: StationDiagram) -> Arm:

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from burg_drake.core import Array, rng_from
 from burg_drake.motion.edge_checker import EdgeChecker
-from burg_drake.motion.roadmap import Roadmap
+from burg_drake.motion.roadmap import Roadmap, chain_to_root
 
 
 def shorten_path(edges: EdgeChecker, path: Array, scale: Array) -> Array:
@@ -28,17 +28,15 @@ def shorten_path(edges: EdgeChecker, path: Array, scale: Array) -> Array:
     Returns:
         (L, n) corners of a free way with the same ends, at most as long as `path`.
     """
-    max_rounds = 2  # Repetitions on the path found.
-    min_gain = 1e-3  # Relative gain in length below which a round is the last one.
     known: dict[bytes, bool] = {}
     if len(path) > 2 and _is_segment_free(edges, path[[0, -1]], known):
         return np.asarray(path[[0, -1]])
-    for _ in range(max_rounds if len(path) > 2 and _path_length(path, scale) > 0.0 else 0):
+    for _ in range(2 if len(path) > 2 and _path_length(path, scale) > 0.0 else 0):
         other = _shortest_through(edges, _path_points(path, scale), scale, known)
         gain = _path_length(path, scale) - _path_length(other, scale)
         if gain >= 0.0:
             path = other
-        if gain <= min_gain * _path_length(path, scale):
+        if gain <= 1e-3 * _path_length(path, scale):
             break
     return path
 
@@ -48,11 +46,10 @@ def _path_length(path: Array, scale: Array) -> float:
 
 
 def _path_points(path: Array, scale: Array) -> Array:
-    """The corners and points at even distances between them."""
-    point_count = 10  # Points along the path, beside its corners.
+    """The corners and 10 points at even distances along the path."""
     steps = np.sqrt((np.diff(path * scale, axis=0) ** 2).sum(axis=1))
     at = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = np.unique(np.concatenate([at, np.linspace(0.0, at[-1], point_count)]))
+    wanted = np.unique(np.concatenate([at, np.linspace(0.0, at[-1], 10)]))
     return np.column_stack([np.interp(wanted, at, joint) for joint in path.T])
 
 
@@ -91,10 +88,7 @@ def _shortest_through(
             free[pair] = allowed[pair] = verdict
     while True:
         _, before = dijkstra(np.where(allowed, length, 0.0), indices=0, return_predecessors=True)
-        chain = [len(q) - 1]
-        while chain[-1] != 0:
-            chain.append(int(before[chain[-1]]))
-        chain.reverse()
+        chain = chain_to_root(before, len(q) - 1)[::-1]
         asked = [pair for pair in pairwise(chain) if not free[pair]]
         blocked = edges.first_blocked_each([q[list(pair)] for pair in asked])
         for pair, at in zip(asked, blocked, strict=True):
@@ -107,7 +101,6 @@ def search_from_goals(
     roadmap: Roadmap, edges: EdgeChecker, goals: Array, lower: Array, upper: Array
 ) -> tuple[int, Array] | None:
     """Looks for a way from home to any of (K, n) goals; see `HomeTree.connect`."""
-    max_rounds = 24  # Batches of samples before the search gives up.
     bounds = edges.proximity.bounds(goals)
     roots = np.flatnonzero(~bounds.blocked if edges.exact else bounds.likely_free)
     if not len(roots):
@@ -116,7 +109,7 @@ def search_from_goals(
     # A goal that is not even likely free says that bounds are too loose around here to guess by.
     guess = bool(bounds.likely_free[roots].any())
     trees = _Trees(goals[roots], guess)
-    for _ in range(max_rounds):
+    for _ in range(24):  # batches of samples before the search gives up
         new = trees.grow(roadmap, edges, _draw_samples(trees.q, lower, upper, rng))
         for node, entry in _connections(roadmap, edges, trees.q, new, guess):
             chain = trees.chain(node)
@@ -143,12 +136,11 @@ def _draw_samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator
 def _connections(
     roadmap: Roadmap, edges: EdgeChecker, q: Array, new: NDArray[np.intp], guess: bool
 ) -> list[tuple[int, int]]:
-    """New nodes and nodes of the roadmap between which the screen finds a free segment, the
-    shortest first."""
-    neighbour_count = 3  # Nodes of the roadmap that a new node is tried with.
+    """New nodes and near nodes of the roadmap (3 each) between which the screen finds a free
+    segment, the shortest first."""
     if not len(new):
         return []
-    entry = np.concatenate([roadmap.near(q[node], neighbour_count) for node in new])
+    entry = np.concatenate([roadmap.near(q[node], 3) for node in new])
     node = np.repeat(new, len(entry) // len(new))
     screened = edges.screen(roadmap.q[entry], q[node])
     free = np.flatnonzero(edges.seem_free(screened, guess=guess))
@@ -170,12 +162,12 @@ class _Trees:
 
     def grow(self, roadmap: Roadmap, edges: EdgeChecker, samples: Array) -> NDArray[np.intp]:
         """Steps from the nearest nodes towards samples (S, n); indices of the new nodes."""
-        max_step = 0.4  # Metres of displacement. Longest step of a tree.
         offset = samples[:, None] - self.q
         distance = (np.abs(offset) * roadmap.scale).sum(axis=-1)
         nearest = distance.argmin(axis=1)
         rows = np.arange(len(samples))
-        share = np.minimum(1.0, max_step / np.maximum(distance[rows, nearest], 1e-12))
+        # A tree grows by steps of at most 0.4 m of displacement.
+        share = np.minimum(1.0, 0.4 / np.maximum(distance[rows, nearest], 1e-12))
         q_a = self.q[nearest]
         q_b = q_a + share[:, None] * offset[rows, nearest]
         free = edges.seem_free(edges.screen(q_a, q_b), guess=self._guess)
@@ -185,10 +177,7 @@ class _Trees:
 
     def chain(self, node: int) -> list[int]:
         """The nodes from one to its goal."""
-        chain = [node]
-        while self._towards[chain[-1]] >= 0:
-            chain.append(int(self._towards[chain[-1]]))
-        return chain
+        return chain_to_root(self._towards, node)
 
 
 class HomeTree:
@@ -283,5 +272,5 @@ class HomeTree:
         return paths
 
     def shortcut(self, path: Array) -> Array:
-        """A way with the same ends that is no longer; see `motion.home_tree`."""
+        """A way with the same ends that is no longer; see `shorten_path`."""
         return shorten_path(self.edges, path, self.roadmap.scale)

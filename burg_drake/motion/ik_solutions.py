@@ -221,14 +221,13 @@ class RoutineSolutions:
         return found
 
     def _check(self, X_AH: Array, q: Array) -> None:
-        # Metres and radians. A calibrated arm deviates less from its data sheet.
-        max_deviation = 5e-3
         if not np.isfinite(q).all():
             raise InvalidInputError("the IK routine returned joint positions that are not finite")
         X = self._arm.forward(q)[0]
         off = np.linalg.norm(X[:, :3, 3] - X_AH[:, :3, 3], axis=1)
         turned = rotation_angle(X[:, :3, :3].swapaxes(-1, -2) @ X_AH[:, :3, :3])
-        if len(q) and max(off.max(), turned.max()) > max_deviation:
+        # Metres and radians. A calibrated arm deviates less from its data sheet.
+        if len(q) and max(off.max(), turned.max()) > 5e-3:
             k = int(np.argmax(np.maximum(off, turned)))
             raise InvalidInputError(
                 f"the joint positions {q[k].round(4).tolist()} of the IK routine place the hand"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, Indices, Outcome, inverse
 from burg_drake.geometry import Poses, rotate
+from burg_drake.motion.line_search import Chain
 from burg_drake.motion.motion_settings import ReachSettings
 from burg_drake.motion.numeric_ik import ArmKinematics, solve_ik
 from burg_drake.motion.panda_ik import IK_BRANCHES, PandaIk, panda_forward
@@ -49,7 +51,7 @@ class LinePoses:
     @property
     def layers(self) -> Array:
         """(L,) lengths at which postures of the arm are looked for, from pregrasp to the top of the
-        lift, at most `LAYER` apart; grasp and end of the retreat are among them [m]."""
+        lift, at most 5 cm apart; grasp and end of the retreat are among them [m]."""
         approach, retreat, lift = map(_layer_distances, (self.standoff, self.retreat, self.lift))
         return np.concatenate([-approach[:0:-1], retreat, self.retreat + lift[1:]])
 
@@ -88,6 +90,31 @@ class LinePoses:
         placed = Poses.of(X) @ Poses.of(self.X_GH)
         X[..., :3, :3], X[..., :3, 3] = placed.R, placed.p
         return X
+
+    def chain(
+        self, X_AG: Array, flip: int, rows: DenseRows, own: slice, lower: Array, place: Any
+    ) -> Chain:
+        """A chain of some rows.
+
+        Args:
+            X_AG: (4, 4) grasp in the arm's base frame.
+            flip: which of the two ways to put the fingers it is.
+            rows: of several chains.
+            own: those of this one.
+            lower: lower bounds of the clearance at all rows [m].
+            place: see `Chain`.
+        """
+        layer = rows.layer[own]
+        length = np.interp(layer, np.arange(len(self.layers)), self.layers)
+        return Chain(
+            flip=flip,
+            q=rows.q[own],
+            at_grasp=int(np.searchsorted(layer, self.at_grasp)),
+            at_retreated=int(np.searchsorted(layer, self.at_retreated)),
+            moved_W=self.carried(X_AG, length),
+            lower=lower[own],
+            place=place,
+        )
 
     def carried(self, X_AG: Array, distance: Array) -> Array:
         """How far what the hand holds from the grasp on has been moved in the world.
@@ -160,11 +187,10 @@ def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
     Returns:
         The rows.
     """
-    max_halvings = 6  # From 1 cm down to 0.2 mm.
     m = len(every.X_AG)
     chain, layer = np.repeat(np.arange(m), len(at)), np.tile(at, m)
     q, broken = every.solve(chain, layer)
-    for _ in range(max_halvings):
+    for _ in range(6):  # from 1 cm down to 0.2 mm
         first = np.flatnonzero((chain[1:] == chain[:-1]) & ~broken[1:] & ~broken[:-1])
         if len(at) < 2 or not len(first):
             break

@@ -143,7 +143,7 @@ class SuccessiveLineSearch:
 
 
 class _SuccessiveBatch:
-    """See `line_search.LineSearch`."""
+    """See `LineSearchBatch`."""
 
     def __init__(
         self, search: SuccessiveLineSearch, first: LineSearchBatch, X_AG: Array, clearance: Array

@@ -68,11 +68,8 @@ class LinePath:
         fine_spacing = 0.0025
         # Of the knots' second differences: bent over 3 knots, 10, or all.
         smoothing_weights = (1e2, 1e4, np.inf)
-        wanted = [
-            (max_spacing, 0.0),
-            *((max_spacing, weight) for weight in smoothing_weights if smoother),
-        ]
-        for spacing, weight in (*wanted, (fine_spacing, 0.0)):
+        weights = (0.0, *smoothing_weights) if smoother else (0.0,)
+        for spacing, weight in (*((max_spacing, w) for w in weights), (fine_spacing, 0.0)):
             path = self._path(spacing, weight)
             if path is not None:
                 yield path
@@ -106,11 +103,10 @@ class LinePath:
             deviation: farthest from the rows' polyline [rad], if there is no check.
             is_free: the check, or None.
         """
-        rows_per_knot = 4  # Rows at which a path is checked.
         low, high = spline_extremes(path)
         if (low < self.kinematics.lower).any() or (high > self.kinematics.upper).any():
             return False
-        q = path(np.linspace(0.0, self.length, rows_per_knot * (len(path.x) - 1) + 1))
+        q = path(np.linspace(0.0, self.length, 4 * (len(path.x) - 1) + 1))
         X_AH = self.kinematics.forward(q)[0]
         if line_error(X_AH, self.X_AH[0], self.X_AH[-1]) > straightness:
             return False
@@ -145,7 +141,7 @@ def spline_extremes(path: CubicSpline) -> tuple[Array, Array]:
 
 def line_error(X_AH: Array, X_A0: Array, X_A1: Array) -> float:
     """Largest distance of hand poses (N, 4, 4) from the straight line between two poses [m]; a turn
-    away from the first counts with a lever of `LEVER`."""
+    away from the first counts with a lever of 10 cm."""
     lever = 0.1  # Metres from the hand at which its rotation counts as a deviation.
     segment = X_A1[:3, 3] - X_A0[:3, 3]
     offset = X_AH[:, :3, 3] - X_A0[:3, 3]
@@ -238,13 +234,12 @@ def time_line(
         is_free: the check of all but the polyline of the rows.
         limit_margin: distance to keep from the joints' limits [rad or m], where the rows do.
     """
-    polyline_deviation = 0.002  # Radians, where no smooth path will do.
-    coarsening = 4  # Sample interval of the peaks over that of a plan.
     line = LinePath.of(rows, kinematics, limit_margin)
     if line.length > 0.0:
         slow: list[PathMotion] = []
         for path in line.paths(smoother=is_free is not None):
-            motion, full = _fastest_line_motion(path, hand, limits, settings.rate / coarsening)
+            # Peaks are looked for at every fourth sample of a plan.
+            motion, full = _fastest_line_motion(path, hand, limits, settings.rate / 4)
             if not full:
                 slow.append(motion)
             elif line.is_good(path, settings.straightness, settings.line_deviation, is_free):
@@ -253,14 +248,14 @@ def time_line(
             if line.is_good(motion.path, settings.straightness, settings.line_deviation, is_free):
                 return motion
     least = np.diff(line.travel) / max(hand.speed, np.finfo(float).tiny)
-    return time_polyline(rows, limits, deviation=polyline_deviation, is_free=is_free, least=least)
+    # Where no smooth path will do, corners are cut by 0.002 rad.
+    return time_polyline(rows, limits, deviation=0.002, is_free=is_free, least=least)
 
 
 def _fastest_line_motion(
     path: CubicSpline, hand: HandSpeed, limits: ArmLimits, rate: float
 ) -> tuple[PathMotion, bool]:
     """The fastest motion found along a path, and whether the hand has its full speed."""
-    speed_count = 5  # Top speeds of the hand that are tried.
     limit_share = 0.998  # Share of the limits that is used. Peaks are sampled at single times.
     length = float(path.x[-1])
     best = PathMotion(path, hand.over(length))
@@ -268,7 +263,7 @@ def _fastest_line_motion(
     if time_scale <= 1.0:
         return best, True
     best = best.time_scaled(time_scale)
-    for share in np.geomspace(1.0, 1.0 / time_scale, speed_count)[1:]:
+    for share in np.geomspace(1.0, 1.0 / time_scale, 5)[1:]:
         motion = PathMotion(path, hand.over(length, float(share)))
         if motion.duration < best.duration:
             factor = limits.time_scale(motion.peaks(rate)) / limit_share

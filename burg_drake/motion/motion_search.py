@@ -209,11 +209,11 @@ class MotionSearch:
             return Reach(Outcome.NO_PATH)
         failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
         if refusal is not None and refusal.rank[0] >= _progress_rank(failure.outcome):
-            return _reason_rank(refusal.outcome, refusal.overlap)
+            return _reach_blocked_by(refusal.outcome, refusal.overlap)
         least = self._least_overlapping(grasp, failure)
         if least is None:
             return Reach(failure.outcome, excess=failure.excess)
-        return _reason_rank(failure.outcome, least)
+        return _reach_blocked_by(failure.outcome, least)
 
     def _least_overlapping(self, grasp: int, failure: Failure) -> Overlap | None:
         """What is in the way, of the configuration where that is least."""
@@ -230,7 +230,7 @@ def _progress_rank(outcome: Outcome) -> int:
     return PROGRESS_ORDER.index(outcome) if outcome in PROGRESS_ORDER else -1
 
 
-def _reason_rank(outcome: Outcome, overlap: Overlap | None) -> Reach:
+def _reach_blocked_by(outcome: Outcome, overlap: Overlap | None) -> Reach:
     if overlap is None:
         return Reach(outcome)
     return Reach(outcome, str(overlap), -overlap.depth)

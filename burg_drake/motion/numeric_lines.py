@@ -75,13 +75,12 @@ class ChainCandidates:
         Returns:
             Indices of what is new.
         """
-        # Radians or metres between joints of postures that count as the same.
-        posture_tolerance = 0.05
         first = len(self)
         if not len(q):
             return np.empty(0, np.intp)
         every_flip, every = np.append(self.flip, flip), np.concatenate([self.q[:, pose], q])
-        same = np.abs(every[first:, None] - every).max(axis=-1) <= posture_tolerance
+        # Postures whose joints are no more than 0.05 rad or m apart count as the same.
+        same = np.abs(every[first:, None] - every).max(axis=-1) <= 0.05
         same &= every_flip[first:, None] == every_flip
         kept = np.flatnonzero(same.argmax(axis=1) == np.arange(first, len(every)))
         count = len(kept)
@@ -299,7 +298,7 @@ class NumericLineSearch:
 
 
 class _NumericBatch:
-    """See `line_search.LineSearch`."""
+    """See `LineSearchBatch`."""
 
     def __init__(self, search: NumericLineSearch, X_AG: Array, clearance: Array) -> None:
         self._search, self._X_AG = search, X_AG
@@ -429,9 +428,8 @@ class _NumericBatch:
         self, grasp: int, k: int, rows: DenseRows, own: slice, lower: Array, upper: Array
     ) -> Chain | None:
         search, of = self._search, self._of[grasp]
-        layer, q = rows.layer[own], rows.q[own]
-        length = np.interp(layer, np.arange(len(search.layers)), search.layers)
-        moved_W = search.lines.carried(self._X_AG[grasp, of.flip[k]], length)
+        layer, flip = rows.layer[own], int(of.flip[k])
+        chain = search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, k)
         blocked = ~(upper[own] > 0.0)
         bad = np.flatnonzero(rows.broken[own] | blocked)
         if len(bad):
@@ -440,28 +438,18 @@ class _NumericBatch:
             stage, bad = SEGMENT_STAGES[int(on.min())][0], bad[on == on.min()]
             row = bad[upper[own][bad].argmin()]
             if blocked[row]:
-                of.block(k, stage, q[row], moved_W[row], float(upper[own][row]))
+                of.block(k, stage, chain.q[row], chain.moved_W[row], float(upper[own][row]))
             else:
                 of.stop(k, stage)
             return None
-        return Chain(
-            flip=int(of.flip[k]),
-            q=q,
-            at_grasp=int(np.searchsorted(layer, search.at_grasp)),
-            at_retreated=int(np.searchsorted(layer, search.lines.at_retreated)),
-            moved_W=moved_W,
-            lower=lower[own],
-            place=k,
-        )
+        return chain
 
     def _explain_no_approach(self, grasp: int) -> Failure:
         """Whether the arm does not get along the line, or has no place at the pregrasp at all."""
         search = self._search
         if search.at_grasp > 0:
-            X_AG, found = self._X_AG[grasp], []
-            for turn in range(search.solutions.rounds):
-                found.append(self._postures(X_AG, 0, turn)[1])
-            q = np.concatenate(found)
+            X_AG, rounds = self._X_AG[grasp], range(search.solutions.rounds)
+            q = np.concatenate([self._postures(X_AG, 0, turn)[1] for turn in rounds])
             if not len(q):
                 return self._beyond_limits(grasp, 0)
             _, upper = search.measure(q)

@@ -28,18 +28,12 @@ from burg_drake.core import Array, Indices, InvalidInputError, check_pose, inver
 from burg_drake.geometry import Poses
 from burg_drake.motion.numeric_ik import ArmKinematics
 
-
-class PandaDimensions:
-    """Panda dimensions."""
-
-    shoulder_height = 0.333  # Metres above the base.
-    upper_arm = 0.316  # Metres from shoulder to elbow, along the link.
-    forearm = 0.384  # Metres from elbow to wrist, along the link.
-    elbow_offset = 0.0825  # Metres from the elbow's axis to both links.
-    wrist_offset = 0.088  # Metres from the wrist to the last axis.
-    flange_length = 0.107  # Metres along the last axis to the flange.
-
-
+SHOULDER_HEIGHT = 0.333  # Metres above the base.
+UPPER_ARM = 0.316  # Metres from shoulder to elbow, along the link.
+FOREARM = 0.384  # Metres from elbow to wrist, along the link.
+ELBOW_OFFSET = 0.0825  # Metres from the elbow's axis to both links.
+WRIST_OFFSET = 0.088  # Metres from the wrist to the last axis.
+FLANGE_LENGTH = 0.107  # Metres along the last axis to the flange.
 IK_BRANCHES = 8  # Solutions of the Panda at one hand pose and one value of its last joint, at most.
 
 
@@ -84,12 +78,11 @@ class PandaIk:
         Its joints have to turn as the Panda's do, on a base frame A like that of link 0; limits and
         the hand's place are its own.
         """
-        pose_tolerance = 1e-9  # Metres, and matrix entries.
         if len(arm.lower) != len(PANDA_DH_PARAMETERS) or not (arm.turns == 1.0).all():
             return None
         q = np.linspace(-1.0, 1.0, 5)[:, None] * np.arange(1.0, 8.0) % 2.0 - 1.0
         X_FH = inverse(panda_forward(q)) @ arm.forward(q)[0]
-        if np.abs(X_FH - X_FH[0]).max() > pose_tolerance:
+        if np.abs(X_FH - X_FH[0]).max() > 1e-9:
             return None
         return cls(X_FH[0], arm.lower, arm.upper)
 
@@ -187,27 +180,17 @@ class _Wrist(_PoseParameterPairs):
         x, y, z = (X_AF.R[:, :, k].T[:, :, None] for k in range(3))
         x6, z6 = c * x - s * y, s * x + c * y
         y6 = np.broadcast_to(-z, x6.shape)
-        v = (
-            PandaDimensions.wrist_offset * x6
-            + PandaDimensions.flange_length * z
-            - X_AF.p.T[:, :, None]
-        )
-        v[2] += PandaDimensions.shoulder_height
+        v = WRIST_OFFSET * x6 + FLANGE_LENGTH * z - X_AF.p.T[:, :, None]
+        v[2] += SHOULDER_HEIGHT
         along = np.stack([_dot(v, x6), _dot(v, y6), _dot(v, z6)])
         pair = np.arange(first, first + q7.size)
         return cls(pair, q7.ravel(), *(a.reshape(3, -1) for a in (v, x6, y6, along)))
 
     def elbows(self) -> Iterator[tuple[int, Array, _Wrist]]:
         """Joint 4, from the length of the triangle's side opposite to the elbow."""
-        p, q = (
-            PandaDimensions.upper_arm * PandaDimensions.forearm - PandaDimensions.elbow_offset**2,
-            -PandaDimensions.elbow_offset * (PandaDimensions.upper_arm + PandaDimensions.forearm),
-        )
-        straight = (
-            2.0 * PandaDimensions.elbow_offset**2
-            + PandaDimensions.upper_arm**2
-            + PandaDimensions.forearm**2
-        )
+        p = UPPER_ARM * FOREARM - ELBOW_OFFSET**2
+        q = -ELBOW_OFFSET * (UPPER_ARM + FOREARM)
+        straight = 2.0 * ELBOW_OFFSET**2 + UPPER_ARM**2 + FOREARM**2
         cosine = (_dot(self.v, self.v) - straight) / (2.0 * np.hypot(p, q))
         reached = np.flatnonzero(np.abs(cosine) <= 1.0)
         some, half = self.some(reached), np.arccos(cosine[reached])
@@ -221,16 +204,8 @@ class _Wrist(_PoseParameterPairs):
         the axis of joint 5, is perpendicular to the axis of joint 6.
         """
         c4, s4 = np.cos(q4), np.sin(q4)
-        across = (
-            PandaDimensions.elbow_offset
-            - PandaDimensions.elbow_offset * c4
-            - PandaDimensions.upper_arm * s4
-        )
-        h = (
-            PandaDimensions.elbow_offset * s4
-            - PandaDimensions.upper_arm * c4
-            - PandaDimensions.forearm
-        )
+        across = ELBOW_OFFSET - ELBOW_OFFSET * c4 - UPPER_ARM * s4
+        h = ELBOW_OFFSET * s4 - UPPER_ARM * c4 - FOREARM
         x, y, z = self.along
         radius = np.sqrt(x * x + y * y)
         possible = np.flatnonzero(np.abs(h) <= radius)
@@ -286,13 +261,13 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 PANDA_DH_PARAMETERS = (
-    (0.0, PandaDimensions.shoulder_height, 0.0),
+    (0.0, SHOULDER_HEIGHT, 0.0),
     (0.0, 0.0, -np.pi / 2),
-    (0.0, PandaDimensions.upper_arm, np.pi / 2),
-    (PandaDimensions.elbow_offset, 0.0, np.pi / 2),
-    (-PandaDimensions.elbow_offset, PandaDimensions.forearm, -np.pi / 2),
+    (0.0, UPPER_ARM, np.pi / 2),
+    (ELBOW_OFFSET, 0.0, np.pi / 2),
+    (-ELBOW_OFFSET, FOREARM, -np.pi / 2),
     (0.0, 0.0, np.pi / 2),
-    (PandaDimensions.wrist_offset, 0.0, np.pi / 2),
+    (WRIST_OFFSET, 0.0, np.pi / 2),
 )
 """Craig's parameters a [m], d [m] and alpha [rad] of each joint."""
 
@@ -308,7 +283,7 @@ def panda_forward(q: ArrayLike) -> Array:
         p = p + a * x + d * z
         x, y = c * x + s * y, c * y - s * x
     X = np.zeros((positions.shape[1], 4, 4))
-    for k, column in enumerate((x, y, z, p + PandaDimensions.flange_length * z)):
+    for k, column in enumerate((x, y, z, p + FLANGE_LENGTH * z)):
         X[:, :3, k] = column.T
     X[:, 3, 3] = 1.0
     return X

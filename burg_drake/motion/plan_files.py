@@ -39,15 +39,182 @@ from burg_drake.core import (
     read_rows,
     suppress_numpy_warnings,
 )
-from burg_drake.motion.trajectory import PHASES, PlannedMotion, PlanOrigin, Trajectory
+from burg_drake.motion.trajectory import PHASES, PlanOrigin, Trajectory
 
 if TYPE_CHECKING:
-    from burg_drake.scene import SceneLike
-    from burg_drake.station import StationLike
+    from pydrake.trajectories import PiecewisePolynomial
+
+    from burg_drake.scene import Scene, SceneLike
+    from burg_drake.station import Station, StationLike
 
 PLAN_FORMAT = "burg_drake plan"  # Value of `format` in files of plans.
 PLAN_VERSION = 1  # Version of files of plans.
 NANOSECONDS_PER_SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan:
+    """The motions of one grasp.
+
+    Attributes:
+        transfer: from the home posture to the pregrasp.
+        approach: straight from there to the grasp.
+        lift: straight along the lift, which begins where the retreat ends.
+        close_time: time that the hand takes to close, after the approach [s].
+        opening: distance between the pads before the hand closes [m] ...
+        width: ... and once it holds the target [m]; NaN if nobody knows.
+        origin: what it is for; None if nobody has said.
+        retreat: straight back from the grasp with what the hand holds; None if the lift begins at
+            the grasp.
+    """
+
+    transfer: Trajectory
+    approach: Trajectory
+    lift: Trajectory
+    close_time: float = 1.0
+    opening: float = np.nan
+    width: float = np.nan
+    origin: PlanOrigin | None = None
+    retreat: Trajectory | None = None
+
+    @property
+    def phases(self) -> dict[str, Trajectory]:
+        """Those of `PHASES` that there are, in their order; each begins with the row that the last
+        one ends with."""
+        close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
+        parts = (self.transfer, self.approach, close, self.retreat, self.lift)
+        return {name: part for name, part in zip(PHASES, parts, strict=True) if part is not None}
+
+    def __repr__(self) -> str:
+        phases = ", ".join(f"{name} {part.duration:.2f} s" for name, part in self.phases.items())
+        of = f"{self.origin.instance!r} of {self.origin.scene!r}: " if self.origin else ""
+        return f"Plan({of}{phases}; {self.approach.q.shape[1]} joints)"
+
+    @property
+    def whole(self) -> Trajectory:
+        """From home to the top of the lift, with the pause in which the hand closes."""
+        return Trajectory.joined(list(self.phases.values()))
+
+    @property
+    def duration(self) -> float:
+        """Time of all phases [s]."""
+        return sum(phase.duration for phase in self.phases.values())
+
+    def to_drake(self) -> PiecewisePolynomial:
+        """`whole` for Drake's `TrajectorySource`."""
+        return self.whole.to_drake()
+
+    def require_for(
+        self,
+        scene: SceneLike | None = None,
+        station: StationLike | None = None,
+        *,
+        name: str = "the plan",
+    ) -> None:
+        """Refuses a plan for another scene or station, by their contents.
+
+        Args:
+            scene, station: what it has to be for; None does not matter.
+            name: what to call the plan.
+
+        Raises:
+            InvalidInputError: it is for another one, or does not tell what it is for.
+        """
+        hash_digits = 12  # Digits of a content hash in messages.
+        from burg_drake.scene import as_scene  # here: a plan alone needs none of it
+        from burg_drake.station import as_station
+
+        wanted: list[tuple[str, Scene | Station]] = []
+        if station is not None:
+            wanted.append(("station", as_station(station)))
+        if scene is not None:
+            wanted.append(("scene", as_scene(scene)))
+        if wanted and self.origin is None:
+            raise InvalidInputError(
+                f"{name} does not say which scene and arm it is for; a CSV plan has this in"
+                " NAME.csv-metadata.json next to it"
+            )
+        for kind, here in wanted:
+            there = getattr(self.origin, kind), getattr(self.origin, f"{kind}_content")
+            if there[1] != here.content:
+                changed = "as it was before a change" if there[0] == here.name else f"{there[0]!r}"
+                raise InvalidInputError(
+                    f"{name} is for {kind} {changed} (content {str(there[1])[:hash_digits]}), not"
+                    f" for {here.name!r} (content {here.content[:hash_digits]}); plan its grasp"
+                    " here"
+                )
+
+    def to_csv(self, path: str | Path) -> None:
+        """Writes a table that `load_plan` reads, and beside it what the plan is for.
+
+        Raises:
+            InvalidInputError: the place cannot be written to, or the samples are not evenly spaced,
+                or no finite numbers.
+        """
+        path, whole = Path(path), self.whole
+        _require_writable(self)
+        joints = _joint_names(self)
+        meanings = _column_meanings(joints)
+        lines = [",".join(map(_quote_cell, meanings))]
+        times = format_rows(whole.t[:, None])
+        rows = format_rows(np.hstack([whole.q, whole.v, whole.a]))
+        for phase, (first, last) in _phase_spans(self).items():
+            start, end = first if first == 0 else first + 1, f",{_width_cell(self, phase)}"
+            lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
+        described = json.dumps(csv_metadata(path.name, meanings, [_plan_metadata(self)]), indent=1)
+        atomic_write_all({metadata_path(path): described + "\n", path: "\n".join(lines) + "\n"})
+
+    def to_json(self, path: str | Path) -> None:
+        """Writes a document that `load_plan` reads.
+
+        Raises:
+            InvalidInputError: the place cannot be written to, or the samples are not evenly spaced,
+                or no finite numbers.
+        """
+        _require_writable(self)
+        whole = self.whole
+        stamps = np.rint(whole.t * NANOSECONDS_PER_SECOND).astype(int).tolist()
+        times = (divmod(stamp, NANOSECONDS_PER_SECOND) for stamp in stamps)
+        rows = zip(times, *(format_rows(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
+        points = ", ".join(
+            f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
+            f' "time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}}}'
+            for (seconds, nanoseconds), q, v, a in rows
+        )
+        document = _plan_metadata(self) | {
+            "phases": {name: list(span) for name, span in _phase_spans(self).items()},
+            "joint_trajectory": {"joint_names": list(_joint_names(self)), "points": []},
+        }
+        text = json.dumps(document, allow_nan=False)
+        atomic_write(path, text.removesuffix("]}}") + points + "]}}\n")
+
+
+def load_plan(
+    path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
+) -> Plan:
+    """Reads what `Plan.to_json` or `Plan.to_csv` has written.
+
+    Example::
+
+        plan = burg.load_plan("plan.json", station="panda_tabletop")
+        for name, phase in plan.phases.items():
+            print(name, phase.duration, phase.q[-1])
+
+    Args:
+        path: the file; a name that ends in .csv is that of a table.
+        scene, station: what the plan has to be for, if given.
+
+    Raises:
+        InvalidInputError: there is no such file, it is not a plan, or one that is damaged: with
+            times, phases or positions that do not belong together, or beyond its own limits; or it
+            is for another scene or station, or does not tell.
+    """
+    path = Path(path)
+    read = _read_csv if path.suffix.lower() == ".csv" else _read_json
+    plan = read(path)
+    plan.require_for(scene, station, name=str(path))
+    return plan
+
 
 Spans = dict[str, tuple[int, int]]
 """First and last sample of each phase; two that follow one another share one."""
@@ -64,19 +231,19 @@ class PlanDescription:
     origin: PlanOrigin | None
 
 
-def is_hand_closed(phase: str) -> bool:
+def _is_hand_closed(phase: str) -> bool:
     """Whether the hand closes, or is closed, in a phase."""
     return PHASES.index(phase) >= PHASES.index("close")
 
 
-def joint_names(plan: PlannedMotion) -> tuple[str, ...]:
+def _joint_names(plan: Plan) -> tuple[str, ...]:
     """Names of the joints, made up if nobody has said them."""
     if plan.origin is not None:
         return plan.origin.joints
     return tuple(f"joint{i + 1}" for i in range(plan.approach.q.shape[1]))
 
 
-def phase_spans(plan: PlannedMotion) -> Spans:
+def _phase_spans(plan: Plan) -> Spans:
     """Where the phases are among the samples of the whole plan."""
     spans, first = {}, 0
     for name, phase in plan.phases.items():
@@ -85,7 +252,7 @@ def phase_spans(plan: PlannedMotion) -> Spans:
     return spans
 
 
-def require_writable(plan: PlannedMotion) -> None:
+def _require_writable(plan: Plan) -> None:
     """Refuses a plan that could not be read again.
 
     Raises:
@@ -101,7 +268,7 @@ def require_writable(plan: PlannedMotion) -> None:
             raise InvalidInputError(f"phase {name!r} is not sampled at {rate:g} Hz")
 
 
-def plan_metadata(plan: PlannedMotion) -> dict[str, Any]:
+def _plan_metadata(plan: Plan) -> dict[str, Any]:
     """JSON values of all of a plan but its samples."""
     return {
         "format": PLAN_FORMAT,
@@ -116,7 +283,7 @@ def plan_metadata(plan: PlannedMotion) -> dict[str, Any]:
     }
 
 
-def require_plan_version(data: Any, path: str | Path) -> None:
+def _require_plan_version(data: Any, path: str | Path) -> None:
     """Refuses what is not a plan, or one of another release.
 
     Raises:
@@ -126,12 +293,13 @@ def require_plan_version(data: Any, path: str | Path) -> None:
         raise InvalidInputError(f"{path} is not a plan: its format is not {PLAN_FORMAT!r}")
     if data.get("version") != PLAN_VERSION:
         raise InvalidInputError(
-            f"{path} has version {quote_value(data.get('version'))}; this release reads {PLAN_VERSION}"
+            f"{path} has version {quote_value(data.get('version'))}; this release reads"
+            f" {PLAN_VERSION}"
         )
 
 
 @contextmanager
-def document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
+def _document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
     """A part of a document, whose errors name it."""
     try:
         yield document[name]
@@ -141,32 +309,32 @@ def document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
         raise InvalidInputError(f"{name!r} is missing or was changed") from error
 
 
-def read_plan_description(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescription:
-    """What `plan_metadata` has written.
+def _read_plan_description(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescription:
+    """What `_plan_metadata` has written.
 
     Raises:
         InvalidInputError: it is damaged, or of other joints.
     """
-    with document_part(document, "hand") as hand:
+    with _document_part(document, "hand") as hand:
         opening, width = (
             np.nan if hand[name] is None else float(hand[name]) for name in ("opening", "width")
         )
         if min(opening, width) < 0.0 or np.inf in (opening, width):
             raise ValueError(hand)
         close_time = float(hand["close_time"])
-    with document_part(document, "rate") as rate:
+    with _document_part(document, "rate") as rate:
         if not 0.0 < rate < np.inf:
             raise ValueError(rate)
     origin = None
     if document.get("origin") is not None:
-        with document_part(document, "origin") as data:
+        with _document_part(document, "origin") as data:
             origin = _read_origin(data, joints)
     return PlanDescription(rate, opening, width, close_time, origin)
 
 
-def assemble_plan(
+def _assemble_plan(
     description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
-) -> PlannedMotion:
+) -> Plan:
     """A plan of its samples.
 
     Args:
@@ -193,7 +361,7 @@ def assemble_plan(
         name: Trajectory(exact[: last - first + 1], *(x[first : last + 1] for x in rows))
         for name, (first, last) in spans.items()
     }
-    plan = PlannedMotion(
+    plan = Plan(
         **{name: trajectory for name, trajectory in parts.items() if name != "close"},
         close_time=description.close_time,
         opening=description.opening,
@@ -223,7 +391,7 @@ def _require_spans(spans: Spans, count: int) -> None:
         end = last
 
 
-def _require_rest(parts: Mapping[str, Trajectory], plan: PlannedMotion) -> None:
+def _require_rest(parts: Mapping[str, Trajectory], plan: Plan) -> None:
     """The arm rests between the phases, and for as long as the hand closes."""
     for name, trajectory in parts.items():
         if np.any([trajectory.v[[0, -1]], trajectory.a[[0, -1]]]):
@@ -274,12 +442,11 @@ def _origin_data(origin: PlanOrigin) -> dict[str, Any]:
         for f in fields(origin)
         if f.name not in ("joints", "limits", "X_WG")
     }
-    limits = {f.name: _finite_values(getattr(origin.limits, f.name)) for f in fields(origin.limits)}
+    limits = {
+        f.name: [_finite_or_none(value) for value in getattr(origin.limits, f.name)]
+        for f in fields(origin.limits)
+    }
     return data | {"X_WG": origin.X_WG.tolist(), "limits": limits}
-
-
-def _finite_values(values: Array) -> list[float | None]:
-    return [_finite_or_none(value) for value in values]
 
 
 def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
@@ -299,32 +466,8 @@ def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
     return PlanOrigin(joints=joints, limits=limits, X_WG=check_pose(data["X_WG"], "X_WG"), **rest)
 
 
-def write_json(plan: PlannedMotion, path: str | Path) -> None:
-    """Writes a plan whole, for `load_plan` and others.
-
-    Raises:
-        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced, or
-            no finite numbers.
-    """
-    require_writable(plan)
-    whole = plan.whole
-    stamps = np.rint(whole.t * NANOSECONDS_PER_SECOND).astype(int).tolist()
-    rows = zip(stamps, *(format_rows(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
-    points = ", ".join(
-        f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
-        f' "time_from_start": {{"sec": {time // NANOSECONDS_PER_SECOND}, "nanosec": {time % NANOSECONDS_PER_SECOND}}}}}'
-        for time, q, v, a in rows
-    )
-    document = plan_metadata(plan) | {
-        "phases": {name: list(span) for name, span in phase_spans(plan).items()},
-        "joint_trajectory": {"joint_names": list(joint_names(plan)), "points": []},
-    }
-    text = json.dumps(document, allow_nan=False)
-    atomic_write(path, text.removesuffix("]}}") + points + "]}}\n")
-
-
-def read_json(path: Path) -> PlannedMotion:
-    """Reads what `write_json` has written.
+def _read_json(path: Path) -> Plan:
+    """Reads what `Plan.to_json` has written.
 
     Raises:
         InvalidInputError: see `load_plan`.
@@ -335,15 +478,15 @@ def read_json(path: Path) -> PlannedMotion:
         raise DocumentError(
             f"{error}; give a file that Plan.to_json or Plan.to_csv wrote"
         ) from error
-    require_plan_version(document, path)
+    _require_plan_version(document, path)
     try:
         return _plan_from_document(document)
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: the plan is damaged: {error}; write it again") from error
 
 
-def _plan_from_document(document: dict[str, Any]) -> PlannedMotion:
-    with document_part(document, "joint_trajectory") as motion:
+def _plan_from_document(document: dict[str, Any]) -> Plan:
+    with _document_part(document, "joint_trajectory") as motion:
         joints = tuple(str(name) for name in motion["joint_names"])
         rows = _read_points(motion["points"], len(joints))
         stamps = [point["time_from_start"] for point in motion["points"]]
@@ -351,12 +494,12 @@ def _plan_from_document(document: dict[str, Any]) -> PlannedMotion:
             [stamp["sec"] + stamp["nanosec"] / NANOSECONDS_PER_SECOND for stamp in stamps],
             dtype=float,
         )
-    description = read_plan_description(document, joints)
-    with document_part(document, "phases") as phases:
+    description = _read_plan_description(document, joints)
+    with _document_part(document, "phases") as phases:
         spans: Spans = {name: (first, last) for name, (first, last) in phases.items()}
         if spans.keys() - set(PHASES):
             raise KeyError(spans)
-        return assemble_plan(description, t, spans, rows)
+        return _assemble_plan(description, t, spans, rows)
 
 
 def _read_points(points: list[dict[str, Any]], n: int) -> list[Array]:
@@ -380,29 +523,8 @@ JOINT_COLUMNS = {
 """Unit and meaning of a joint's columns, by the first letter of their names."""
 
 
-def write_csv(plan: PlannedMotion, path: str | Path) -> None:
-    """Writes the samples of all phases as a table, and what they are for beside it.
-
-    Raises:
-        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced, or
-            no finite numbers.
-    """
-    path, whole = Path(path), plan.whole
-    require_writable(plan)
-    joints = joint_names(plan)
-    meanings = _column_meanings(joints)
-    lines = [",".join(map(_quote_cell, meanings))]
-    times = format_rows(whole.t[:, None])
-    rows = format_rows(np.hstack([whole.q, whole.v, whole.a]))
-    for phase, (first, last) in phase_spans(plan).items():
-        start, end = first if first == 0 else first + 1, f",{_width_cell(plan, phase)}"
-        lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
-    described = json.dumps(csv_metadata(path.name, meanings, [plan_metadata(plan)]), indent=1)
-    atomic_write_all({metadata_path(path): described + "\n", path: "\n".join(lines) + "\n"})
-
-
-def read_csv(path: Path) -> PlannedMotion:
-    """Reads what `write_csv` has written; the table alone is a plan that does not tell what it is
+def _read_csv(path: Path) -> Plan:
+    """Reads what `Plan.to_csv` has written; the table alone is a plan that does not tell what it is
     for.
 
     Raises:
@@ -438,11 +560,11 @@ def _read_csv_metadata(path: Path, header: Sequence[str]) -> dict[str, Any]:
         raise InvalidInputError(
             f"{path} describes a table with other columns; write the plan again"
         )
-    require_plan_version(data, path)
+    _require_plan_version(data, path)
     return dict(data)
 
 
-def _plan_from_rows(rows: CsvRows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
+def _plan_from_rows(rows: CsvRows, joints: tuple[str, ...], data: Any) -> Plan:
     n = len(joints)
     for line, row in rows:
         if len(row) != 3 * n + 3:
@@ -462,24 +584,22 @@ def _plan_from_rows(rows: CsvRows, joints: tuple[str, ...], data: Any) -> Planne
     q, v, a = np.hsplit(values, 3)
     if data is None:
         data = _describe_by_rows(rows, t, spans)
-    plan = assemble_plan(read_plan_description(data, joints), t, spans, (q, v, a))
+    plan = _assemble_plan(_read_plan_description(data, joints), t, spans, (q, v, a))
     _require_widths(plan, rows)
     return plan
 
 
-def _require_widths(plan: PlannedMotion, rows: CsvRows) -> None:
+def _require_widths(plan: Plan, rows: CsvRows) -> None:
     """The hand is open until it closes, and then as wide as the target in all rows."""
-    width_tolerance = 1e-6  # Metres that other programs may round off.
     for line, (_, phase, *_, text) in rows:
         wanted = _width_cell(plan, phase)
         if text == wanted:
             continue
-        if not (
-            wanted and abs(_parse_number(text, "width", line) - float(wanted)) <= width_tolerance
-        ):
+        # Other programs may round off a micrometre.
+        if not (wanted and abs(_parse_number(text, "width", line) - float(wanted)) <= 1e-6):
             raise InvalidInputError(
-                f"width in line {line} is {quote_value(text)}; in phase {phase!r} of this plan it is"
-                f" {quote_value(wanted)}"
+                f"width in line {line} is {quote_value(text)}; in phase {phase!r} of this plan it"
+                f" is {quote_value(wanted)}"
             )
 
 
@@ -520,11 +640,11 @@ def _parse_number(text: str, name: str, line: int) -> float:
         ) from error
 
 
-def _width_cell(plan: PlannedMotion, phase: str) -> str:
+def _width_cell(plan: Plan, phase: str) -> str:
     """Commanded distance between the pads [m]; empty if nobody knows how wide an open hand is."""
-    width = plan.width if is_hand_closed(phase) else plan.opening
+    width = plan.width if _is_hand_closed(phase) else plan.opening
     if np.isnan(width):
-        return "0.0" if is_hand_closed(phase) else ""
+        return "0.0" if _is_hand_closed(phase) else ""
     return repr(float(width))
 
 
@@ -547,43 +667,3 @@ def _quote_cell(text: str) -> str:
     """A text of the header, quoted where that is needed."""
     quotes = any(sign in text for sign in ',"\n\r')
     return '"' + text.replace('"', '""') + '"' if quotes else text
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Plan(PlannedMotion):
-    """The motions of one grasp; attributes are those of `PlannedMotion`."""
-
-    def to_csv(self, path: str | Path) -> None:
-        """Writes a table that `load_plan` reads; see `csv_file`."""
-        write_csv(self, path)
-
-    def to_json(self, path: str | Path) -> None:
-        """Writes a document that `load_plan` reads; see `json_file`."""
-        write_json(self, path)
-
-
-def load_plan(
-    path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
-) -> Plan:
-    """Reads what `Plan.to_json` or `Plan.to_csv` has written.
-
-    Example::
-
-        plan = burg.load_plan("plan.json", station="panda_tabletop")
-        for name, phase in plan.phases.items():
-            print(name, phase.duration, phase.q[-1])
-
-    Args:
-        path: the file; a name that ends in .csv is that of a table.
-        scene, station: what the plan has to be for, if given.
-
-    Raises:
-        InvalidInputError: there is no such file, it is not a plan, or one that is damaged: with
-            times, phases or positions that do not belong together, or beyond its own limits; or it
-            is for another scene or station, or does not tell.
-    """
-    path = Path(path)
-    read = read_csv if path.suffix.lower() == ".csv" else read_json
-    plan = Plan(**vars(read(path)))
-    plan.require_for(scene, station, name=str(path))
-    return plan

@@ -79,7 +79,6 @@ class Planner:
             witness: its motion.
             width: distance between the pads that hold the target [m]; NaN if it is not known.
         """
-        grip_time = 0.2  # Seconds to build up the force after the fingers have closed.
         is_free, hand = self.reach.path_is_free, self.reach.diagram.station.hand
         if len(witness.transfer) > 2:
             witness = replace(witness, transfer=self.reach.shortcut(witness.transfer))
@@ -112,7 +111,7 @@ class Planner:
         finger_travel = high - (low if np.isnan(width) else min(width, high))
         return replace(
             plan,
-            close_time=finger_travel / 2.0 / hand.closing_speed + grip_time,
+            close_time=finger_travel / 2.0 / hand.closing_speed + 0.2,  # builds up the force
             opening=high,
             width=width,
             origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),

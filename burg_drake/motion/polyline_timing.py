@@ -85,9 +85,9 @@ class Cubics:
 
     def peaks(self) -> tuple[Array, Array, Array]:
         """(n,) each: largest absolute velocity, acceleration and jerk."""
-        min_interval = 1e-9  # Seconds. Closer knots are one that was computed in two ways.
         h = np.diff(self.t)[:, None]
-        a, j = self.a[:-1], np.where(h > min_interval, self.j, 0.0)
+        # Knots less than 1 ns apart are one that was computed in two ways.
+        a, j = self.a[:-1], np.where(h > 1e-9, self.j, 0.0)
         turns = np.divide(-a, j, out=np.zeros_like(j), where=j != 0.0)  # where a velocity peaks
         turns = np.where((turns > 0.0) & (turns < h), turns, 0.0)
         inside = self.v[:-1] + turns * (a + turns * j / 2.0)
@@ -199,14 +199,12 @@ def time_polyline(
     Returns:
         The motion; straight between two waypoints.
     """
-    still_duration = 0.001  # Seconds. Duration of a motion that goes nowhere.
     moves = np.abs(np.diff(q, axis=0)).max(axis=1) > 0.0
     least = np.zeros(len(q) - 1) if least is None else least
     q, least = np.concatenate([q[:1], q[1:][moves]]), least[moves]
     if len(q) == 1:
-        return Cubics.from_jerk_steps(
-            q[0], np.array([0.0, still_duration]), np.zeros((2, q.shape[1]))
-        )
+        # A motion that goes nowhere takes 1 ms.
+        return Cubics.from_jerk_steps(q[0], np.array([0.0, 0.001]), np.zeros((2, q.shape[1])))
     stops = Cubics.joined(
         [_time_straight(q[k : k + 2], limits, least[k]) for k in range(len(least))]
     )
@@ -268,11 +266,11 @@ class _TimedPolyline:
 
     def is_good(self, corner: int, deviation: float, is_free: IsFree) -> bool:
         """Whether the motion stays near a corner, and free."""
-        row_spacing = 0.02  # Radians of the fastest joint between checked rows.
         finer_rows = 8  # Rows per checked row at which the deviation is measured.
         start, end = self.arrival[corner], self.departure[corner]
         velocity = self.motion.peaks()[0].max()
-        count = int(np.ceil((end - start) * velocity / row_spacing)) + 1
+        # Between two checked rows the fastest joint moves by at most 0.02 rad.
+        count = int(np.ceil((end - start) * velocity / 0.02)) + 1
         rows = self.motion.at(np.linspace(start, end, finer_rows * count + 1))[0]
         farthest = distance_to_polyline(rows, self.q).max()
         return farthest <= 0.999 * deviation and is_free(rows[::finer_rows])

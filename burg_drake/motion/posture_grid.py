@@ -15,8 +15,8 @@ import numpy as np
 from burg_drake.core import Array, Booleans, Indices, Single
 from burg_drake.motion.clearance_bounds import (
     ArmProximity,
+    Bounding,
     ClearanceBounds,
-    ClearanceBoundsSettings,
 )
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.motion_settings import ReachSettings
@@ -322,7 +322,7 @@ class PostureGrid:
 
         A chain costs the way of the joint that moves most from pose to pose, the cost of its
         start, and for each posture a cost that rises to `doubt` as the lower bound of its
-        clearance falls from `COMFORT` to 0.
+        clearance falls from 1 cm to 0.
 
         Args:
             grasps: (m,) indices.
@@ -409,16 +409,16 @@ class PostureGridBuilder:
 
     def grid(self, X_AG: Array, count: int) -> PostureGrid:
         """Room for the postures of grasps (n, 2, 4, 4)."""
-        max_change = 0.75  # Radians of the redundant joint from layer to layer.
-        max_crossing_change = 0.38  # Radians, where the branch changes.
         X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
         values = self.parameters(count)
         spacing = values[1] - values[0] if count > 1 else np.inf
+        # The redundant joint changes by at most 0.75 rad from layer to layer, or 0.38 rad where
+        # the branch changes.
         return PostureGrid(
             *(self.ik, X_AH, values),
             travel=self.settings.joint_travel,
-            offsets=_grid_offsets(max_change / spacing),
-            crossing=_grid_offsets(max_crossing_change / spacing),
+            offsets=_grid_offsets(0.75 / spacing),
+            crossing=_grid_offsets(0.38 / spacing),
         )
 
     def measure(self, grid: PostureGrid, poses: Indices, grasps: Indices, wanted: Booleans) -> None:
@@ -437,7 +437,7 @@ class PostureGridBuilder:
 
 
 def _grid_offsets(most: float) -> tuple[int, ...]:
-    """Those of `OFFSETS`, up and down, that are no larger, and 0; rising."""
+    """Offsets up and down that are no larger than `most`, and 0; rising."""
     # Values of the redundant joint. Large changes need no fine choice.
     steps = (1, 2, 4, 8, 16, 24)
     up = [k for k in steps if k <= most]
@@ -452,5 +452,5 @@ def decisive_clearance(bounds: ClearanceBounds, exact: bool) -> Array:
     return np.where(
         bounds.likely_free,
         np.inf,
-        np.minimum(bounds.upper, ClearanceBoundsSettings.likely_free_above),
+        np.minimum(bounds.upper, Bounding.likely_free_above),
     )

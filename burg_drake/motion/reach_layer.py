@@ -20,7 +20,7 @@ from burg_drake.core import (
     rotation_from_rpy,
 )
 from burg_drake.motion.arm_reach import ArmReach
-from burg_drake.motion.reachability import board_cells, grasps_over_board
+from burg_drake.motion.reachability import board_cells, grasps_over_board, require_arm
 from burg_drake.motion.station_check import empty_scene
 from burg_drake.scene import Board
 from burg_drake.station import Station, StationLike, as_station, world_content
@@ -131,18 +131,6 @@ def reach_without_objects(station: Station) -> ArmReach:
     return ArmReach(empty_scene(), station)
 
 
-def require_arm(station: Station) -> None:
-    """Refuses a station that cannot reach for anything.
-
-    Raises:
-        InvalidInputError: it has no arm.
-    """
-    if station.document.arm is None:
-        raise InvalidInputError(
-            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
-        )
-
-
 def answers_by_refinement(
     rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
@@ -163,10 +151,8 @@ def answers_by_refinement(
         new = found[j, i, 0] == unknown
         j, i = j[new], i[new]
         if stride < coarsest_stride:
-            below, above = (
-                _surrounding_nodes(j, rows, 2 * stride),
-                _surrounding_nodes(i, columns, 2 * stride),
-            )
+            below = _surrounding_nodes(j, rows, 2 * stride)
+            above = _surrounding_nodes(i, columns, 2 * stride)
             corners = np.stack([found[b, a] for b in below for a in above])
             agreed = (corners == corners[0]).all(axis=(0, 2))
             found[j[agreed], i[agreed]] = corners[0][agreed]
@@ -185,6 +171,5 @@ def _coarse_nodes(count: int, stride: int) -> Indices:
 def _surrounding_nodes(index: Indices, count: int, stride: int) -> tuple[Indices, Indices]:
     """The nodes on both sides of points; twice the same for a node."""
     nodes = _coarse_nodes(count, stride)
-    return nodes[np.searchsorted(nodes, index, side="right") - 1], nodes[
-        np.searchsorted(nodes, index)
-    ]
+    below = np.searchsorted(nodes, index, side="right") - 1
+    return nodes[below], nodes[np.searchsorted(nodes, index)]

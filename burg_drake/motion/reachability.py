@@ -158,8 +158,8 @@ def map_reachability(
     What was mapped before comes from the user's cache.
 
     Args:
-        scene: its board, and all that stands on it as the document places it; `without_free_objects` takes the
-            objects away.
+        scene: its board, and all that stands on it as the document places it.
+            `without_free_objects` takes the objects away.
         station: arm, hand and surroundings.
         settings: what is asked.
 
@@ -168,10 +168,7 @@ def map_reachability(
     """
     scene, station = as_scene(scene), as_station(station)
     settings = settings or ReachabilitySettings()
-    if station.document.arm is None:
-        raise InvalidInputError(
-            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
-        )
+    require_arm(station)
     (x, y), cell = board_cells(scene.board.size, settings.spacing)
     heights = np.array(settings.heights)
     tilt, R_WG = settings.orientations
@@ -188,6 +185,18 @@ def map_reachability(
     reached = cached("reachability", asked, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)
+
+
+def require_arm(station: Station) -> None:
+    """Refuses a station that cannot reach for anything.
+
+    Raises:
+        InvalidInputError: it has no arm.
+    """
+    if station.document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
+        )
 
 
 def without_free_objects(scene: Scene) -> Scene:

@@ -17,7 +17,7 @@ from burg_drake.station import StationDiagram
 
 
 class ObjectViewLimits:
-    """Object view limits."""
+    """When the hand of a posture looks at an object."""
 
     min_distance = 0.03  # Metres from the grasp frame to the origin of an object.
     max_distance = 0.30  # Metres from the grasp frame to the origin of an object.
@@ -49,7 +49,6 @@ def postures_over_objects(
     Returns:
         (F, n) postures, which may collide; none if the scene has no free object.
     """
-    draw_count = 40_000  # Postures to choose from: half uniform, half around home.
     station, plant = station_diagram.station, station_diagram.plant
     hand = plant.GetBodyByName(station.hand.body, plant.GetModelInstanceByName("hand")).index()
     X_FG = links.X_FB[hand] @ station.hand.X_HG.matrix()
@@ -58,7 +57,7 @@ def postures_over_objects(
 
     def make() -> Arrays:
         q = random_postures(
-            home, lower, upper, draw_count, rng_from("burg_drake postures over objects")
+            home, lower, upper, 40_000, rng_from("burg_drake postures over objects")
         )
         return {"q": q[_looks_at_object(links, frame, X_FG, objects, q)]}
 
@@ -115,7 +114,7 @@ class Roadmap:
             home: (n,) the posture that all ways begin at.
             lower, upper: (n,) joint limits [rad or m].
             focus: (F, n) postures like the goals to come, for two thirds of the nodes.
-            seed: content that the samples follow from, see `core.provenance.rng_from`.
+            seed: content that the samples follow from, see `core.rng_from`.
             nodes: how many configurations to look for; those that home does not lead to are
                 dropped.
         """
@@ -145,7 +144,7 @@ class Roadmap:
         """Judges the edges of the ways that `path` will look at first, with one batch of the fast
         tier; the verdicts are the same."""
         reached = nodes[np.isfinite(self.distance[nodes])]
-        paths = (pairwise(self._chain(int(node))) for node in dict.fromkeys(reached.tolist()))
+        paths = (pairwise(self._chain(node)) for node in dict.fromkeys(reached.tolist()))
         asked = {(min(edge), max(edge)) for path in paths for edge in path}
         new = np.array(sorted(asked - self._free - self._blocked), dtype=np.intp).reshape(-1, 2)
         q_a, q_b = self.q[new[:, 0]], self.q[new[:, 1]]
@@ -168,10 +167,7 @@ class Roadmap:
 
     def _chain(self, node: int) -> list[int]:
         """The nodes from home to one, by what is known."""
-        chain = [node]
-        while chain[-1] != 0:
-            chain.append(int(self._before[chain[-1]]))
-        return chain[::-1]
+        return chain_to_root(self._before, node)[::-1]
 
     def _is_free(self, edge: tuple[int, int]) -> bool:
         first, second = sorted(edge)  # so that the verdict is that of the edge, not of a direction
@@ -179,6 +175,14 @@ class Roadmap:
             free = self._edges.is_free(self.q[first], self.q[second])
             (self._free if free else self._blocked).add((first, second))
         return (first, second) in self._free
+
+
+def chain_to_root(before: NDArray[np.integer], node: int) -> list[int]:
+    """The nodes from one to the root of its tree, by the node before each; negative at a root."""
+    chain = [node]
+    while before[chain[-1]] >= 0:
+        chain.append(int(before[chain[-1]]))
+    return chain
 
 
 def _build_roadmap(
@@ -193,9 +197,8 @@ def _build_roadmap(
     """Nodes and edges of a roadmap; for the arguments see there."""
     node_clearance = 0.01  # Metres. Lower bound of the clearance of all nodes but home.
     clearance_margin = 1e-3  # Metres below the clearance at home, where that is small.
-    posture_count = 64  # Random postures over which displacements are averaged.
     rng = rng_from("burg_drake home tree", seed, nodes)
-    scale = _joint_levers(edges, rng.uniform(lower, upper, (posture_count, len(home))))
+    scale = _joint_levers(edges, rng.uniform(lower, upper, (64, len(home))))
     at_home = float(edges.proximity.bounds(home[None]).lower[0])
     clearance = min(node_clearance, at_home - clearance_margin)
     wide = random_postures(home, lower, upper, 2 * nodes, rng)
@@ -219,9 +222,8 @@ def _connect_neighbours(
     edges: EdgeChecker, q: Array, scale: Array
 ) -> tuple[NDArray[np.intp], Array]:
     """(E, 2) pairs of near nodes that seem to be connected, and the displacements [m]."""
-    neighbour_count = 6  # Nearest nodes that a node is connected with.
     scaled = q * scale
-    ranks = np.arange(1, min(neighbour_count + 1, len(q)) + 1)
+    ranks = np.arange(1, min(7, len(q)) + 1)  # itself and the 6 nearest
     _, near = cKDTree(scaled).query(scaled, k=ranks, p=1.0)
     pairs = np.stack([np.repeat(np.arange(len(q)), near.shape[1]), near.ravel()], axis=1)
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)

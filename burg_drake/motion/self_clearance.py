@@ -89,10 +89,9 @@ class LinkDistance:
             (C,) distances. Of bodies that overlap it is 0 or less: they do so at least as deeply,
             as far as that is known.
         """
-        max_pairs = 2**16  # Pairs of shapes measured together. Bounds the memory.
-        size = max(1, max_pairs // self.pairs)
-        blocks = [positions[start : start + size] for start in range(0, len(positions), size)]
-        found = [self._at(block, ceiling) for block in blocks]
+        size = max(1, 2**16 // self.pairs)  # bounds the memory
+        starts = range(0, len(positions), size)
+        found = [self._at(positions[start : start + size], ceiling) for start in starts]
         return np.concatenate([np.empty(0), *found])
 
     @property
@@ -168,8 +167,8 @@ def _segment_ends(length: float) -> Array:
     return np.array([(0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)])
 
 
-class PairTableSettings:
-    """Pair table settings."""
+class Tables:
+    """Size and accuracy of the tables of distances between links."""
 
     max_joints = 2  # Joints between the links of a table.
     cell_angle = np.deg2rad(3.0)  # Radians. Size of the smallest cells at most.
@@ -217,22 +216,20 @@ class JointGrid:
             limits: (n, 2) of the joints' positions [rad or m].
         """
         joints = tuple(range(a.frame, several[0].frame))
-        if len(joints) > PairTableSettings.max_joints:
+        if len(joints) > Tables.max_joints:
             return None
         turns = np.array([links.turns[i] for i in joints], dtype=bool)
         low, high = limits[list(joints)].reshape(-1, 2).T
         whole = turns & ~(high - low < 2.0 * np.pi)
         low, high = np.where(whole, -np.pi, low), np.where(whole, np.pi, high)
-        finest = np.where(turns, PairTableSettings.cell_angle, PairTableSettings.cell_length)
+        finest = np.where(turns, Tables.cell_angle, Tables.cell_length)
         if not np.isfinite(high - low).all():
             return None
         count = (
-            np.ceil((high - low) / (finest * 2**PairTableSettings.levels) - 1e-9)
-            .astype(int)
-            .clip(1)
-            * 2**PairTableSettings.levels
+            np.ceil((high - low) / (finest * 2**Tables.levels) - 1e-9).astype(int).clip(1)
+            * 2**Tables.levels
         )
-        if np.prod(count) > PairTableSettings.max_cells:
+        if np.prod(count) > Tables.max_cells:
             return None
         lever = np.max([_levers(links, a, b, joints, limits) for b in several], axis=0)
         return cls(joints, low, (high - low) / count, count, tuple(whole.tolist()), lever)
@@ -269,14 +266,14 @@ class PairTable:
     def of(cls, grid: JointGrid, distance: LinkDistance) -> PairTable:
         """Measures the distances."""
         lower, upper = np.empty((2, int(np.prod(grid.count))))
-        cells = _all_cells(grid.count // 2**PairTableSettings.levels)
-        for level in reversed(range(PairTableSettings.levels + 1)):
+        cells = _all_cells(grid.count // 2**Tables.levels)
+        for level in reversed(range(Tables.levels + 1)):
             slack = float(grid.step @ grid.lever) * 2**level / 2
-            ceiling = PairTableSettings.known_distance + slack
+            ceiling = Tables.known_distance + slack
             found = distance.at(grid.centers(cells, level), ceiling)
-            inside = found + slack < -PairTableSettings.accuracy
+            inside = found + slack < -Tables.accuracy
             done = (
-                (slack <= PairTableSettings.relative_error * found)
+                (slack <= Tables.relative_error * found)
                 | (found >= ceiling)
                 | inside
                 | (level == 0)
@@ -284,11 +281,11 @@ class PairTable:
             number, reach = grid.within(cells[done], level)
             at = found[done, None]
             lower[number] = (
-                np.where(at > 0.0, np.minimum(at, ceiling), at - PairTableSettings.depth_margin)
+                np.where(at > 0.0, np.minimum(at, ceiling), at - Tables.depth_margin)
                 - reach
-                - PairTableSettings.accuracy
+                - Tables.accuracy
             )
-            upper[number] = at + reach + PairTableSettings.accuracy
+            upper[number] = at + reach + Tables.accuracy
             cells = _halve_cells(cells[~done])
         return cls(grid, lower.astype(np.float32), upper.astype(np.float32))
 
@@ -312,23 +309,18 @@ class PairTable:
 def may_collide(grid: JointGrid, distance: LinkDistance) -> bool:
     """Whether two bodies overlap anywhere in the grid, or come so close that it is not sure, or
     would take too long to find out."""
-    cells = _all_cells(grid.count // 2**PairTableSettings.levels)
-    for level in range(PairTableSettings.levels, -PairTableSettings.extra_levels - 1, -1):
-        slack = float(grid.step @ grid.lever) * 2**level / 2 + PairTableSettings.accuracy
+    cells = _all_cells(grid.count // 2**Tables.levels)
+    for level in range(Tables.levels, -Tables.extra_levels - 1, -1):
+        slack = float(grid.step @ grid.lever) * 2**level / 2 + Tables.accuracy
         found = distance.at(grid.centers(cells, level), slack)
-        if found.min() <= PairTableSettings.accuracy:
+        if found.min() <= Tables.accuracy:
             return True
         cells = _halve_cells(cells[found <= slack])
         if not len(cells):
             return False
-        if len(cells) * distance.pairs > PairTableSettings.max_distances:
+        if len(cells) * distance.pairs > Tables.max_distances:
             return True
     return True
-
-
-def is_table_affordable(grid: JointGrid, distance: LinkDistance) -> bool:
-    """Whether a table of these distances is made in seconds."""
-    return bool(np.prod(grid.count) * distance.pairs <= PairTableSettings.max_distances)
 
 
 def _all_cells(counts: Iterable[int]) -> Indices:
@@ -387,18 +379,13 @@ def collision_pairs(
     plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[BodyIndex]
 ) -> list[tuple[BodyIndex, BodyIndex]]:
     """Pairs of bodies that Drake does not leave out of collision checks."""
-    geometries = {
-        body: plant.GetCollisionGeometriesForBody(plant.get_body(body)) for body in bodies
-    }
-    return [
-        (a, b)
-        for a, b in itertools.combinations(bodies, 2)
-        if any(
-            not inspector.CollisionFiltered(one, two)
-            for one in geometries[a]
-            for two in geometries[b]
-        )
-    ]
+    own = {body: plant.GetCollisionGeometriesForBody(plant.get_body(body)) for body in bodies}
+
+    def collide(a: BodyIndex, b: BodyIndex) -> bool:
+        pairs = itertools.product(own[a], own[b])
+        return any(not inspector.CollisionFiltered(one, two) for one, two in pairs)
+
+    return [(a, b) for a, b in itertools.combinations(bodies, 2) if collide(a, b)]
 
 
 class SelfClearance:
@@ -536,7 +523,7 @@ def _tables(
         grid = JointGrid.over(links, a, others, limits)
         assert grid is not None
         distance = LinkDistance(station_diagram, links, a.body, [b.body for b in others])
-        if is_table_affordable(grid, distance):
+        if np.prod(grid.count) * distance.pairs <= Tables.max_distances:
             tables.append((PairTable.of(grid, distance), tuple((i, j) for j in several)))
         else:
             left += [(i, j) for j in several]

@@ -120,7 +120,7 @@ def usable_span(scene: Scene, station: Station) -> ArmSpan:
     """The span of a station's arm.
 
     Raises:
-        InvalidInputError: it cannot be used; see `usable_arm.require_usable_arm`.
+        InvalidInputError: it cannot be used; see `require_usable_arm`.
     """
     diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
     return _require_usable(diagram, ArmKinematics.of(diagram))
@@ -168,9 +168,8 @@ def _reach_warnings(
         )
     lines = []
     if not scene.instances and not reached.all():
-        lines.append(
-            f"the arm reaches only {format_share(reached.mean())} of the board in any hand orientation"
-        )
+        share = format_share(reached.mean())
+        lines.append(f"the arm reaches only {share} of the board in any hand orientation")
     far = unreachable_objects(arm.span, scene, station)
     lines += far.values()
     lines += [
@@ -188,9 +187,8 @@ def _reaches_cleared(scene: Scene, station: Station, settings: ReachabilitySetti
     """Whether the arm reaches anything of the board once the objects are taken away."""
     if not scene.instances:
         return False
-    return bool(
-        map_reachability(without_free_objects(scene), station, settings=settings).reached.any()
-    )
+    cleared = map_reachability(without_free_objects(scene), station, settings=settings)
+    return bool(cleared.reached.any())
 
 
 def _is_mapped(reachability: ReachabilityMap, scene: Scene, name: str) -> bool:

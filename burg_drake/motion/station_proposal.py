@@ -65,7 +65,6 @@ def propose_station(scene: Scene, path: Path) -> StationProposal:
     Raises:
         InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
     """
-    max_places = 4  # Places of an arm that are checked; some seconds each.
     fitting, misfits = find_built_in(scene)
     if fitting is not None:
         document = replace(fitting.document, name=make_name(path.stem))
@@ -73,7 +72,8 @@ def propose_station(scene: Scene, path: Path) -> StationProposal:
     bare = _without_arm(scene, path)
     found: list[tuple[Station, tuple[str, ...]]] = []
     settings = _coarse_map(scene)
-    for station in itertools.islice(_with_arms(scene, bare), max_places):
+    # Each place of an arm takes some seconds to check.
+    for station in itertools.islice(_with_arms(scene, bare), 4):
         with contextlib.suppress(InvalidInputError):
             report = inspect_station(station, scene, settings=settings)
             assert report.arm is not None
@@ -167,7 +167,6 @@ def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
     headings_deg = (90.0, 45.0, 135.0, 0.0, 180.0, -45.0, -135.0, -90.0)
     base_half_width = 0.12  # Metres. Half the side of the square that the base needs.
     shoulder_height = 0.6  # Metres above the base that must be free.
-    pedestal_name = "arm_pedestal"  # Name of the obstacle under the arm.
     usual = load_station("panda_tabletop")
     assert usual.document.arm is not None
     free = [placed_vertices(scene, name) for name in scene.instances] or [_board_corners(scene)]
@@ -193,7 +192,7 @@ def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
             bare.document, arm=arm, table=_table_under(np.vstack([edges, room[:, :2]]))
         )
         if height:
-            name = pedestal_name
+            name = "arm_pedestal"
             while name in scene.instances or name in scene.background:
                 name += "_"
             box = Obstacle(
@@ -206,18 +205,17 @@ def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
 
 def _support_height(scene: Scene) -> float:
     """Height of what the lowest free object stands on [m]; 0 where that is the board."""
-    min_furniture_height = 0.05  # Metres above the table.
     lowest = [float(placed_vertices(scene, name)[:, 2].min()) for name in scene.instances]
     floor = min(lowest, default=0.0)
-    return round(floor, 3) if floor > min_furniture_height else 0.0
+    return round(floor, 3) if floor > 0.05 else 0.0  # what is lower is no furniture
 
 
 def _coarse_map(scene: Scene) -> ReachabilitySettings:
     """A reachability map at the board and at the free objects, quickly."""
-    cell_count = 20  # Cells of the map along the board's longer side.
     support = _support_height(scene)
     raised = tuple(support + height for height in BOARD_CHECK_HEIGHTS) if support else ()
-    spacing = max(ReachabilitySettings().spacing, max(scene.board.size) / cell_count)
+    # At most 20 cells along the board's longer side.
+    spacing = max(ReachabilitySettings().spacing, max(scene.board.size) / 20)
     return ReachabilitySettings(
         spacing=spacing,
         heights=(*BOARD_CHECK_HEIGHTS, *raised),

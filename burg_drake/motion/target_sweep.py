@@ -106,10 +106,8 @@ class TargetSweep:
         length: float,
     ) -> None:
         """Notes for some ways (S,) whether the object gets too deep into one body on them."""
-        max_spacing = 1e-3  # Metres between the places that are checked.
-        max_poses = 2**17  # Poses checked together. Bounds the memory to about 20 MB.
-        places = np.linspace(0.0, length, int(np.ceil(length / max_spacing)) + 1)
-        size = max(1, max_poses // len(places))
+        places = np.linspace(0.0, length, int(np.ceil(length / 1e-3)) + 1)
+        size = max(1, 2**17 // len(places))  # bounds the memory to about 20 MB
         for k in range(0, len(rows), size):
             some = slice(k, k + size)
             p_W = start_W[some, None] + places[:, None] * u_W[some, None]

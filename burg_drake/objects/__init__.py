@@ -1,7 +1,7 @@
 """Meshes to sim-ready objects: repair, mass properties, convex pieces, SDF, stable poses.
 
-Read `library` first, which has what is known of an object in the end; `meshes`, `physics` and
-`collision` compute it.
+Read `library` first, which has what is known of an object in the end. `mesh_loading`, `mass`,
+`resting_poses`, `convex_decomposition` and `contact` compute it.
 """
 
 import lazy_loader

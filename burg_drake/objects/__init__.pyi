@@ -20,7 +20,7 @@ from .contact import (
     min_face_height as min_face_height,
 )
 from .convex_decomposition import (
-    Pieces as Pieces,
+    ConvexPieces as ConvexPieces,
     check_given_pieces as check_given_pieces,
     convex_pieces as convex_pieces,
     join_parts as join_parts,

@@ -62,7 +62,7 @@ class _CollapsingSurface:
         self.heap: list[tuple[float, int, int, int, int, Point]] = []
         edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         for i, j in np.unique(edges, axis=0).tolist():
-            self._consider(i, j)
+            self._queue_edge(i, j)
 
     def collapse(self) -> bool:
         """Collapses the cheapest edge that can be; False if none is left below the most."""
@@ -72,8 +72,8 @@ class _CollapsingSurface:
                 continue
             if cost > self.most_distance**2:
                 return False
-            if self._keeps_shape(i, j, point):
-                self._join(i, j, point)
+            if self._can_merge(i, j, point):
+                self._merge_vertices(i, j, point)
                 return True
         return False
 
@@ -83,7 +83,7 @@ class _CollapsingSurface:
         used, place = np.unique(left, return_inverse=True)
         return np.array(self.points)[used], place.reshape(-1, 3)
 
-    def _consider(self, i: int, j: int) -> None:
+    def _queue_edge(self, i: int, j: int) -> None:
         q = [a + b for a, b in zip(self.quadrics[i], self.quadrics[j], strict=True)]
         point, cost = _cheapest_point(q, self.points[i], self.points[j])
         entry = (cost, i, j, self.version[i], self.version[j], point)
@@ -94,7 +94,7 @@ class _CollapsingSurface:
         found.discard(i)
         return found
 
-    def _keeps_shape(self, i: int, j: int, point: Point) -> bool:
+    def _can_merge(self, i: int, j: int, point: Point) -> bool:
         """Whether the surface stays a manifold, and no face turns over or becomes a sliver."""
         shared = self.around[i] & self.around[j]
         common = self._neighbours(i) & self._neighbours(j)
@@ -110,7 +110,7 @@ class _CollapsingSurface:
                 return False
         return True
 
-    def _join(self, i: int, j: int, point: Point) -> None:
+    def _merge_vertices(self, i: int, j: int, point: Point) -> None:
         for face in self.around[i] & self.around[j]:
             for k in self.faces[face] or ():
                 self.around[k].discard(face)
@@ -126,7 +126,7 @@ class _CollapsingSurface:
         self.version[i] += 1
         self.version[j] += 1
         for k in sorted(self._neighbours(i)):
-            self._consider(min(i, k), max(i, k))
+            self._queue_edge(min(i, k), max(i, k))
 
 
 def _vertex_quadrics(vertices: Array, faces: NDArray[np.int64]) -> Array:
@@ -244,7 +244,7 @@ def unite_bodies(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
         return surface, []
     union = manifold3d.Manifold.batch_boolean(manifolds, manifold3d.OpType.Add)
     twice = 1.0 - union.volume() / sum(m.volume() for m in manifolds)
-    result = _from_manifold(union)
+    result = from_manifold(union)
     if twice < min_overlap_share:
         glued = not is_closed(_with_merged_vertices(surface)) and is_closed(
             _with_merged_vertices(result)
@@ -262,13 +262,13 @@ def split_bodies(surface: trimesh.Trimesh) -> trimesh.Trimesh | None:
     """A surface whose bodies touch along edges, with these edges doubled so that it counts as
     closed; None if it is not that."""
     manifold = _to_manifold(surface)
-    result = None if manifold is None else _from_manifold(manifold)
+    result = None if manifold is None else from_manifold(manifold)
     return result if result is not None and is_closed(result) else None
 
 
 def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh, list[str]]:
-    """The surface with at most `max_faces` faces if that can be had within the last tolerance of
-    `DECIMATION`, and otherwise with as few as that gives.
+    """The surface with at most `max_faces` faces if that can be had within the largest
+    tolerance, and otherwise with as few as that gives.
 
     Args:
         surface: closed, wound outward.
@@ -289,7 +289,7 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
         if manifold is None:
             break
         manifold = manifold.simplify(tolerance * diagonal)
-        merged = _with_merged_vertices(_from_manifold(manifold))
+        merged = _with_merged_vertices(from_manifold(manifold))
         if not is_closed(merged) or signed_volume(merged) <= 0.0:
             break
         best = merged
@@ -315,7 +315,7 @@ def coarser_surfaces(surface: trimesh.Trimesh, most_distance: float) -> list[tri
         most_distance: about how far the coarsest are from it, in the mean [m].
 
     Returns:
-        Closed surfaces, finest first, each with about `RUNG` times the faces of the one before.
+        Closed surfaces, finest first, each with about 0.9 times the faces of the one before.
     """
     # Metres; Manifold is fast and removes most faces before edges collapse.
     tolerances = (1e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.2e-4)
@@ -328,7 +328,7 @@ def coarser_surfaces(surface: trimesh.Trimesh, most_distance: float) -> list[tri
         if manifold is None or len(found[-1].faces) <= enough_faces:
             break
         manifold = manifold.simplify(tolerance)
-        _append_if_closed(found, _with_merged_vertices(_from_manifold(manifold)))
+        _append_if_closed(found, _with_merged_vertices(from_manifold(manifold)))
     finest = found[-1]
     if len(finest.faces) > max_faces:
         return found
@@ -394,7 +394,8 @@ def _with_merged_vertices(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     return merged
 
 
-def _from_manifold(manifold: manifold3d.Manifold) -> trimesh.Trimesh:
+def from_manifold(manifold: manifold3d.Manifold) -> trimesh.Trimesh:
+    """The surface of a solid of Manifold."""
     mesh = manifold.to_mesh64()
     faces = np.asarray(mesh.tri_verts).astype(np.int64)
     return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], faces, process=False)

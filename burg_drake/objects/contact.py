@@ -28,14 +28,11 @@ MAX_TURNED_SHARE = 0.05
 """Share of the area whose normals may be turned, as next to moved edges."""
 
 
-class NormalComparison:
-    """Normal comparison."""
-
-    averaging_radius = 2e-3  # Metres; less than half a pad. Faces of scans vary within it.
-    result_samples = 20_000  # Points on the contact surface.
-    object_samples = 60_000  # Points on the object's surface.
-    candidates = 8  # Faces compared for each point.
-    neighbours = 24  # Points whose normals are averaged.
+AVERAGING_RADIUS = 2e-3  # Metres; less than half a pad. Faces of scans vary within it.
+RESULT_SAMPLES = 20_000  # Points on the contact surface.
+OBJECT_SAMPLES = 60_000  # Points on the object's surface.
+NEAREST_FACES = 8  # Faces compared for each point.
+AVERAGED_NORMALS = 24  # Points whose normals are averaged.
 
 
 def contact_surface(
@@ -94,17 +91,17 @@ class SurfaceNormals:
         self.reach = reach
         self.triangles = np.asarray(surface.triangles)
         self.normals = np.asarray(surface.face_normals)
-        self.samples, self.owner = spread_samples(surface, NormalComparison.object_samples)
+        self.samples, self.owner = spread_samples(surface, OBJECT_SAMPLES)
         self.every = np.concatenate([self.owner, np.arange(len(self.triangles))])
         self.places = cKDTree(np.vstack([self.samples, self.triangles.mean(axis=1)]))
         self.even = cKDTree(self.samples)
-        alike = NormalComparison.averaging_radius * self.normals[self.owner]
+        alike = AVERAGING_RADIUS * self.normals[self.owner]
         self.alike = cKDTree(np.hstack([self.samples, alike]))
 
     def turned_share(self, mesh: trimesh.Trimesh, most_angle: float = MAX_NORMAL_ANGLE) -> float:
         """Share of a mesh's area whose normals are more than an angle [rad] off the
         surface's, both of the nearest place and of the mean around it."""
-        points, face = spread_samples(mesh, NormalComparison.result_samples)
+        points, face = spread_samples(mesh, RESULT_SAMPLES)
         normals = np.asarray(mesh.face_normals)[face]
         own = self._nearest(points, normals)
         mean = self._mean(points, own)
@@ -114,11 +111,8 @@ class SurfaceNormals:
     def _nearest(self, points: Array, normals: Array) -> Array:
         """Normals (N, 3) of the surface at the nearest places: within `reach` at those that
         face the same way, as near a thin wall its other side may be nearer."""
-        _, near = self.places.query(points, min(NormalComparison.candidates, len(self.every)))
-        _, alike = self.alike.query(
-            np.hstack([points, NormalComparison.averaging_radius * normals]),
-            NormalComparison.candidates,
-        )
+        _, near = self.places.query(points, min(NEAREST_FACES, len(self.every)))
+        _, alike = self.alike.query(np.hstack([points, AVERAGING_RADIUS * normals]), NEAREST_FACES)
         which = np.hstack([self.every[near], self.owner[alike]])
         apart = triangle_distances(points[:, None], self.triangles[which])
         facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
@@ -128,9 +122,7 @@ class SurfaceNormals:
     def _mean(self, points: Array, own: Array) -> Array:
         """Normals (N, 3) in the mean around points, of what faces the same way as `own`."""
         distance, around = self.even.query(
-            points,
-            NormalComparison.neighbours,
-            distance_upper_bound=NormalComparison.averaging_radius,
+            points, AVERAGED_NORMALS, distance_upper_bound=AVERAGING_RADIUS
         )
         within = np.isfinite(distance)
         others = self.normals[self.owner[np.where(within, around, 0)]]
@@ -142,7 +134,7 @@ class SurfaceNormals:
 
 def max_excess(mesh: trimesh.Trimesh, pieces: Sequence[trimesh.Trimesh]) -> float:
     """How far a surface stands out of the union of convex pieces, at most [m]."""
-    points = np.vstack([mesh.vertices, spread_samples(mesh, NormalComparison.result_samples)[0]])
+    points = np.vstack([mesh.vertices, spread_samples(mesh, RESULT_SAMPLES)[0]])
     height = np.full(len(points), np.inf)
     for piece in pieces:
         planes = np.asarray(piece.face_normals)
@@ -197,26 +189,29 @@ def contact_geometry(
     """
     if kind == "mesh":
         return _write_contact_mesh(surface, closed, folder), (CONTACT_FILE,)
-    if kind == "surface":
-        try:
-            return _write_contact_surface(surface, closed, pieces, folder), (CONTACT_FILE,)
-        except MeshError as error:
+    if kind in ("pieces", "compliant_pieces"):
+        return ContactGeometry(kind=kind), ()
+    if kind != "surface":
+        volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
+        found = fit_primitive(surface, volume)
+        if found is not None:
+            primitive, fit = found
+            return ContactGeometry(kind="primitive", primitive=primitive, fit=fit), ()
+        if kind == "primitive":
+            raise MeshError(_primitive_error_message(surface, volume))
+    try:
+        mesh, fit = contact_surface(surface, closed)
+    except MeshError as error:
+        if kind == "surface":
             raise MeshError(
                 f"contact 'surface': {error}; {MESH_REPAIR_HINT}, or choose 'pieces'"
             ) from error
-    if kind in ("pieces", "compliant_pieces"):
-        return ContactGeometry(kind=kind), ()
-    volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
-    found = fit_primitive(surface, volume)
-    if found is not None:
-        primitive, fit = found
-        return ContactGeometry(kind="primitive", primitive=primitive, fit=fit), ()
-    if kind == "primitive":
-        raise MeshError(_primitive_error_message(surface, volume))
-    try:
-        return _write_contact_surface(surface, closed, pieces, folder), (CONTACT_FILE,)
-    except MeshError as error:
         return ContactGeometry(reason=str(error)), ()
+    write_piece(mesh, folder / CONTACT_FILE)
+    excess = max_excess(mesh, pieces)
+    return ContactGeometry(kind="surface", mesh=CONTACT_FILE, fit=fit, excess=excess), (
+        CONTACT_FILE,
+    )
 
 
 def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
@@ -229,8 +224,8 @@ def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
     if not contact.reason:
         return ""
     return (
-        f"finger pads touch {_piece_count_text(pieces)}, because {contact.reason}; {MESH_REPAIR_HINT}, or"
-        " accept that by 'contact: pieces' in an objects.yaml"
+        f"finger pads touch {_piece_count_text(pieces)}, because {contact.reason};"
+        f" {MESH_REPAIR_HINT}, or accept that by 'contact: pieces' in an objects.yaml"
     )
 
 
@@ -249,25 +244,13 @@ def describe_pad_contact(library: ObjectLibrary, name: str) -> str:
         what = f"a surface with {len(library.mesh(contact.mesh).faces)} faces"
     else:
         return _piece_count_text(len(entry.pieces))
-    return (
-        what
-        if contact.fit is None
-        else (f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm from the mesh")
-    )
+    if contact.fit is None:
+        return what
+    return f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm from the mesh"
 
 
 def _piece_count_text(count: int) -> str:
     return f"{count} convex piece{'' if count == 1 else 's'}"
-
-
-def _write_contact_surface(
-    surface: trimesh.Trimesh, closed: bool, pieces: Sequence[trimesh.Trimesh], folder: Path
-) -> ContactGeometry:
-    mesh, fit = contact_surface(surface, closed)
-    write_piece(mesh, folder / CONTACT_FILE)
-    return ContactGeometry(
-        kind="surface", mesh=CONTACT_FILE, fit=fit, excess=max_excess(mesh, pieces)
-    )
 
 
 def _write_contact_mesh(surface: trimesh.Trimesh, closed: bool, folder: Path) -> ContactGeometry:

@@ -21,7 +21,7 @@ COACD_REMESHING: dict[str, str | int] = {"preprocess_mode": "on", "preprocess_re
 
 
 @dataclass(frozen=True)
-class Pieces:
+class ConvexPieces:
     """Convex pieces.
 
     Attributes:
@@ -35,7 +35,7 @@ class Pieces:
 
 def convex_pieces(
     surface: trimesh.Trimesh, closed: bool, parameters: Decomposition = Decomposition()
-) -> Pieces:
+) -> ConvexPieces:
     """Convex pieces of a surface.
 
     Args:
@@ -48,16 +48,16 @@ def convex_pieces(
     """
     max_convex_ratio = 1.02  # Hull volume over volume, up to which a mesh counts as convex.
     if closed and surface.convex_hull.volume <= max_convex_ratio * surface.volume:
-        return Pieces((_reduce_hull(surface.vertices, parameters),))
+        return ConvexPieces((_reduce_hull(surface.vertices, parameters),))
     parts, seconds = _run_decomposition(surface, closed, parameters)
     solid = [p for p in parts if thickness(p) >= parameters.min_thickness]
     if not solid:
         raise MeshError("convex decomposition found no solid piece; is the mesh a thin sheet?")
     joined = join_parts(solid, parameters.join)
-    return Pieces(tuple(_reduce_hull(p, parameters) for p in joined), seconds)
+    return ConvexPieces(tuple(_reduce_hull(p, parameters) for p in joined), seconds)
 
 
-def check_given_pieces(pieces: Sequence[trimesh.Trimesh]) -> Pieces:
+def check_given_pieces(pieces: Sequence[trimesh.Trimesh]) -> ConvexPieces:
     """Checks pieces that come with an object and takes them as they are.
 
     Raises:
@@ -73,7 +73,7 @@ def check_given_pieces(pieces: Sequence[trimesh.Trimesh]) -> Pieces:
         ratio = piece.convex_hull.volume / piece.volume
         if ratio > 1.001:
             raise MeshError(f"piece {i} is not convex: its hull has {ratio:.3f} times its volume")
-    return Pieces(tuple(pieces))
+    return ConvexPieces(tuple(pieces))
 
 
 def join_parts(parts: Sequence[Array], budget: float) -> list[Array]:

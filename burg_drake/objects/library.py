@@ -359,7 +359,8 @@ class ObjectLibrary:
         """
         if name not in self.objects:
             raise UnknownNameError(
-                f"object {name!r} is not in library {self.root}; {suggest_names(name, self.objects)}"
+                f"object {name!r} is not in library {self.root};"
+                f" {suggest_names(name, self.objects)}"
             )
         return self.objects[name]
 

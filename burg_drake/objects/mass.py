@@ -45,7 +45,7 @@ def solid_of_surface(surface: trimesh.Trimesh) -> Solid:
     Raises:
         InvalidInputError: the surface encloses no positive volume.
     """
-    return _integrate_meshes([surface])
+    return solid_of_pieces([surface])
 
 
 def solid_of_pieces(pieces: Sequence[trimesh.Trimesh]) -> Solid:
@@ -54,7 +54,17 @@ def solid_of_pieces(pieces: Sequence[trimesh.Trimesh]) -> Solid:
     Args:
         pieces: convex, wound outward.
     """
-    return _integrate_meshes(pieces)
+    volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+    origin = np.mean([m.bounds.mean(axis=0) for m in pieces], axis=0)
+    for mesh in pieces:
+        v, f, s = _tetrahedron_integrals(mesh.triangles - origin)
+        volume, first, second = volume + v, first + f, second + s
+    if not volume > 0.0:
+        raise InvalidInputError("the surface encloses no volume; its normals must point outward")
+    centroid = first / volume
+    covariance = second / volume - np.outer(centroid, centroid)
+    G = np.trace(covariance) * np.eye(3) - covariance
+    return Solid(float(volume), centroid + origin, 0.5 * (G + G.T))
 
 
 def mass_properties(
@@ -70,7 +80,7 @@ def mass_properties(
     """Mass, centre of mass and inertia.
 
     Args:
-        solid: geometry; that of the wall of a hollow body, see `shell.solid_of_shell`.
+        solid: geometry; that of the wall of a hollow body, see `solid_of_shell`.
         mass: [kg]; goes before `density`.
         density: of the material [kg/m^3]; `DEFAULT_DENSITY` if neither is given.
         center_of_mass: `p_OOcm` in place of the centroid [m]. Without `inertia`, the inertia is
@@ -97,8 +107,8 @@ def mass_properties(
     if center_of_mass is not None:
         overridden.append("center_of_mass")
         centre = _check_center_of_mass(center_of_mass, bounds)
-    I = mass * solid.G_OOcm  # noqa: E741
-    moments = (*np.diag(I).tolist(), I[0, 1], I[0, 2], I[1, 2])
+    I_OOcm = mass * solid.G_OOcm
+    moments = (*np.diag(I_OOcm).tolist(), I_OOcm[0, 1], I_OOcm[0, 2], I_OOcm[1, 2])
     if inertia is not None:
         overridden.append("inertia")
         _check_inertia(inertia)
@@ -201,20 +211,6 @@ def _check_inertia(inertia: Inertia) -> None:
         )
 
 
-def _integrate_meshes(meshes: Sequence[trimesh.Trimesh]) -> Solid:
-    volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-    origin = np.mean([m.bounds.mean(axis=0) for m in meshes], axis=0)
-    for mesh in meshes:
-        v, f, s = _tetrahedron_integrals(mesh.triangles - origin)
-        volume, first, second = volume + v, first + f, second + s
-    if not volume > 0.0:
-        raise InvalidInputError("the surface encloses no volume; its normals must point outward")
-    centroid = first / volume
-    covariance = second / volume - np.outer(centroid, centroid)
-    G = np.trace(covariance) * np.eye(3) - covariance
-    return Solid(float(volume), centroid + origin, 0.5 * (G + G.T))
-
-
 def _tetrahedron_integrals(triangles: Array) -> tuple[float, Array, Array]:
     """Integrals of 1, x and x x^T over the tetrahedra from the origin to each triangle."""
     det = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2]))
@@ -255,7 +251,7 @@ def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
 
 def _depth_inside_surface(surface: trimesh.Trimesh) -> float:
     """How far it is from the surface, straight inward, to the other side [m], at the least but for
-    a share `THIN` of the area."""
+    a share `thin_share` of the area."""
     thin_share = 0.15  # Share of the area that may have no depth for two walls, as at rims.
     start_share = 1e-6  # Start of the rays inside the surface, over its size.
     areas = surface.area_faces

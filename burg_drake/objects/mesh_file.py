@@ -48,7 +48,7 @@ def check_bytes(path: Path) -> None:
     """Refuses a file that is too large to be read.
 
     Raises:
-        MeshError: it has more than `MOST_BYTES`.
+        MeshError: it has more than 512 MB.
     """
     max_bytes = 2**29  # 512 MB.
     size = path.stat().st_size

@@ -89,9 +89,7 @@ class SurfaceMesh:
 
 
 def load_mesh(
-    mesh: str | Path | trimesh.Trimesh,
-    scale: float = 1.0,
-    preparation: Preparation = Preparation(),
+    mesh: str | Path | trimesh.Trimesh, scale: float = 1.0, preparation: Preparation = Preparation()
 ) -> SurfaceMesh:
     """Loads, checks and repairs a mesh.
 

@@ -180,14 +180,18 @@ def _fill_holes(result: RepairedMesh) -> None:
         result.sentences.append(f"filled {filled} small holes")
 
 
-def boundary_loops(mesh: trimesh.Trimesh) -> list[list[int]]:
-    """Closed loops of boundary edges as vertex indices, in the direction of their faces."""
-    edges = mesh.edges
+def rim_edges(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
+    """Edges (E, 2) of only one face, in its direction."""
     _, inverse, count = np.unique(
         mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True
     )
+    return np.asarray(mesh.edges[count[inverse.reshape(-1)] == 1])
+
+
+def boundary_loops(mesh: trimesh.Trimesh) -> list[list[int]]:
+    """Closed loops of boundary edges as vertex indices, in the direction of their faces."""
     following: dict[int, list[int]] = {}
-    for a, b in edges[count[inverse.reshape(-1)] == 1].tolist():
+    for a, b in rim_edges(mesh).tolist():
         following.setdefault(a, []).append(b)
     loops = []
     for start in sorted(following):

@@ -25,7 +25,7 @@ def face_palette(mesh: trimesh.Trimesh) -> tuple[NDArray[np.uint8], NDArray[np.i
 
     Returns:
         (C, 4) colours as bytes and (F,) index of each face's one; None where the faces have no
-        colours of their own, or only one, or more than `MAX_COLOURS`.
+        colours of their own, or only one, or more than 16.
     """
     max_colours = 16  # A mesh with more face colours is a scan, not a few materials.
     if mesh.visual is None or mesh.visual.kind != "face":

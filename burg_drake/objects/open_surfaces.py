@@ -18,6 +18,7 @@ from burg_drake.objects.mesh_repair import (
     MAX_HOLE_WIDTH,
     RepairedMesh,
     boundary_loops,
+    rim_edges,
     signed_volume,
 )
 
@@ -143,14 +144,6 @@ def separate_faces(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     _, representative = np.unique(label, return_index=True)
     vertices = mesh.vertices[faces.reshape(-1)[representative]]
     return trimesh.Trimesh(vertices, label.reshape(-1, 3), process=False)
-
-
-def rim_edges(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """Edges (E, 2) of only one face, in its direction."""
-    _, inverse, count = np.unique(
-        mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True
-    )
-    return np.asarray(mesh.edges[count[inverse.reshape(-1)] == 1])
 
 
 def _stitch_rims(sheet: trimesh.Trimesh, upper: Array, lower: Array) -> trimesh.Trimesh:

@@ -15,13 +15,9 @@ from burg_drake.geometry import convex_hull
 from burg_drake.objects.library import Fit, ObjectEntry, ObjectLibrary, Primitive
 from burg_drake.objects.shape_fit import surface_distance
 
-
-class PrimitiveSearch:
-    """Primitive search."""
-
-    max_steps = 12  # Linear programmes for one primitive.
-    max_turn = 0.15  # Radians in one step.
-    directions = 600  # Directions whose extreme corners the search uses.
+MAX_STEPS = 12  # Linear programmes for one primitive.
+MAX_TURN = 0.15  # Radians in one step.
+SEARCH_DIRECTIONS = 600  # Directions whose extreme corners the search uses.
 
 
 def fit_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitive, Fit] | None:
@@ -88,10 +84,8 @@ def _enclosing_primitives(
 ) -> Iterator[Primitive]:
     """The smallest primitives around points, from starts with at most that volume [m^3]."""
     corners = points
-    if len(points) > PrimitiveSearch.directions:
-        corners = points[
-            np.unique((points @ _even_directions(PrimitiveSearch.directions).T).argmax(axis=0))
-        ]
+    if len(points) > SEARCH_DIRECTIONS:
+        corners = points[np.unique((points @ _even_directions(SEARCH_DIRECTIONS).T).argmax(axis=0))]
     yield _enclosing_sphere(corners, points)
     axes = _face_normal_axes(surface)
     if np.prod(np.ptp(points @ axes, axis=0)) <= most:
@@ -143,7 +137,7 @@ def _even_directions(count: int) -> Array:
 
 def _enclosing_sphere(corners: Array, points: Array) -> Primitive:
     center = (points.min(axis=0) + points.max(axis=0)) / 2
-    for _ in range(PrimitiveSearch.max_steps):
+    for _ in range(MAX_STEPS):
         apart = corners - center
         radius = np.linalg.norm(apart, axis=1)
         step = radius.max()
@@ -158,7 +152,7 @@ def _enclosing_sphere(corners: Array, points: Array) -> Primitive:
 
 
 def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
-    for _ in range(PrimitiveSearch.max_steps):
+    for _ in range(MAX_STEPS):
         p = corners @ R_OP
         extent = np.maximum(np.ptp(p, axis=0), 1e-9)
         # seen from axes turned by w, p moves by p x w: columns are w, upper and lower bounds
@@ -170,9 +164,7 @@ def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
             rows += [np.hstack([turned[:, k], upper]), np.hstack([-turned[:, k], lower])]
             limits += [-p[:, k], p[:, k]]
         cost = np.concatenate([np.zeros(3), 1.0 / extent, -1.0 / extent])
-        w = _solve_linear_program(
-            cost, np.vstack(rows), np.concatenate(limits), [PrimitiveSearch.max_turn] * 3
-        )[:3]
+        w = _solve_linear_program(cost, np.vstack(rows), np.concatenate(limits), [MAX_TURN] * 3)[:3]
         R_new = R_OP @ Rotation.from_rotvec(w).as_matrix()
         shrunk = np.prod(np.ptp(corners @ R_new, axis=0)) / np.prod(extent)
         if shrunk >= 1.0 - 1e-12:
@@ -182,9 +174,7 @@ def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
     lower, upper = p.min(axis=0), p.max(axis=0)
     X_OP = make_pose(R_OP, R_OP @ ((lower + upper) / 2))
     return Primitive(
-        shape="box",
-        size=_as_triple(upper - lower),
-        X_OP=Pose.from_matrix(X_OP, quaternion=True),
+        shape="box", size=_as_triple(upper - lower), X_OP=Pose.from_matrix(X_OP, quaternion=True)
     )
 
 
@@ -193,7 +183,7 @@ def _enclosing_cylinder(corners: Array, points: Array, R_OP: Array) -> Primitive
     p = corners @ R_OP
     X_OP = make_pose(R_OP, R_OP @ ((p.min(axis=0) + p.max(axis=0)) / 2))
     X_best, best = X_OP, np.inf
-    for _ in range(PrimitiveSearch.max_steps):
+    for _ in range(MAX_STEPS):
         p = transform_points(inverse(X_OP), corners)
         volume = float(np.hypot(p[:, 0], p[:, 1]).max() ** 2 * np.ptp(p[:, 2]))
         if volume >= best * (1.0 - 1e-12):
@@ -225,9 +215,7 @@ def _shrinking_motion(p: Array) -> Array:
     rows[2 * n :] = np.hstack([-turned[:, 2], np.tile([0.0, 0, 0, 0, 1], (n, 1))])
     limits = np.concatenate([-radius, -p[:, 2], p[:, 2]])
     cost = np.array([0, 0, 0, 0, 2.0 / size, 1.0 / height, -1.0 / height])
-    x = _solve_linear_program(
-        cost, rows, limits, [PrimitiveSearch.max_turn, PrimitiveSearch.max_turn, size, size]
-    )
+    x = _solve_linear_program(cost, rows, limits, [MAX_TURN, MAX_TURN, size, size])
     return make_pose(Rotation.from_rotvec([x[0], x[1], 0.0]).as_matrix(), (x[2], x[3], 0.0))
 
 

@@ -118,7 +118,7 @@ class PotentialLandscape:
         self._neighbors = hull.neighbors.astype(int)
         self._triangles = hull.points[hull.simplices]
         self._hull_points = hull.points
-        self._found: dict[float, Index] = {}
+        self._basins_by_margin: dict[float, Index] = {}
 
     def height(self, down: Array) -> Array:
         """Of the centre of mass with directions `down` (..., 3) of O down, (...) [m]."""
@@ -130,14 +130,14 @@ class PotentialLandscape:
         Args:
             tilt_margin: minima parted by a smaller tilt are one [rad].
         """
-        face, successor = self._faces, self._toppled
+        face, successor = self._faces, self._toppled_faces
         share = np.bincount(face, weights=_solid_angles(self._triangles)) / (4.0 * np.pi)
-        level = self._levels
+        level = self._face_heights
         for i in np.argsort(-level, kind="stable"):
             if successor[i] != i:
                 share[successor[i]] += share[i]
                 share[i] = 0.0
-        basin = self._basins(tilt_margin)[self._first]
+        basin = self._basins(tilt_margin)[self._lowest_triangles]
         found = []
         for lowest in np.unique(basin):
             probability = float(share[basin == lowest].sum())
@@ -155,7 +155,7 @@ class PotentialLandscape:
         """Where it rolls from direction `down` (3,), rising and falling by less than a tilt by
         `margin` would do."""
         start = int((self.normals @ down).argmax())
-        rows, other, passes = self._passes
+        rows, other, passes = self._edge_passes
         level = self.heights[start]
         flat = passes * np.cos(margin) <= level
         low = self.heights < level * np.cos(margin)  # it would fall there, and not come back
@@ -178,7 +178,7 @@ class PotentialLandscape:
         )
 
     def rolls(self, down: Array) -> bool:
-        """Whether it can roll on from `down` (3,) by `ROLL_SPAN`."""
+        """Whether it can roll on from `down` (3,) by 60 degrees."""
         # Radians that an object turns without a higher pass if it rolls.
         min_span = np.deg2rad(60.0)
         return bool(self.neutral(down).span >= min_span)
@@ -196,20 +196,20 @@ class PotentialLandscape:
         return connected_components(graph, directed=False)[1]
 
     @cached_property
-    def _first(self) -> Index:
+    def _lowest_triangles(self) -> Index:
         """(faces,) the lowest triangle of each face."""
         order = np.lexsort((self.heights, self._faces))
         _, at = np.unique(self._faces[order], return_index=True)
         return order[at]
 
     @cached_property
-    def _levels(self) -> Array:
+    def _face_heights(self) -> Array:
         """(faces,) mean height of each face."""
         count = np.bincount(self._faces)
         return np.bincount(self._faces, weights=self.heights) / count
 
     @cached_property
-    def _toppled(self) -> Index:
+    def _toppled_faces(self) -> Index:
         """(faces,) the face that each face topples to, itself where the centre of mass is above
         it."""
         foot = self.normals * self.heights[:, None]
@@ -228,11 +228,11 @@ class PotentialLandscape:
         _, at = np.unique(face[order], return_index=True)
         worst = order[at]  # the triangle of each face with the edge that is passed the farthest
         towards = to[worst, k[worst]]
-        falls = (beyond[worst, k[worst]] > 0.0) & (self._levels[towards] < self._levels)
+        falls = (beyond[worst, k[worst]] > 0.0) & (self._face_heights[towards] < self._face_heights)
         return np.where(falls, towards, np.arange(len(worst)))
 
     @cached_property
-    def _passes(self) -> tuple[Index, Index, Array]:
+    def _edge_passes(self) -> tuple[Index, Index, Array]:
         """Edges between facets: one facet, the other facet (E,) and the height of the centre of
         mass when it passes over the edge (E,) [m]."""
         rows, k = np.nonzero(np.arange(len(self.heights))[:, None] < self._neighbors)
@@ -252,9 +252,9 @@ class PotentialLandscape:
         Edges are taken by the height of the pass over them. A pass joins two basins when, from the
         higher one's minimum, it is less than the tilt margin up.
         """
-        if tilt_margin in self._found:
-            return self._found[tilt_margin]
-        rows, other, passes = self._passes
+        if tilt_margin in self._basins_by_margin:
+            return self._basins_by_margin[tilt_margin]
+        rows, other, passes = self._edge_passes
         heights = self.heights.tolist()
         parent = list(range(len(heights)))
         low = list(range(len(heights)))  # lowest facet of each root's basin
@@ -275,8 +275,8 @@ class PotentialLandscape:
                 i, j = j, i
             if heights[low[j]] >= most:
                 parent[j] = i
-        self._found[tilt_margin] = np.array([low[root(i)] for i in range(len(heights))])
-        return self._found[tilt_margin]
+        self._basins_by_margin[tilt_margin] = np.array([low[root(i)] for i in range(len(heights))])
+        return self._basins_by_margin[tilt_margin]
 
 
 def _solid_angles(triangles: Array) -> Array:
@@ -289,10 +289,7 @@ def _solid_angles(triangles: Array) -> Array:
 
 
 def stable_poses(
-    surface: trimesh.Trimesh,
-    support: Array,
-    p_OOcm: Array,
-    search: SymmetrySearch | None = None,
+    surface: trimesh.Trimesh, support: Array, p_OOcm: Array, search: SymmetrySearch | None = None
 ) -> tuple[StablePose, ...]:
     """Resting poses, most probable first.
 

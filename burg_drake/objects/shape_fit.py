@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
+from manifold3d import Error, Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
 from burg_drake.geometry import RayCaster, triangle_distances
+from burg_drake.objects.closed_surfaces import from_manifold
 from burg_drake.objects.library import Decomposition, Fit
 from burg_drake.objects.symmetry import sample_surface, spread_samples
 
@@ -93,8 +95,6 @@ def union_mesh(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     Raises:
         MeshError: there are no parts, or one is not a closed manifold.
     """
-    from manifold3d import Error, Manifold, Mesh64, OpType
-
     if not parts:
         raise MeshError("there are no parts to take the union of; give at least one")
     solids = []
@@ -104,9 +104,7 @@ def union_mesh(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
         if solid.status() != Error.NoError:
             raise MeshError(f"part {i} is not a closed surface ({solid.status().name})")
         solids.append(solid)
-    mesh = Manifold.batch_boolean(solids, OpType.Add).to_mesh64()
-    faces = np.asarray(mesh.tri_verts).astype(np.int64)
-    return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], faces, process=False)
+    return from_manifold(Manifold.batch_boolean(solids, OpType.Add))
 
 
 def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh, enough: float = np.inf) -> float:
@@ -126,7 +124,7 @@ def surface_overlap(one: trimesh.Trimesh, other: trimesh.Trimesh, floor: float) 
     """How deep the deepest point of one surface is inside the other one, either way [m].
 
     That is at most the way by which they would have to be moved apart. Points are taken on the
-    faces and edges of both, `OVERLAP_SPACING` apart at most.
+    faces and edges of both, 2 mm apart at most.
 
     Args:
         one, other: surfaces in one frame, wound outward. Nothing is inside a surface that is not
@@ -158,7 +156,7 @@ def _depth_inside(surface: trimesh.Trimesh, solid: trimesh.Trimesh, floor: float
 
 def _points_in_box(surface: trimesh.Trimesh, box: Array) -> Array:
     """Points (N, 3) of a surface within a box (2, 3): vertices, and middles of edges, of triangles
-    that are halved until no edge is longer than `OVERLAP_SPACING`."""
+    that are halved until no edge is longer than 2 mm."""
     max_spacing = 2e-3  # Metres between neighbouring points of the surface.
     found = [np.asarray(surface.vertices)]
     triangles = np.asarray(surface.triangles)

@@ -73,7 +73,8 @@ def carrying_corners(
         most: height over the lowest corner up to which others may count [m].
 
     Returns:
-        Indices of corners; where that is no support, of those within `SUPPORT_HEIGHT_TOLERANCE` of the lowest one.
+        Indices of corners; where that is no support, of those within
+            `SUPPORT_HEIGHT_TOLERANCE` of the lowest one.
     """
     min_inner_distance = 5e-4  # Metres of the centre of mass from the sides of its support polygon.
     heights = np.round(corners @ up, 9)

@@ -15,15 +15,11 @@ from trimesh.triangles import closest_point
 
 from burg_drake.core import Array, rot_z
 
-
-class SymmetrySampling:
-    """Symmetry sampling."""
-
-    surface_points = 16000  # Points that represent the surface.
-    probe_points = 1000  # Points that are rotated and compared.
-    coarse_points = 100  # Points of the first comparison.
-    normal_weight = 0.025  # Share of the diagonal per unit difference of normals.
-    sectors = 72  # Angles about an axis in the first search.
+SURFACE_POINTS = 16000  # Points that represent the surface.
+PROBE_POINTS = 1000  # Points that are rotated and compared.
+COARSE_POINTS = 100  # Points of the first comparison.
+NORMAL_WEIGHT = 0.025  # Share of the diagonal per unit difference of normals.
+SECTORS = 72  # Angles about an axis in the first search.
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +70,8 @@ class SymmetrySearch:
     Args:
         surface: in O [m].
         p_OC: (3,) point that all turns are about, such as the centre of mass [m].
-        tolerance: largest deviation that counts as the same [m]; `MAX_DEVIATION` if None.
+        tolerance: largest deviation that counts as the same [m]; if None 0.2 mm, or 0.5 % of the
+            diagonal where that is less.
         covered: share of the surface that must be within the tolerance.
 
     Attributes:
@@ -95,18 +92,16 @@ class SymmetrySearch:
         least = min(max_deviation, max_deviation_share * self.diagonal)
         self.tolerance = least if tolerance is None else tolerance
         self._covered = covered
-        points, face = spread_samples(surface, SymmetrySampling.surface_points)
+        points, face = spread_samples(surface, SURFACE_POINTS)
         self._sample = points - p_OC
-        order = _evenly_spread_order(SymmetrySampling.surface_points)[
-            :: SymmetrySampling.surface_points // SymmetrySampling.probe_points
-        ]
+        order = _evenly_spread_order(SURFACE_POINTS)[:: SURFACE_POINTS // PROBE_POINTS]
         normals = _triangle_normals(self._triangles)
         self._probe, self._probe_normals = self._sample[order], normals[face[order]]
         # centres of triangles stand for those that are too small to have a point
         self._face = np.concatenate([face, np.arange(len(self._triangles))])
         self._points = np.vstack([self._sample, self._triangles.mean(axis=1)])
         self._normals = normals[self._face]
-        weight = SymmetrySampling.normal_weight * self.diagonal
+        weight = NORMAL_WEIGHT * self.diagonal
         self._tree = cKDTree(np.hstack([self._points, weight * self._normals]))
 
     def find(self) -> Symmetries:
@@ -125,7 +120,7 @@ class SymmetrySearch:
         pairs = [(axis, sign * axis) for axis in axes.T for sign in (1.0, -1.0)]
         candidates = list(axes.T)
         if not any(unequal):
-            far = self._farthest()
+            far = self._farthest_directions()
             pairs = [(far[0], b) for b in far]
             candidates += far
         axis = next((a for a in candidates if self.turns_about(a)), None)
@@ -133,15 +128,15 @@ class SymmetrySearch:
             pairs = [(axis, -axis)]
         found = [np.eye(3)]
         for a, b in pairs:
-            for R in self._starts(a, b):
+            for R in self._candidate_rotations(a, b):
                 if _is_known_rotation(R, found):
                     continue
-                refined = self._refined(R)
+                refined = self._refine_rotation(R)
                 if refined is None or _is_known_rotation(refined, found) or not self.fits(refined):
                     continue
                 if axis is not None:
                     return Symmetries(np.stack([np.eye(3), refined]), axis)
-                found = self._products([*found, refined])
+                found = self._close_group([*found, refined])
         return Symmetries(np.stack(found), axis)
 
     def turns_about(self, axis: Array) -> bool:
@@ -155,13 +150,12 @@ class SymmetrySearch:
 
     def fits(self, R: Array) -> bool:
         """Whether a rotation (3, 3) lays the surface onto itself."""
-        few = self._share_near(R, SymmetrySampling.coarse_points)
-        return (
-            few > self._covered - 0.1
-            and self._share_near(R, SymmetrySampling.probe_points) >= self._covered
-        )
+        few = self._share_within_tolerance(R, COARSE_POINTS)
+        if not few > self._covered - 0.1:
+            return False
+        return self._share_within_tolerance(R, PROBE_POINTS) >= self._covered
 
-    def _farthest(self) -> list[Array]:
+    def _farthest_directions(self) -> list[Array]:
         """Unit vectors to the farthest corners, farthest first, none near another.
 
         The farthest point of a surface is a corner, and where a turn takes it the surface has a
@@ -180,7 +174,7 @@ class SymmetrySearch:
             left = left[left @ left[0] < np.cos(same_angle)]
         return directions
 
-    def _share_near(self, R: Array, count: int) -> float:
+    def _share_within_tolerance(self, R: Array, count: int) -> float:
         """Share of the first `count` points that R (3, 3) takes to within the tolerance."""
         candidates = 8  # Points of the surface whose triangles are compared.
         turned, facing = self._probe[:count] @ R.T, self._probe_normals[:count] @ R.T
@@ -192,58 +186,48 @@ class SymmetrySearch:
         near = (alike & (gaps <= self.tolerance)).any(axis=1)
         return float(near.mean())
 
-    def _starts(self, a: Array, b: Array) -> Iterator[Array]:
+    def _candidate_rotations(self, a: Array, b: Array) -> Iterator[Array]:
         """Rotations (3, 3) that take direction a to b, those that fit best by areas first."""
         max_angles = 8  # Angles about an axis that are refined.
-        profile_a, profile_b = self._profile(a), self._profile(b)
+        profile_a, profile_b = self._area_profile(a), self._area_profile(b)
         shape_a, shape_b = profile_a.sum(axis=0), profile_b.sum(axis=0)
         if np.abs(shape_a - shape_b).sum() > 0.5 * shape_a.sum():
             return
         match = np.fft.irfft(
             (np.fft.rfft(profile_b, axis=0) * np.conj(np.fft.rfft(profile_a, axis=0))).sum(axis=1),
-            SymmetrySampling.sectors,
+            SECTORS,
         )
         R_Ba, R_Bb = rotation_from_down(a), rotation_from_down(b)
         chosen: list[int] = []
         for k in np.argsort(-match, kind="stable").tolist():
-            if all(
-                min((k - c) % SymmetrySampling.sectors, (c - k) % SymmetrySampling.sectors) > 2
-                for c in chosen
-            ):
+            if all(min((k - c) % SECTORS, (c - k) % SECTORS) > 2 for c in chosen):
                 chosen.append(k)
-                yield R_Bb.T @ rot_z(2.0 * np.pi * k / SymmetrySampling.sectors) @ R_Ba
+                yield R_Bb.T @ rot_z(2.0 * np.pi * k / SECTORS) @ R_Ba
             if len(chosen) == max_angles:
                 return
 
-    def _profile(self, down: Array) -> Array:
+    def _area_profile(self, down: Array) -> Array:
         """(SECTORS, bins) area by azimuth, height and radius, about the vertical."""
         p = self._sample @ rotation_from_down(down).T
-        azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * SymmetrySampling.sectors
+        azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * SECTORS
         radius = np.hypot(p[:, 0], p[:, 1]) / self.diagonal
         height = p[:, 2] / self.diagonal + 1.0
         bins = (
-            azimuth.astype(int) % SymmetrySampling.sectors,
+            azimuth.astype(int) % SECTORS,
             np.clip((height * 8).astype(int), 0, 16),
             np.clip((radius * 8).astype(int), 0, 8),
         )
-        flat = np.ravel_multi_index(bins, (SymmetrySampling.sectors, 17, 9))
-        return (
-            np.bincount(flat, minlength=SymmetrySampling.sectors * 17 * 9)
-            .reshape(SymmetrySampling.sectors, -1)
-            .astype(float)
-        )
+        flat = np.ravel_multi_index(bins, (SECTORS, 17, 9))
+        return np.bincount(flat, minlength=SECTORS * 17 * 9).reshape(SECTORS, -1).astype(float)
 
-    def _refined(self, R: Array) -> Array | None:
+    def _refine_rotation(self, R: Array) -> Array | None:
         """The rotation near R (3, 3) that lays the surface closest onto itself; None if that is
         not near.
 
         Iterated closest points, with distances along the normals.
         """
         max_median_share = 0.02  # Median distance over the diagonal; above it the search stops.
-        for count, rounds in (
-            (SymmetrySampling.coarse_points, 8),
-            (SymmetrySampling.probe_points // 2, 6),
-        ):
+        for count, rounds in ((COARSE_POINTS, 8), (PROBE_POINTS // 2, 6)):
             probe, normals = self._probe[:count], self._probe_normals[:count]
             for _ in range(rounds):
                 turned = probe @ R.T
@@ -262,10 +246,10 @@ class SymmetrySearch:
 
     def _nearest(self, points: Array, normals: Array, count: int) -> NDArray[np.int64]:
         """(N,) or (N, count) numbers of the surface's points that are nearest."""
-        weight = SymmetrySampling.normal_weight * self.diagonal
+        weight = NORMAL_WEIGHT * self.diagonal
         return np.asarray(self._tree.query(np.hstack([points, weight * normals]), k=count)[1])
 
-    def _products(self, found: Sequence[Array]) -> list[Array]:
+    def _close_group(self, found: Sequence[Array]) -> list[Array]:
         """The rotations with their products, which are symmetries as well."""
         max_rotations = 120  # Rotations kept; polyhedra have at most 60.
         group = list(found)
@@ -275,7 +259,7 @@ class SymmetrySearch:
                     return group
                 if _is_known_rotation(b @ a, group):
                     continue
-                product = self._refined(b @ a)
+                product = self._refine_rotation(b @ a)
                 if (
                     product is not None
                     and not _is_known_rotation(product, group)

@@ -12,12 +12,9 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of meshes, in metres."""
 
 
-class ObjectExtent:
-    """Object extent."""
-
-    maximum = 2.5  # Metres; above it the unit is taken to be wrong.
-    minimum = 1e-3  # Metres.
-    usual = (0.01, 1.0)  # Metres, of nearly all objects on a table.
+MAX_EXTENT = 2.5  # Metres; above it the unit is taken to be wrong.
+MIN_EXTENT = 1e-3  # Metres.
+USUAL_EXTENTS = (0.01, 1.0)  # Metres, of nearly all objects on a table.
 
 
 def unit_scale(name: str) -> float:
@@ -57,7 +54,7 @@ def check_extent(extent: float, name: str, scale: float) -> None:
     """
     if extent == 0.0:
         raise MeshError(f"{name}: all vertices are at one point")
-    if not ObjectExtent.minimum <= extent <= ObjectExtent.maximum:
+    if not MIN_EXTENT <= extent <= MAX_EXTENT:
         units = _fitting_units(extent / scale)
         error = MeshError(
             f"{name}: taken as metres, the mesh is {format_length(extent)} long; "
@@ -70,7 +67,7 @@ def check_extent(extent: float, name: str, scale: float) -> None:
 def _fitting_units(extent: float) -> dict[str, float]:
     """Units with their scales that would make something usual of a mesh with this largest extent in
     its own unit, or else something possible."""
-    for low, high in (ObjectExtent.usual, (ObjectExtent.minimum, ObjectExtent.maximum)):
+    for low, high in (USUAL_EXTENTS, (MIN_EXTENT, MAX_EXTENT)):
         if fits := {u: s for u, s in UNITS.items() if low <= s * extent <= high}:
             return fits
     return {}

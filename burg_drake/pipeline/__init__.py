@@ -1,6 +1,7 @@
 """Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked.
 
-Read `build` first, then `stages`; `recipe` is what is asked for.
+Read `object_source` first, then `library_build` and `object_build`; `library_recipe` is what is
+asked for.
 """
 
 import lazy_loader

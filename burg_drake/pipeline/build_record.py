@@ -9,7 +9,6 @@ import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from burg_drake.core import (
     content_hash,
     load_document,
     load_json,
+    package_version,
     plain_data,
 )
 from burg_drake.objects import (
@@ -83,10 +83,11 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     if pieces_given is not None:
         given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in pieces_given]
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
-    makers = (_package_version("trimesh"), _package_version("manifold3d"))
+    # Another version of a package may make something else of the same mesh.
+    makers = (package_version("trimesh", ""), package_version("manifold3d", ""))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)
     visual = content_hash(BUILD_VERSION, "opaque visual", *surface, _as_floats(source.rgba))
-    maker = [_package_version("coacd"), *FINER_THRESHOLDS, MAX_PIECES] if given is None else []
+    maker = [package_version("coacd", ""), *FINER_THRESHOLDS, MAX_PIECES] if given is None else []
     pieces = content_hash(
         BUILD_VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker
     )
@@ -97,7 +98,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
         _as_floats(source.center_of_mass),
         source.contact,
         asdict(DEFAULT_CONTACT),
-        [_package_version("drake")] if confirm else None,
+        [package_version("drake", "")] if confirm else None,
     )
     numbers = (source.mass, source.density, source.coefficient)
     build = content_hash(
@@ -122,14 +123,6 @@ def _as_floats(numbers: tuple[float | None, ...] | None) -> list[float | None] |
     return None if numbers is None else [None if n is None else float(n) for n in numbers]
 
 
-def _package_version(package: str) -> str:
-    """Its version: another one may make something else of the same mesh."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return ""
-
-
 @dataclass(frozen=True, kw_only=True)
 class ObjectGeometry:
     """What a build found out about an object's shape.
@@ -140,7 +133,7 @@ class ObjectGeometry:
         closed: whether the surface is watertight.
         wall: thickness of the wall that an open surface became [m]; None for others.
         lower, upper: bounds [m].
-        volume, p_OOcm, G_OOcm: see `mass.Solid`; the matrix by rows.
+        volume, p_OOcm, G_OOcm: see `Solid`; the matrix by rows.
         pieces: file names in the object's folder.
         threshold: that the pieces were cut with; None for pieces that came with the object.
         cut: what was done to get them beyond what was asked for; or empty.

@@ -17,7 +17,7 @@ from burg_drake.core import (
     make_name,
     suggest_names,
 )
-from burg_drake.formats import BurgInstance, BurgLibrary, BurgObject, BurgScene, YcbObject
+from burg_drake.formats import BurgInstance, BurgLibrary, BurgScene, YcbObject
 from burg_drake.objects import ObjectLibrary, SymmetrySearch
 from burg_drake.pipeline.object_source import ObjectSource, check_source, object_name
 from burg_drake.scene import Board, Instance, Markers, SceneDocument
@@ -39,7 +39,7 @@ def burg_sources(
     listed poses agree with the new ones.
 
     Args:
-        library: from `formats.burg_toolkit.read_burg_library`.
+        library: from `read_burg_library`.
         masses: by identifier or object name [kg]; they go before the document's.
         density: for objects that have no mass, which are fixed otherwise [kg/m^3].
         friction: coefficient of objects that have none.
@@ -55,9 +55,10 @@ def burg_sources(
     names = burg_names(library)
     given = _by_identifier(masses or {}, names, "a mass")
     left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "skip")
-    objects = [o for o in library.objects if o.identifier not in left_out]
     sources = []
-    for item in objects:
+    for item in library.objects:
+        if item.identifier in left_out:
+            continue
         mass = given.get(item.identifier, item.mass)
         source = ObjectSource(
             name=names[item.identifier],
@@ -91,18 +92,16 @@ def burg_names(library: BurgLibrary) -> dict[str, str]:
     Raises:
         InvalidInputError: two objects get the same name, or an identifier makes none.
     """
-    names: dict[str, str] = {}
-    owner: dict[str, BurgObject] = {}
+    identifiers: dict[str, str] = {}
     for item in library.objects:
         name = object_name(item.identifier)
-        if name in owner:
+        if name in identifiers:
             raise InvalidInputError(
-                f"{library.path}:{item.line}: {owner[name].identifier!r} and {item.identifier!r}"
+                f"{library.path}:{item.line}: {identifiers[name]!r} and {item.identifier!r}"
                 f" both become object {name!r}; rename one of them"
             )
-        names[item.identifier] = name
-        owner[name] = item
-    return names
+        identifiers[name] = item.identifier
+    return {identifier: name for name, identifier in identifiers.items()}
 
 
 def ycb_sources(
@@ -115,7 +114,7 @@ def ycb_sources(
     """What to build from meshes of the YCB set.
 
     Args:
-        objects: from `formats.ycb.find_ycb`.
+        objects: from `find_ycb`.
         masses: by YCB name or object name [kg]; they go before the published ones.
         density: for objects that have no mass [kg/m^3]; the pipeline's default if None.
         friction: coefficient of all.
@@ -191,11 +190,9 @@ def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -
     here = [_gravity_direction(pose.X_SO) for pose in entry.stable_poses]
     distinct: list[Array] = []
     for down in listed:
-        if not any(test.same(down, other) for other in distinct):
+        if not test.is_among(down, distinct):
             distinct.append(down)
-    unknown = tuple(
-        i for i, down in enumerate(listed) if not any(test.same(down, other) for other in here)
-    )
+    unknown = tuple(i for i, down in enumerate(listed) if not test.is_among(down, here))
     return PoseComparison(len(listed), len(distinct), len(here), unknown)
 
 
@@ -215,7 +212,10 @@ class _PoseMatcher:
         self.symmetries, self.tolerance = search.find(), search.tolerance
         self.points = surface.vertices - p_OOcm
 
-    def same(self, a: Array, b: Array) -> bool:
+    def is_among(self, down: Array, others: Iterable[Array]) -> bool:
+        return any(self._is_same_pose(down, other) for other in others)
+
+    def _is_same_pose(self, a: Array, b: Array) -> bool:
         # BURG-Toolkit records the pose after a fall onto V-HACD pieces, not the face.
         max_angle = np.deg2rad(10.0)
         if float(a @ b) > np.cos(max_angle):
@@ -267,7 +267,7 @@ def import_burg_scene(
 ) -> ImportedScene:
     """The scene document of a scene of BURG-Toolkit.
 
-    Objects are those that `pipeline.collection_imports.burg_sources` makes of the scene's object
+    Objects are those that `burg_sources` makes of the scene's object
     library, by `object_name(identifier)`. What has no mass there is background, whichever list it
     is in. Instances have no names in BURG-Toolkit; they get those of their objects, the second one
     of an object `NAME_2` and so on. One that would be called as something of every station, such as
@@ -275,7 +275,7 @@ def import_burg_scene(
     it has the size of the ground area and the markers of this project.
 
     Args:
-        scene: from `formats.burg_toolkit.read_burg_scene`.
+        scene: from `read_burg_scene`.
         library: has the objects.
         name: of the document; that of the scene's file if empty.
         reference: how the document refers to the library; its folder if empty.
@@ -288,7 +288,7 @@ def import_burg_scene(
     names = _InstanceNames(scene, library)
     free, fixed, notes = [], [], []
     for item in scene.objects:
-        instance = names.instance(item)
+        instance = names.make_instance(item)
         if library.entry(instance.object).is_fixed:
             fixed.append(instance)
             notes.append(
@@ -297,7 +297,7 @@ def import_burg_scene(
             )
         else:
             free.append(instance)
-    fixed += [names.instance(item) for item in scene.bg_objects]
+    fixed += [names.make_instance(item) for item in scene.bg_objects]
     notes += [
         f"an instance of object {i.object!r} is called {i.name!r}, as every station has"
         f" something called {i.object!r} already"
@@ -337,24 +337,21 @@ class _InstanceNames:
     """Finds objects, and gives names to their instances."""
 
     def __init__(self, scene: BurgScene, library: ObjectLibrary) -> None:
-        self.scene = scene
-        self.library = library
         self.count: Counter[str] = Counter()
         items = sorted((*scene.objects, *scene.bg_objects), key=lambda item: item.line)
         self.taken = {object_name(item.object_type) for item in items}
         lacking = [i for i in items if object_name(i.object_type) not in library.objects]
         if lacking:
-            lines = [f"{scene.path}:{i.line}: {self._require_object(i)}" for i in lacking]
-            raise UnknownNameError("; ".join(lines))
+            named = [(i, object_name(i.object_type)) for i in lacking]
+            raise UnknownNameError(
+                "; ".join(
+                    f"{scene.path}:{i.line}: object {name!r} ({i.object_type!r}) is not in library"
+                    f" {library.root}; {suggest_names(name, library.objects)}"
+                    for i, name in named
+                )
+            )
 
-    def _require_object(self, item: BurgInstance) -> str:
-        name = object_name(item.object_type)
-        return (
-            f"object {name!r} ({item.object_type!r}) is not in library {self.library.root};"
-            f" {suggest_names(name, self.library.objects)}"
-        )
-
-    def instance(self, item: BurgInstance) -> Instance:
+    def make_instance(self, item: BurgInstance) -> Instance:
         object = object_name(item.object_type)
         self.count[object] += 1
         if self.count[object] == 1 and object not in MODEL_NAMES:

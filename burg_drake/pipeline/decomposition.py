@@ -10,9 +10,9 @@ import trimesh
 
 from burg_drake.core import MeshError
 from burg_drake.objects import (
+    ConvexPieces,
     Decomposition,
     Fit,
-    Pieces,
     SurfaceMesh,
     check_given_pieces,
     convex_pieces,
@@ -72,18 +72,16 @@ def cut_into_pieces(source: ObjectSource, mesh: SurfaceMesh) -> ObjectPieces:
         with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
             finer = _cut_at_threshold(mesh, replace(parameters, threshold=threshold))
             seconds += finer.seconds
-            better = relative_deviation(finer.fit, mesh.surface) < relative_deviation(
-                best.fit, mesh.surface
-            )
-            if better and len(finer.pieces) <= MAX_PIECES:
+            deviations = [relative_deviation(made.fit, mesh.surface) for made in (finer, best)]
+            if deviations[0] < deviations[1] and len(finer.pieces) <= MAX_PIECES:
                 best = finer
     note = f"more pieces, up to {MAX_PIECES}, do not fit better" if tried else ""
     if best is not first and first.fit is not None and best.fit is not None:
         note = (
-            f"cut again with decomposition.threshold {best.threshold:g} instead of "
-            f"{first.threshold:g}, as the {len(first.pieces)} pieces did not fit well ("
-            f"{describe_fit(first.fit)}): now {len(best.pieces)} pieces ("
-            f"{describe_fit(best.fit)})"
+            f"cut again with decomposition.threshold {best.threshold:g} instead of"
+            f" {first.threshold:g}, as the {len(first.pieces)} pieces did not fit well"
+            f" ({describe_fit(first.fit)}): now {len(best.pieces)} pieces"
+            f" ({describe_fit(best.fit)})"
         )
     return replace(best, note=note, seconds=seconds)
 
@@ -93,10 +91,10 @@ def _cut_at_threshold(mesh: SurfaceMesh, parameters: Decomposition) -> ObjectPie
     return _measure_fit(pieces, mesh, parameters.threshold)
 
 
-def _measure_fit(pieces: Pieces, mesh: SurfaceMesh, threshold: float | None) -> ObjectPieces:
-    decimals = 7  # 0.1 um: files hold exactly the vertices of the computation.
+def _measure_fit(pieces: ConvexPieces, mesh: SurfaceMesh, threshold: float | None) -> ObjectPieces:
+    # To 0.1 um: files hold exactly the vertices of the computation.
     rounded = tuple(
-        trimesh.Trimesh(np.round(p.vertices, decimals) + 0.0, p.faces, process=False)
+        trimesh.Trimesh(np.round(p.vertices, 7) + 0.0, p.faces, process=False)
         for p in pieces.meshes
     )
     fit = measure_fit(mesh.surface, rounded, mesh.surface.volume) if mesh.closed else None

@@ -62,14 +62,6 @@ def open_for_build(out: str | Path) -> Iterator[Path]:
                     folder.rmdir()
 
 
-@contextmanager
-def scratch_folder(root: Path) -> Iterator[Path]:
-    """A hidden folder beside the objects, for as long as they are built."""
-    prefix = f".building-{os.getpid()}-"
-    with tempfile.TemporaryDirectory(dir=root, prefix=prefix) as scratch:
-        yield Path(scratch)
-
-
 def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection[str]) -> None:
     """Checks that nothing is replaced but objects of this library.
 
@@ -151,14 +143,6 @@ class BuildTask:
     root: Path
     folder: Path
     confirm: bool
-
-
-def build_objects(
-    work: Sequence[BuildTask], workers: int
-) -> Iterator[tuple[BuildTask, BuiltObject | BaseException]]:
-    """Builds objects, each with what came of it; see `core.map_unordered`. The sizes of all
-    meshes are checked first: a wrong unit is told before anything takes long."""
-    return map_unordered(run_build_task, work, workers, check=check_task_size)
 
 
 def check_task_size(item: BuildTask) -> None:
@@ -255,9 +239,15 @@ def build_library(
     named = [s if isinstance(s, ObjectSource) else ObjectSource.from_file(s) for s in sources]
     _check_names(named)
     with open_for_build(out) as root:
-        library = _open_library(root, name)
+        if (root / LIBRARY_FILE).exists():
+            library = load_library(root)
+        else:
+            library = ObjectLibrary(LibraryDocument(name=name or object_name(root.name)), root)
         check_targets(named, root, library.objects)
-        tally = _BuildProgress(_with_name(library, name), len(named), progress, on_failure)
+        if name is not None and name != library.name:
+            library = ObjectLibrary(replace(library.document, name=name), root)
+            library.save()
+        tally = _BuildProgress(library, len(named), progress, on_failure)
         _build_objects(named, tally, confirm, workers)
         return tally.report(named)
 
@@ -268,7 +258,7 @@ def _build_objects(
     root = tally.library.root
     todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
-        checked = _needs_confirmation(source, confirm)
+        checked = confirm and not source.fixed  # what is fixed need not be simulated
         entry = tally.entries.get(source.name)
         try:
             keys = stage_keys(source, checked)
@@ -280,24 +270,21 @@ def _build_objects(
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
-    with scratch_folder(root) as scratch:
+    prefix = f".building-{os.getpid()}-"
+    with tempfile.TemporaryDirectory(dir=root, prefix=prefix) as scratch:
         work = [
-            BuildTask(s, keys, root, scratch / s.name, _needs_confirmation(s, confirm))
+            BuildTask(s, keys, root, Path(scratch, s.name), confirm and not s.fixed)
             for s, keys in _longest_first(todo)
         ]
         try:
-            for item, outcome in build_objects(work, workers):
+            # Sizes are checked first: a wrong unit is told before anything takes long.
+            for item, outcome in map_unordered(run_build_task, work, workers, check_task_size):
                 if isinstance(outcome, BuiltObject):
-                    tally.publish(item.source, outcome, scratch)
+                    tally.publish(item.source, outcome, Path(scratch))
                 else:
                     tally.fail(item.source.name, outcome)
         finally:
             tally.save()
-
-
-def _needs_confirmation(source: ObjectSource, confirm: bool) -> bool:
-    """Whether the stable poses of an object are simulated, if any are: not what is fixed."""
-    return confirm and not source.fixed
 
 
 def _longest_first(
@@ -349,7 +336,6 @@ class _BuildProgress:
 
     def publish(self, source: ObjectSource, built: BuiltObject, scratch: Path) -> None:
         """Moves an object's folder into place and writes the library with it."""
-        save_interval = 1.0  # Seconds between writes of `library.yaml` during a build.
         if built.folder is not None:
             home = self.library.root / source.name
             before = scratch / f"{source.name}.before"
@@ -362,7 +348,7 @@ class _BuildProgress:
                     before.rename(home)
                 raise
         self.entries[source.name] = built.entry
-        if time.monotonic() > self.saved + save_interval:
+        if time.monotonic() > self.saved + 1.0:  # seconds between writes of `library.yaml`
             self.save()
         self.notes[source.name] = built.notes
         self.seconds[source.name] = built.seconds
@@ -371,7 +357,9 @@ class _BuildProgress:
     def save(self) -> None:
         """Writes the library if it has new objects."""
         if self.entries != self.library.objects:
-            self.library = _with_entries(self.library, self.entries)
+            ordered = {name: self.entries[name] for name in sorted(self.entries)}
+            document = replace(self.library.document, objects=ordered)
+            self.library = ObjectLibrary(document, self.library.root)
             self.library.save()
         self.saved = time.monotonic()
 
@@ -394,22 +382,3 @@ def _check_names(sources: Sequence[ObjectSource]) -> None:
         if count > 1:
             files = ", ".join(str(s.mesh) for s in sources if s.name == name)
             raise InvalidInputError(f"{count} meshes have the same object name {name!r}: {files}")
-
-
-def _open_library(root: Path, name: str | None) -> ObjectLibrary:
-    if (root / LIBRARY_FILE).exists():
-        return load_library(root)
-    return ObjectLibrary(LibraryDocument(name=name or object_name(root.name)), root)
-
-
-def _with_name(library: ObjectLibrary, name: str | None) -> ObjectLibrary:
-    if name is None or name == library.name:
-        return library
-    library = ObjectLibrary(replace(library.document, name=name), library.root)
-    library.save()
-    return library
-
-
-def _with_entries(library: ObjectLibrary, entries: dict[str, ObjectEntry]) -> ObjectLibrary:
-    ordered = {name: entries[name] for name in sorted(entries)}
-    return ObjectLibrary(replace(library.document, objects=ordered), library.root)

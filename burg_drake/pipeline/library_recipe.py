@@ -238,21 +238,12 @@ def _with_defaults(item: RecipeObject, defaults: Defaults) -> RecipeObject:
 
 
 def _make_source(name: str, item: RecipeObject, root: Path) -> ObjectSource:
-    scale = item.scale if item.scale is not None else UNITS[item.unit or "m"]
-    return ObjectSource(
-        name=name,
-        mesh=root / item.mesh,
-        mass=item.mass,
-        density=item.density,
-        center_of_mass=item.center_of_mass,
-        inertia=item.inertia,
-        wall_thickness=item.wall_thickness,
-        openings=item.openings or "wall",
-        friction=item.friction,
-        scale=scale,
-        pieces=tuple(root / file for file in item.pieces) or None,
-        contact=item.contact,
-        rgba=item.rgba,
-        description=item.description,
-        decomposition=(item.decomposition or Cutting()).parameters(),
-    )
+    fields = _set_fields(item)
+    scale = UNITS[fields.pop("unit", "m")]
+    fields |= {
+        "mesh": root / item.mesh,
+        "scale": fields.get("scale", scale),
+        "pieces": tuple(root / file for file in item.pieces) or None,
+        "decomposition": (item.decomposition or Cutting()).parameters(),
+    }
+    return ObjectSource(name=name, **fields)

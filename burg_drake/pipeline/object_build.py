@@ -22,7 +22,6 @@ from burg_drake.objects import (
     DEFAULT_DENSITY,
     DEFAULT_FRICTION,
     ContactGeometry,
-    Decomposition,
     LibraryDocument,
     MassProperties,
     ObjectEntry,
@@ -187,14 +186,8 @@ def _confirm_poses(
     )
     atomic_write(folder / f"{name}.sdf", sdf)
     entry = ObjectEntry(
-        mesh=f"{name}/{MESH_FILE}",
-        sdf=f"{name}/{name}.sdf",
-        pieces=tuple(f"{name}/{piece}" for piece in geometry.pieces),
-        contact=placed_contact(geometry.contact, name),
-        lower=geometry.lower,
-        upper=geometry.upper,
+        **_geometry_fields(name, geometry),
         mass_properties=properties,
-        stable_poses=geometry.stable_poses,
         source=Source(file="", sha256=""),
         build="",
     )
@@ -203,9 +196,18 @@ def _confirm_poses(
     return confirmation.poses, confirmation.notes
 
 
-def placed_contact(contact: ContactGeometry, name: str) -> ContactGeometry:
-    """The contact geometry of object `name` with its mesh relative to the library's folder."""
-    return replace(contact, mesh=f"{name}/{contact.mesh}") if contact.mesh else contact
+def _geometry_fields(name: str, geometry: ObjectGeometry) -> dict[str, Any]:
+    """Fields of the entry of object `name`; its files are relative to the library's folder."""
+    contact = geometry.contact
+    return {
+        "mesh": f"{name}/{MESH_FILE}",
+        "sdf": f"{name}/{name}.sdf",
+        "pieces": tuple(f"{name}/{piece}" for piece in geometry.pieces),
+        "contact": replace(contact, mesh=f"{name}/{contact.mesh}") if contact.mesh else contact,
+        "lower": geometry.lower,
+        "upper": geometry.upper,
+        "stable_poses": geometry.stable_poses,
+    }
 
 
 def _as_vector3(values: Any) -> Vector3:
@@ -351,31 +353,20 @@ def _make_entry(
     root: Path,
 ) -> ObjectEntry:
     file, path = _mesh_origin(source, root)
+    decomposition = None
+    if source.pieces is None:
+        threshold = geometry.threshold or source.decomposition.threshold
+        decomposition = replace(source.decomposition, threshold=threshold)
     return ObjectEntry(
+        **_geometry_fields(source.name, geometry),
         description=source.description,
-        mesh=f"{source.name}/{MESH_FILE}",
         surface=f"{source.name}/{geometry.surface}" if geometry.surface else "",
-        sdf=f"{source.name}/{source.name}.sdf",
-        pieces=tuple(f"{source.name}/{name}" for name in geometry.pieces),
-        decomposition=_used_decomposition(source, geometry),
+        decomposition=decomposition,
         fit=geometry.fit,
-        contact=placed_contact(geometry.contact, source.name),
         friction=source.coefficient,
-        lower=geometry.lower,
-        upper=geometry.upper,
         mass_properties=properties,
-        stable_poses=geometry.stable_poses,
         source=Source(
             file=file, path=path, sha256=keys.file, scale=source.scale, repairs=geometry.repairs
         ),
         build=keys.build,
-    )
-
-
-def _used_decomposition(source: ObjectSource, geometry: ObjectGeometry) -> Decomposition | None:
-    """The parameters that the pieces were cut with, if they were."""
-    if source.pieces is not None:
-        return None
-    return replace(
-        source.decomposition, threshold=geometry.threshold or source.decomposition.threshold
     )

@@ -36,7 +36,7 @@ class ObjectSource:
         name: of the library entry: lower-case letters, digits and underscores.
         mesh: mesh file, or a mesh in memory.
         mass: [kg]; computed from the density if None.
-        density: of the material [kg/m^3]; `mass.DEFAULT_DENSITY` if None.
+        density: of the material [kg/m^3]; `DEFAULT_DENSITY` if None.
         fixed: it has no mass, as it can only be background of a scene: furniture.
         center_of_mass: `p_OOcm` [m], in place of the centroid.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
@@ -44,7 +44,7 @@ class ObjectSource:
         wall_thickness: [m]. A closed surface becomes a hollow body whose mass is in its wall; an
             open surface becomes a wall of this thickness (`Preparation` has the default).
         openings: what becomes of an open surface: a `wall`, or a solid with flat caps (`close`).
-        friction: coefficient; `entry.DEFAULT_FRICTION` if None.
+        friction: coefficient; `DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
         pieces: convex pieces, meshes in O [m] or mesh files in the mesh's own frame and unit; made
             by decomposition if None.

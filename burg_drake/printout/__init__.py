@@ -1,6 +1,7 @@
 """The printable board: height map of a scene, markers at true scale, pages.
 
-Read `board_printout` first; it goes from `relief` over `sheet` to `tiling`.
+Read `board_printout` first: it draws the objects (`object_drawings`), chooses the pages
+(`page_tiling`), and writes the sheet and the instructions (`sheet`, `guide`).
 """
 
 import lazy_loader

@@ -1,6 +1,5 @@
 from .board_printout import (
     Printout as Printout,
-    PrintSettings as PrintSettings,
     draw_rulers as draw_rulers,
     print_board as print_board,
 )
@@ -35,6 +34,7 @@ from .page_tiling import (
     paper_size as paper_size,
     tile_board as tile_board,
 )
+from .print_settings import PrintSettings as PrintSettings
 from .sheet import (
     BLACK as BLACK,
     BOLD_FONT as BOLD_FONT,

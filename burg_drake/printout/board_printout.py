@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.core import Array, InvalidInputError, Units, atomic_write, setting
+from burg_drake.core import Array, InvalidInputError, atomic_write
 from burg_drake.printout.guide import BoardFacts, Guide, draw_guide, guide_steps
 from burg_drake.printout.object_drawings import (
     FIXED_HUE,
@@ -33,6 +33,7 @@ from burg_drake.printout.page_tiling import (
     page_orientations,
     tile_board,
 )
+from burg_drake.printout.print_settings import PrintSettings
 from burg_drake.printout.sheet import (
     BOLD_FONT,
     FAINT,
@@ -58,14 +59,10 @@ from burg_drake.scene import (
     validate_scene,
 )
 
-
-class PageFrameLayout:
-    """Page frame layout."""
-
-    ruler_length = 0.100  # Metres.
-    thin_line = 0.12e-3  # Metres.
-    map_size = (0.026, 0.011)  # Metres, width and height of the map of pages.
-    legend_width = 0.030  # Metres.
+RULER_LENGTH = 0.100  # Metres.
+THIN_LINE = 0.12e-3  # Metres.
+MAP_SIZE = (0.026, 0.011)  # Metres, width and height of the map of pages.
+LEGEND_WIDTH = 0.030  # Metres.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,15 +108,15 @@ def draw_page_frame(
     right = paper.width - paper.margin
     base = paper.margin
     if len(tiling.tiles) > 1:
-        right -= PageFrameLayout.map_size[0]
+        right -= MAP_SIZE[0]
         _draw_map(pen, tile, tiling, size, (right, base))
         right -= 4e-3
-    left = paper.lower[0] + PageFrameLayout.ruler_length + 8e-3
-    above = paper.lower[1] + PageFrameLayout.ruler_length + 8e-3
-    if tints and above + PageFrameLayout.legend_width < paper.upper[1]:
+    left = paper.lower[0] + RULER_LENGTH + 8e-3
+    above = paper.lower[1] + RULER_LENGTH + 8e-3
+    if tints and above + LEGEND_WIDTH < paper.upper[1]:
         _draw_legend(pen, (paper.lower[0] - 2.1e-3, above), turned=True)
     elif tints and right - left > 0.105:
-        right -= PageFrameLayout.legend_width
+        right -= LEGEND_WIDTH
         _draw_legend(pen, (right, base + 5.8e-3), turned=False)
         right -= 6e-3
     _draw_caption(pen, caption, tile, len(tiling.tiles), (left, right), base)
@@ -143,12 +140,10 @@ def _draw_ruler(pen: Pen, start: Array, *, turned: bool) -> None:
         x, y = (start + length * along + off * aside).tolist()
         return x, y
 
-    pen.line(at(0.0, 0.0), at(PageFrameLayout.ruler_length, 0.0), width=PageFrameLayout.thin_line)
+    pen.line(at(0.0, 0.0), at(RULER_LENGTH, 0.0), width=THIN_LINE)
     for millimetre in range(101):
         tick = 2.4e-3 if millimetre % 50 == 0 else 1.7e-3 if millimetre % 10 == 0 else 0.9e-3
-        width = (
-            2 * PageFrameLayout.thin_line if millimetre in (0, 100) else PageFrameLayout.thin_line
-        )
+        width = 2 * THIN_LINE if millimetre in (0, 100) else THIN_LINE
         pen.line(at(millimetre * 1e-3, 0.0), at(millimetre * 1e-3, tick), width=width)
     for millimetre in (50, 100) if turned else (0, 50, 100):
         words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
@@ -163,21 +158,15 @@ def _draw_caption(
     page = f"page {tile.number} of {pages}"
     pen.text(right, base + 10.0e-3, page, 10, align=1.0)
     room = right - left - text_width(page, 10) - 3e-3
-    pen.text(
-        left,
-        base + 10.0e-3,
-        caption.title,
-        _fitting_text_size(caption.title, room, 10, BOLD_FONT),
-        font=BOLD_FONT,
-    )
-    pen.text(
-        left, base + 6.8e-3, caption.board, _fitting_text_size(caption.board, right - left, 6.5)
-    )
-    start = left - PageFrameLayout.ruler_length - 8e-3  # below the ruler, too
-    pen.text(
-        start, base + 4.2e-3, caption.facts, _fitting_text_size(caption.facts, right - start, 6.5)
-    )
-    pen.text(start, base + 0.75e-3, caption.how, _fitting_text_size(caption.how, right - start, 10))
+    title_size = _fitting_text_size(caption.title, room, 10, BOLD_FONT)
+    pen.text(left, base + 10.0e-3, caption.title, title_size, font=BOLD_FONT)
+    start = left - RULER_LENGTH - 8e-3  # below the ruler, too
+    for x, y, text, size in (
+        (left, 6.8e-3, caption.board, 6.5),
+        (start, 4.2e-3, caption.facts, 6.5),
+        (start, 0.75e-3, caption.how, 10),
+    ):
+        pen.text(x, base + y, text, _fitting_text_size(text, right - x, size))
 
 
 def _fitting_text_size(text: str, room: float, size: float, font: str = "Helvetica") -> float:
@@ -189,8 +178,8 @@ def _draw_map(
     pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], corner: tuple[float, float]
 ) -> None:
     """The board with its cuts, and this page filled."""
-    scale = min(PageFrameLayout.map_size[0] / size[0], PageFrameLayout.map_size[1] / size[1])
-    left, bottom = corner[0] + PageFrameLayout.map_size[0] - scale * size[0], corner[1] + 0.5e-3
+    scale = min(MAP_SIZE[0] / size[0], MAP_SIZE[1] / size[1])
+    left, bottom = corner[0] + MAP_SIZE[0] - scale * size[0], corner[1] + 0.5e-3
     xs = [0.0, *tiling.x_cuts, size[0]]
     ys = [size[1], *tiling.y_cuts, 0.0]
     for other in tiling.tiles:
@@ -199,7 +188,7 @@ def _draw_map(
         here = other.number == tile.number
         if here:
             pen.area([rectangle(lower, upper)], INK)
-        pen.outline([rectangle(lower, upper)], PageFrameLayout.thin_line, INK)
+        pen.outline([rectangle(lower, upper)], THIN_LINE, INK)
         text = min(6.0, 0.6 * (upper[1] - lower[1]) / POINT)
         middle = (lower[0] + upper[0]) / 2, (lower[1] + upper[1]) / 2 - 0.35 * text * POINT
         pen.text(*middle, str(other.number), text, align=0.5, color=WHITE if here else INK)
@@ -215,7 +204,7 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
         return x, y
 
     steps = 60
-    edges = PageFrameLayout.legend_width * np.arange(steps + 1) / steps
+    edges = LEGEND_WIDTH * np.arange(steps + 1) / steps
     for k in range(steps):
         luma = luma_at(MAX_TINT_HEIGHT * (k + 0.5) / steps)
         r, g, b = tint_colors(FIXED_HUE, luma).tolist()
@@ -225,9 +214,7 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
     pen.text(*at(0.0, 2.8e-3), "height above the sheet", 6, turned=turned)
     for k, millimetre in enumerate((0, 50, 100)):
         words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
-        pen.text(
-            *at(k * PageFrameLayout.legend_width / 2, -2.0e-3), words, 6, align=k / 2, turned=turned
-        )
+        pen.text(*at(k * LEGEND_WIDTH / 2, -2.0e-3), words, 6, align=k / 2, turned=turned)
 
 
 def _draw_cuts(
@@ -237,20 +224,19 @@ def _draw_cuts(
     and below."""
     (x0, y0), (x1, y1) = tiling.paper.lower, tiling.paper.upper
     columns = len(tiling.x_cuts) + 1
-    for cut, trimmed in ((tile.cut_left, True), (tile.cut_right, False)):
-        if cut is not None:
-            x = tile.p_PS[0] + cut
-            pen.line((x, y0), (x, y1), width=PageFrameLayout.thin_line, color=FAINT, dash=1.2e-3)
-            crossed = tile.p_PS[1] + np.array([0.0, size[1], *_mark_positions(marks, 0, cut)])
-            words = _cut_label(trimmed, tile.number + 1, tiling.flap)
-            _label_cut(pen, (x, y1), words, trimmed, crossed, turned=True)
-    for cut, trimmed in ((tile.cut_top, True), (tile.cut_bottom, False)):
-        if cut is not None:
-            y = tile.p_PS[1] + cut
-            pen.line((x0, y), (x1, y), width=PageFrameLayout.thin_line, color=FAINT, dash=1.2e-3)
-            crossed = tile.p_PS[0] + np.array([0.0, size[0], *_mark_positions(marks, 1, cut)])
-            words = _cut_label(trimmed, tile.number + columns, tiling.flap)
-            _label_cut(pen, (x1, y), words, trimmed, crossed, turned=False)
+    for axis, cut, trimmed in (
+        *((0, tile.cut_left, True), (0, tile.cut_right, False)),
+        *((1, tile.cut_top, True), (1, tile.cut_bottom, False)),
+    ):
+        if cut is None:
+            continue
+        at = tile.p_PS[axis] + cut
+        start, end = ((at, y0), (at, y1)) if axis == 0 else ((x0, at), (x1, at))
+        pen.line(start, end, width=THIN_LINE, color=FAINT, dash=1.2e-3)
+        places = np.array([0.0, size[1 - axis], *_mark_positions(marks, axis, cut)])
+        words = _cut_label(trimmed, tile.number + (columns if axis else 1), tiling.flap)
+        crossed = tile.p_PS[1 - axis] + places
+        _label_cut(pen, end, words, trimmed, crossed, turned=axis == 0)
 
 
 def _mark_positions(marks: Array, axis: int, cut: float) -> list[float]:
@@ -266,13 +252,7 @@ def _cut_label(trimmed: bool, neighbour: int, flap: float) -> str:
 
 
 def _label_cut(
-    pen: Pen,
-    end: tuple[float, float],
-    words: str,
-    trimmed: bool,
-    crossed: Array,
-    *,
-    turned: bool,
+    pen: Pen, end: tuple[float, float], words: str, trimmed: bool, crossed: Array, *, turned: bool
 ) -> None:
     """Says at the end of a cut line what to do there.
 
@@ -367,48 +347,6 @@ def _between_cuts(points: Array, tile: Tile) -> Array:
     low = [-np.inf if c is None else c for c in (tile.cut_left, tile.cut_bottom)]
     high = [np.inf if c is None else c for c in (tile.cut_right, tile.cut_top)]
     return points[((points >= low) & (points <= high)).all(axis=1)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class PrintSettings:
-    """How a board is printed.
-
-    Attributes:
-        page: name of a paper, or `WxH` in millimetres; see `printout.page_tiling`.
-        margin: that the printer leaves white on all sides of a page [m].
-        measured: what the rulers of 100 mm along x and y of the page measured on paper [m]; all is
-            drawn larger by as much as that is too little.
-        height_map: draw the objects.
-        names: write their names beside them, on every page that shows a part of them.
-        instructions: begin with a page that shows how the board is printed, assembled and used.
-    """
-
-    page: str = setting(
-        "A4",
-        "paper: A4 to A0, letter, legal, tabloid, or WxH in mm",
-        metavar="PAGE",
-    )
-    margin: float = setting(
-        5e-3, "unprintable margin of the printer", unit=Units.millimetres, low=0
-    )
-    measured: tuple[float, float] = (0.1, 0.1)
-    height_map: bool = setting(
-        True, "print only markers, not where objects stand", name="no_height_map"
-    )
-    names: bool = setting(True, "do not print names of objects", name="no_names")
-    instructions: bool = False
-
-    def __post_init__(self) -> None:
-        # Metres of a printed ruler of 100 mm; otherwise it was read in another unit.
-        ruler_range = (0.080, 0.125)
-        if not 0.0 <= self.margin <= 0.05:
-            raise InvalidInputError(f"margin is {1e3 * self.margin:g} mm; it must be 0 to 50 mm")
-        for value in self.measured:
-            if not ruler_range[0] <= value <= ruler_range[1]:
-                raise InvalidInputError(
-                    f"the measured length of the 100 mm ruler is {1e3 * value:g} mm; it must be"
-                    f" {1e3 * ruler_range[0]:g} to {1e3 * ruler_range[1]:g} mm"
-                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from burg_drake.printout.sheet import (
     REGULAR_FONT,
     WHITE,
     Pen,
+    draw_arrow,
     rectangle,
     text_width,
 )
@@ -30,15 +31,12 @@ PLAN_HEIGHT = 0.042
 """Metres, height of the plan of pages."""
 
 
-class SketchStyle:
-    """Sketch style."""
-
-    good = (0.0, 0.50, 0.30)  # Colour of correct results.
-    bad = (0.75, 0.12, 0.10)  # Colour of mistakes and cuts.
-    paper = (0.95, 0.96, 0.97)  # Colour of paper.
-    shade = (0.80, 0.83, 0.87)  # Colour of shaded areas.
-    label_size = 10.0  # Points.
-    thick_line = 0.5e-3  # Metres.
+GOOD_COLOR = (0.0, 0.50, 0.30)  # Colour of correct results.
+BAD_COLOR = (0.75, 0.12, 0.10)  # Colour of mistakes and cuts.
+PAPER_COLOR = (0.95, 0.96, 0.97)  # Colour of paper.
+SHADE_COLOR = (0.80, 0.83, 0.87)  # Colour of shaded areas.
+LABEL_SIZE = 10.0  # Points.
+THICK_LINE = 0.5e-3  # Metres.
 
 
 Spot = tuple[float, float]
@@ -47,7 +45,7 @@ Spot = tuple[float, float]
 def draw_scale(pen: Pen) -> None:
     """The board at its true size, and one that was fitted to the page."""
     for x, share, words, good in ((4e-3, 1.0, "100 %", True), (44e-3, 0.7, "fit to page", False)):
-        _draw_paper(pen, (x, 3e-3), (x + 16e-3, 25e-3))
+        _draw_box(pen, (x, 3e-3), (x + 16e-3, 25e-3))
         middle = np.array([x + 8e-3, 14e-3])
         for column in (-1, 0, 1):
             for row in (-1, 0, 1):
@@ -59,19 +57,17 @@ def draw_scale(pen: Pen) -> None:
             x + 17.5e-3,
             7e-3,
             words,
-            SketchStyle.label_size,
+            LABEL_SIZE,
             font=BOLD_FONT,
-            color=SketchStyle.good if good else SketchStyle.bad,
+            color=GOOD_COLOR if good else BAD_COLOR,
         )
 
 
 def draw_measuring(pen: Pen) -> None:
     """A ruler of steel held to the printed one."""
     left, right, line = 5e-3, 65e-3, 8e-3
-    pen.area(
-        [rectangle((left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3))], SketchStyle.shade
-    )
-    pen.outline([rectangle((left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3))], 0.2e-3, INK)
+    steel = (left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3)
+    _draw_box(pen, *steel, SHADE_COLOR, 0.2e-3)
     pen.line((left, line), (right, line), width=0.3e-3)
     for k in range(11):
         x = left + (right - left) * k / 10
@@ -79,15 +75,9 @@ def draw_measuring(pen: Pen) -> None:
         pen.line((x, line), (x, line - (2.6e-3 if long else 1.5e-3)), width=0.3e-3)
         pen.line((x, line + 0.6e-3), (x, line + (3.2e-3 if long else 2.2e-3)), width=0.2e-3)
     for x, words in ((left, "0"), (right, "100 mm")):
-        pen.text(x, line - 6.6e-3, words, SketchStyle.label_size, align=0.5)
-        pen.text(x, line + 4.4e-3, words[:3].strip(), SketchStyle.label_size, align=0.5)
-    pen.text(
-        left,
-        line + 11.5e-3,
-        "both printed rulers: 100 mm each",
-        SketchStyle.label_size,
-        font=BOLD_FONT,
-    )
+        pen.text(x, line - 6.6e-3, words, LABEL_SIZE, align=0.5)
+        pen.text(x, line + 4.4e-3, words[:3].strip(), LABEL_SIZE, align=0.5)
+    pen.text(left, line + 11.5e-3, "both printed rulers: 100 mm each", LABEL_SIZE, font=BOLD_FONT)
     _draw_tick_or_cross(pen, (right + 6e-3, line + 13e-3), good=True)
 
 
@@ -95,40 +85,23 @@ def draw_cutting(pen: Pen) -> None:
     """A page whose left and upper rims are cut off."""
     low, high = np.array([22e-3, 2e-3]), np.array([60e-3, 25e-3])
     cut = np.array([low[0] + 6e-3, high[1] - 6e-3])
-    pen.area(
-        [rectangle(low, high), rectangle((cut[0], low[1]), (high[0], cut[1]))], SketchStyle.shade
-    )
+    pen.area([rectangle(low, high), rectangle((cut[0], low[1]), (high[0], cut[1]))], SHADE_COLOR)
     pen.outline([rectangle(low, high)], 0.2e-3, INK)
-    pen.line(
-        (cut[0], low[1]),
-        (cut[0], high[1]),
-        width=SketchStyle.thick_line,
-        color=SketchStyle.bad,
-        dash=1.5e-3,
-    )
-    pen.line(
-        (low[0], cut[1]),
-        (high[0], cut[1]),
-        width=SketchStyle.thick_line,
-        color=SketchStyle.bad,
-        dash=1.5e-3,
-    )
-    for x, y in ((high[0] - 5e-3, low[1]), (cut[0], low[1] + 5e-3)):
-        end = (x, high[1]) if y == low[1] else (high[0], y)
-        if y == low[1]:
-            pen.line((x, low[1]), (x, cut[1]), width=0.2e-3, color=FAINT, dash=1.2e-3)
-        else:
-            pen.line((cut[0], y), (end[0], y), width=0.2e-3, color=FAINT, dash=1.2e-3)
+    pen.line((cut[0], low[1]), (cut[0], high[1]), width=THICK_LINE, color=BAD_COLOR, dash=1.5e-3)
+    pen.line((low[0], cut[1]), (high[0], cut[1]), width=THICK_LINE, color=BAD_COLOR, dash=1.5e-3)
+    x, y = high[0] - 5e-3, low[1] + 5e-3
+    for start, end in (((x, low[1]), (x, cut[1])), ((cut[0], y), (high[0], y))):
+        pen.line(start, end, width=0.2e-3, color=FAINT, dash=1.2e-3)
     _draw_scissors(pen, (float(high[0]) + 1.5e-3, float(cut[1])))
     pen.text(
         float(cut[0]) + 7e-3,
         float(cut[1]) + 1.6e-3,
         "CUT",
-        SketchStyle.label_size,
+        LABEL_SIZE,
         font=BOLD_FONT,
-        color=SketchStyle.bad,
+        color=BAD_COLOR,
     )
-    pen.text(float(cut[0]) + 7e-3, float(cut[1]) - 8.5e-3, "stays", SketchStyle.label_size)
+    pen.text(float(cut[0]) + 7e-3, float(cut[1]) - 8.5e-3, "stays", LABEL_SIZE)
 
 
 def draw_gluing(pen: Pen, flap: float) -> None:
@@ -138,15 +111,13 @@ def draw_gluing(pen: Pen, flap: float) -> None:
         pen: draws in the box.
         flap: width of the strips [m]; 0 if pages are joined edge to edge.
     """
-    _draw_paper(pen, (8e-3, 4e-3), (38e-3, 23e-3))
+    _draw_box(pen, (8e-3, 4e-3), (38e-3, 23e-3))
     seam = 31e-3 if flap else 38e-3
     if flap:
         for y in np.arange(5e-3, 22.9e-3, 2e-3).tolist():
-            pen.line(
-                (seam + 0.5e-3, y), (37.5e-3, y + 0.8e-3), width=0.25e-3, color=SketchStyle.good
-            )
+            pen.line((seam + 0.5e-3, y), (37.5e-3, y + 0.8e-3), width=0.25e-3, color=GOOD_COLOR)
     start = seam + 8e-3
-    _draw_paper(pen, (start, 6e-3), (start + 30e-3, 25e-3))
+    _draw_box(pen, (start, 6e-3), (start + 30e-3, 25e-3))
     for x, y in ((seam, 13.5e-3), (start, 15.5e-3)):
         pen.circle(x, y, 1.8e-3, INK, 0.25e-3)
         pen.line((x - 2.8e-3, y), (x + 2.8e-3, y), width=0.25e-3)
@@ -154,7 +125,7 @@ def draw_gluing(pen: Pen, flap: float) -> None:
     _draw_sketch_arrow(pen, (start - 1.5e-3, 9.0e-3), (seam + 0.8e-3, 7.0e-3), INK)
     pen.text(19e-3, 12e-3, "1", 16, font=BOLD_FONT, align=0.5)
     pen.text(start + 17e-3, 14e-3, "2", 16, font=BOLD_FONT, align=0.5)
-    pen.text(8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge", SketchStyle.label_size)
+    pen.text(8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge", LABEL_SIZE)
 
 
 def draw_plan(
@@ -168,9 +139,7 @@ def draw_plan(
     for tile in tiling.tiles:
         lower = shift + scale * np.array([xs[tile.column], ys[tile.row + 1]])
         upper = shift + scale * np.array([xs[tile.column + 1], ys[tile.row]])
-        shade = SketchStyle.paper if (tile.row + tile.column) % 2 else WHITE
-        pen.area([rectangle(lower, upper)], shade)
-        pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
+        _draw_box(pen, lower, upper, PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE)
     for drawing in objects:
         loops = [shift + scale * loop for loop in (*drawing.outline, *drawing.raised)]
         pen.outline(loops, 0.3e-3, drawing.outline_color)
@@ -184,16 +153,15 @@ def draw_plan(
 
 def draw_flatness(pen: Pen) -> None:
     """A sheet on a stiff plate, and one that waves."""
-    pen.area([rectangle((2e-3, 8e-3), (36e-3, 12e-3))], SketchStyle.shade)
-    pen.outline([rectangle((2e-3, 8e-3), (36e-3, 12e-3))], 0.2e-3, INK)
+    _draw_box(pen, (2e-3, 8e-3), (36e-3, 12e-3), SHADE_COLOR, 0.2e-3)
     pen.line((2e-3, 12.5e-3), (36e-3, 12.5e-3), width=0.8e-3)
-    pen.text(19e-3, 2.5e-3, "glued to a plate", SketchStyle.label_size, align=0.5)
+    pen.text(19e-3, 2.5e-3, "glued to a plate", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (17e-3, 17e-3), good=True)
     x = np.linspace(44e-3, 78e-3, 60)
     y = 11e-3 + 2.0e-3 * np.sin((x - 44e-3) / 34e-3 * 4 * np.pi)
     pen.line((44e-3, 8e-3), (78e-3, 8e-3), width=0.3e-3, color=FAINT)
     pen.line(*zip(x.tolist(), y.tolist(), strict=True), width=0.8e-3)
-    pen.text(61e-3, 2.5e-3, "waves, curls", SketchStyle.label_size, align=0.5)
+    pen.text(61e-3, 2.5e-3, "waves, curls", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (59e-3, 17e-3), good=False)
 
 
@@ -202,18 +170,17 @@ def draw_lighting(pen: Pen) -> None:
     lamp_color = (0.98, 0.80, 0.30)  # Colour of lamps.
     for left in (2e-3, 44e-3):
         pen.line((left, 6e-3), (left + 34e-3, 6e-3), width=0.6e-3)
-        pen.area([rectangle((left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3))], SketchStyle.shade)
-        pen.outline([rectangle((left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3))], 0.25e-3, INK)
+        _draw_box(pen, (left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3), SHADE_COLOR)
     pen.area([rectangle((6e-3, 23.5e-3), (32e-3, 25.5e-3))], lamp_color)
     for x in (8e-3, 15e-3, 22e-3, 29e-3):
         _draw_sketch_arrow(pen, (x, 22.5e-3), (x, 16e-3), FAINT)
-    pen.text(19e-3, 0.5e-3, "wide, soft light", SketchStyle.label_size, align=0.5)
+    pen.text(19e-3, 0.5e-3, "wide, soft light", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (34.5e-3, 20e-3), good=True)
     lamp = 48e-3, 22e-3
     pen.area([_ellipse_outline(lamp, 2.2e-3)], lamp_color)
     _draw_sketch_arrow(pen, (50e-3, 20.5e-3), (57e-3, 13.5e-3), FAINT)
     pen.area([rectangle((64e-3, 5.2e-3), (73e-3, 6.0e-3))], INK)
-    pen.text(61e-3, 0.5e-3, "lamp, hard shadow", SketchStyle.label_size, align=0.5)
+    pen.text(61e-3, 0.5e-3, "lamp, hard shadow", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (72e-3, 20e-3), good=False)
 
 
@@ -242,71 +209,60 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
         ((1.0, 1.0), (1.0, -1.0), (2.6, -1.6), (2.6, 1.6)),
     ):
         pen.area([np.array([at + 1e-3 * (a * along + b * across) for a, b in shape])], INK)
-    pen.text(58.5e-3, 17e-3, f"{tilt_deg:g}°", SketchStyle.label_size)
-    pen.text(
-        2e-3,
-        18e-3,
-        f"{distances[0]:.1f} to {distances[1]:.1f} m",
-        SketchStyle.label_size,
-        font=BOLD_FONT,
-    )
+    pen.text(58.5e-3, 17e-3, f"{tilt_deg:g}°", LABEL_SIZE)
+    pen.text(2e-3, 18e-3, f"{distances[0]:.1f} to {distances[1]:.1f} m", LABEL_SIZE, font=BOLD_FONT)
 
 
 def draw_placing(pen: Pen) -> None:
     """An object that is set down on its silhouette."""
     sheet = np.array([[8e-3, 3e-3], [62e-3, 3e-3], [72e-3, 14e-3], [18e-3, 14e-3]])
-    pen.area([sheet], SketchStyle.paper)
+    pen.area([sheet], PAPER_COLOR)
     pen.outline([sheet], 0.25e-3, INK)
     shape = _ellipse_outline((40e-3, 8.5e-3), 8e-3, 0.42)
     pen.area([shape], (0.72, 0.82, 0.90))
     pen.outline([shape], 0.3e-3, (0.25, 0.45, 0.60))
     pen.outline([_ellipse_outline((40e-3, 8.5e-3), 6e-3, 0.42)], 0.6e-3, (0.10, 0.28, 0.42))
     base, top = 15.5e-3, 22.5e-3
-    pen.area([rectangle((34e-3, base), (46e-3, top))], SketchStyle.shade)
-    pen.area([_ellipse_outline((40e-3, base), 6e-3, 0.25)], SketchStyle.shade)
+    pen.area([rectangle((34e-3, base), (46e-3, top))], SHADE_COLOR)
+    pen.area([_ellipse_outline((40e-3, base), 6e-3, 0.25)], SHADE_COLOR)
     pen.area([_ellipse_outline((40e-3, top), 6e-3, 0.25)], WHITE)
     pen.outline([_ellipse_outline((40e-3, top), 6e-3, 0.25)], 0.25e-3, INK)
     pen.line((34e-3, top), (34e-3, base), width=0.25e-3)
     pen.line((46e-3, top), (46e-3, base), width=0.25e-3)
-    _draw_sketch_arrow(pen, (52e-3, 21e-3), (52e-3, 12e-3), SketchStyle.good)
+    _draw_sketch_arrow(pen, (52e-3, 21e-3), (52e-3, 12e-3), GOOD_COLOR)
 
 
-def _draw_paper(pen: Pen, lower: Spot, upper: Spot) -> None:
-    pen.area([rectangle(lower, upper)], SketchStyle.paper)
-    pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
+def _draw_box(
+    pen: Pen,
+    lower: Spot | Array,
+    upper: Spot | Array,
+    color: Rgb = PAPER_COLOR,
+    line_width: float = 0.25e-3,
+) -> None:
+    pen.area([rectangle(lower, upper)], color)
+    pen.outline([rectangle(lower, upper)], line_width, INK)
 
 
 def _draw_tick_or_cross(pen: Pen, at: Spot, *, good: bool) -> None:
     """A tick or a cross, 5 mm wide, with its lower left corner at a point."""
     x, y = at
     if good:
-        pen.line(
-            (x, y + 2e-3), (x + 1.6e-3, y), (x + 5e-3, y + 5e-3), width=1e-3, color=SketchStyle.good
-        )
+        pen.line((x, y + 2e-3), (x + 1.6e-3, y), (x + 5e-3, y + 5e-3), width=1e-3, color=GOOD_COLOR)
     else:
-        pen.line((x, y), (x + 4.5e-3, y + 4.5e-3), width=1e-3, color=SketchStyle.bad)
-        pen.line((x, y + 4.5e-3), (x + 4.5e-3, y), width=1e-3, color=SketchStyle.bad)
+        pen.line((x, y), (x + 4.5e-3, y + 4.5e-3), width=1e-3, color=BAD_COLOR)
+        pen.line((x, y + 4.5e-3), (x + 4.5e-3, y), width=1e-3, color=BAD_COLOR)
 
 
 def _draw_sketch_arrow(pen: Pen, start: Spot, tip: Spot, color: Rgb) -> None:
-    begin, end = np.array(start), np.array(tip)
-    along = (end - begin) / np.linalg.norm(end - begin)
-    across = np.array([-along[1], along[0]])
-    neck = end - 2.2e-3 * along
-    pen.line(start, (float(neck[0]), float(neck[1])), width=SketchStyle.thick_line, color=color)
-    pen.area([np.array([end, neck + 1.1e-3 * across, neck - 1.1e-3 * across])], color)
+    draw_arrow(pen, start, tip, color, head=2.2e-3, width=THICK_LINE)
 
 
 def _draw_scissors(pen: Pen, at: Spot) -> None:
     """Open scissors whose blades meet left of a point."""
     x, y = at
     for side in (1.0, -1.0):
-        pen.line(
-            (x - 4e-3, y + side * 1.2e-3),
-            (x + 5e-3, y - side * 1.6e-3),
-            width=SketchStyle.thick_line,
-        )
-        pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, INK, SketchStyle.thick_line)
+        pen.line((x - 4e-3, y + side * 1.2e-3), (x + 5e-3, y - side * 1.6e-3), width=THICK_LINE)
+        pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, INK, THICK_LINE)
 
 
 def _ellipse_outline(middle: Spot, radius: float, flat: float = 1.0) -> Array:
@@ -322,7 +278,7 @@ class GuideStep:
     Attributes:
         heading: what, in a word or two.
         words: paragraphs.
-        draw: its sketch, in a box of `sketches.BOX`; None without.
+        draw: its sketch, in a box of `SKETCH_SIZE`; None without.
         height: of the sketch [m].
     """
 
@@ -330,6 +286,33 @@ class GuideStep:
     words: tuple[str, ...]
     draw: Callable[[Pen], None] | None = None
     height: float = SKETCH_SIZE[1]
+
+
+FLATTEN_STEP = GuideStep(
+    "Keep it flat",
+    (
+        "Glue the sheet, all over, onto a flat, stiff plate of wood, foam or aluminium. A sheet"
+        " that waves moves the pose that a camera finds.",
+    ),
+    draw_flatness,
+)
+LIGHTING_STEP = GuideStep(
+    "Light",
+    (
+        "Soft, even light. No lamp or sun whose shadows have hard edges or that shines back from"
+        " the paper; white paper must not be overexposed.",
+    ),
+    draw_lighting,
+)
+PLACING_STEP = GuideStep(
+    "Place the objects",
+    (
+        "Each object on its silhouette. The thick line is where it touches the sheet, the thin one"
+        " its outline from above; darker is closer to the sheet. Begin at the far edge. Then let a"
+        " camera check: burg-drake ar, or burg-drake camera placement.",
+    ),
+    draw_placing,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -361,8 +344,8 @@ def guide_steps(facts: BoardFacts) -> list[GuideStep]:
     steps = [_print_step(facts), _measure_step(facts)]
     if len(facts.tiling.tiles) > 1:
         steps += _assembly_steps(facts)
-    steps += [_flatten_step(), _lighting_step(), _camera_step(facts)]
-    return [*steps, *([_placing_step()] if facts.objects else [])]
+    steps += [FLATTEN_STEP, LIGHTING_STEP, _camera_step(facts)]
+    return [*steps, PLACING_STEP] if facts.objects else steps
 
 
 def _print_step(facts: BoardFacts) -> GuideStep:
@@ -419,22 +402,6 @@ def _assembly_steps(facts: BoardFacts) -> list[GuideStep]:
     return [plan, cut, glue]
 
 
-def _flatten_step() -> GuideStep:
-    words = (
-        "Glue the sheet, all over, onto a flat, stiff plate of wood, foam or aluminium. A sheet"
-        " that waves moves the pose that a camera finds."
-    )
-    return GuideStep("Keep it flat", (words,), draw_flatness)
-
-
-def _lighting_step() -> GuideStep:
-    words = (
-        "Soft, even light. No lamp or sun whose shadows have hard edges or that shines back from"
-        " the paper; white paper must not be overexposed."
-    )
-    return GuideStep("Light", (words,), draw_lighting)
-
-
 def _camera_step(facts: BoardFacts) -> GuideStep:
     min_distance = 11.0  # Distance of the camera in sides of a marker: 0.5 m for 45 mm.
     max_distance = 22.0  # Distance of the camera in sides of a marker: 1 m for 45 mm.
@@ -449,22 +416,10 @@ def _camera_step(facts: BoardFacts) -> GuideStep:
     return GuideStep("Camera", (words,), sketch)
 
 
-def _placing_step() -> GuideStep:
-    words = (
-        "Each object on its silhouette. The thick line is where it touches the sheet, the thin one"
-        " its outline from above; darker is closer to the sheet. Begin at the far edge. Then let a"
-        " camera check: burg-drake ar, or burg-drake camera placement."
-    )
-    return GuideStep("Place the objects", (words,), draw_placing)
-
-
-class GuideLayout:
-    """Guide layout."""
-
-    heading_size = 12.5  # Points, on A4.
-    body_size = 10.0  # Points, on A4.
-    line_spacing = 1.2  # Distance of lines over the size of the text.
-    edge_gap = 5e-3  # Metres between the text and the page's margin.
+HEADING_SIZE = 12.5  # Points, on A4.
+BODY_SIZE = 10.0  # Points, on A4.
+LINE_SPACING = 1.2  # Distance of lines over the size of the text.
+EDGE_GAP = 5e-3  # Metres between the text and the page's margin.
 
 
 @dataclass(frozen=True)
@@ -522,7 +477,7 @@ def draw_guide(pen: Pen, paper: Paper, guide: Guide, *, scale_page: tuple[float,
         (scales[-1], lay_out_steps(guide, paper, scales[-1])),
     )
     pages = places[-1].page + 1
-    edge = paper.margin + GuideLayout.edge_gap
+    edge = paper.margin + EDGE_GAP
     for page in range(pages):
         canvas = pen.canvas
         canvas.scale(*scale_page)
@@ -552,7 +507,7 @@ def lay_out_steps(guide: Guide, paper: Paper, scale: float) -> list[StepPlace]:
     min_column_width = SKETCH_SIZE[0] + 1e-3  # Metres.
     step_gap = 3.5e-3  # Metres.
     header_height = 17e-3  # Metres, of title and subtitle.
-    edge = paper.margin + GuideLayout.edge_gap
+    edge = paper.margin + EDGE_GAP
     width, height = (paper.width - 2 * edge) / scale, (paper.height - 2 * edge) / scale
     columns = int((width + column_gap) / (min_column_width + column_gap))
     if columns < 1:
@@ -575,15 +530,10 @@ def step_height(step: GuideStep, width: float) -> float:
     """What a step takes of a column [m]."""
     lines = sum(len(wrap_text(words, width)) for words in step.words)
     sketch = step.height + 2e-3 if step.draw else 0.0
-    return (
-        GuideLayout.line_spacing
-        * POINT
-        * (GuideLayout.heading_size + 2.0 + lines * GuideLayout.body_size)
-        + sketch
-    )
+    return LINE_SPACING * POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE) + sketch
 
 
-def wrap_text(words: str, width: float, size: float = GuideLayout.body_size) -> list[str]:
+def wrap_text(words: str, width: float, size: float = BODY_SIZE) -> list[str]:
     """Lines of text that are no longer than a width [m], where its words allow that."""
     lines, line = [], ""
     for word in words.split():
@@ -598,18 +548,16 @@ def wrap_text(words: str, width: float, size: float = GuideLayout.body_size) -> 
 def _draw_header(pen: Pen, guide: Guide, top: float, right: float) -> None:
     title_size = 20.0  # Points.
     pen.text(0.0, top - title_size * POINT, guide.title, title_size, font=BOLD_FONT)
-    size = GuideLayout.body_size * min(
-        1.0, right / max(text_width(guide.subtitle, GuideLayout.body_size), 1e-9)
-    )
+    size = BODY_SIZE * min(1.0, right / max(text_width(guide.subtitle, BODY_SIZE), 1e-9))
     pen.text(0.0, top - 13e-3, guide.subtitle, max(size, 10.0))
     pen.line((0.0, top - 15e-3), (right, top - 15e-3), width=0.2e-3, color=FAINT)
 
 
 def _draw_step(pen: Pen, place: StepPlace) -> None:
-    y = place.top - GuideLayout.heading_size * POINT
+    y = place.top - HEADING_SIZE * POINT
     heading = f"{place.number}  {place.step.heading}"
-    pen.text(place.left, y, heading, GuideLayout.heading_size, font=BOLD_FONT, color=INK)
-    y -= 2.0 * GuideLayout.line_spacing * POINT
+    pen.text(place.left, y, heading, HEADING_SIZE, font=BOLD_FONT, color=INK)
+    y -= 2.0 * LINE_SPACING * POINT
     if place.step.draw:
         y -= place.step.height + 1e-3
         pen.canvas.saveState()
@@ -619,7 +567,5 @@ def _draw_step(pen: Pen, place: StepPlace) -> None:
         y -= 1e-3
     for paragraph in place.step.words:
         for line in wrap_text(paragraph, place.width):
-            y -= GuideLayout.line_spacing * GuideLayout.body_size * POINT
-            pen.text(
-                place.left, y + 0.25 * GuideLayout.body_size * POINT, line, GuideLayout.body_size
-            )
+            y -= LINE_SPACING * BODY_SIZE * POINT
+            pen.text(place.left, y + 0.25 * BODY_SIZE * POINT, line, BODY_SIZE)

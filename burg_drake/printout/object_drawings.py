@@ -36,11 +36,6 @@ FIXED_HUE = (0.35, 0.35, 0.35)
 """Hue of fixed objects."""
 
 
-def object_hue(index: int) -> Rgb:
-    """Hue of the free object with this number."""
-    return HUES[index % len(HUES)]
-
-
 def luma_at(height: ArrayLike) -> Array:
     """Luma at heights [m] above the sheet: dark on it, and steepest there, as a person sees best
     what is near to the paper."""
@@ -154,21 +149,15 @@ def lowest_surface(grid: SheetGrid, p_SV: Array, faces: NDArray[np.int64]) -> Sh
 
 def visible_layers(layers: list[SheetLayer]) -> list[SheetLayer]:
     """The layers, each without what lies above another one."""
-    return [_without_hidden(layer, [o for o in layers if o is not layer]) for layer in layers]
-
-
-def pixels_above(layer: SheetLayer, other: SheetLayer) -> int:
-    """Pixels in which a layer lies above another one."""
-    mine, its = _shared_windows(layer, other)
-    return int((other.height[its] < layer.height[mine]).sum())
-
-
-def _without_hidden(layer: SheetLayer, others: list[SheetLayer]) -> SheetLayer:
-    height = layer.height.copy()
-    for other in others:
-        mine, its = _shared_windows(layer, other)
-        height[mine][other.height[its] < layer.height[mine]] = np.inf
-    return dataclasses.replace(layer, height=height)
+    shown = []
+    for layer in layers:
+        height = layer.height.copy()
+        for other in layers:
+            if other is not layer:
+                mine, its = _shared_windows(layer, other)
+                height[mine][other.height[its] < layer.height[mine]] = np.inf
+        shown.append(dataclasses.replace(layer, height=height))
+    return shown
 
 
 def _shared_windows(
@@ -320,7 +309,7 @@ def projected_layers(scene: Scene, grid: SheetGrid) -> dict[str, SheetLayer]:
 def instance_hue(scene: Scene, name: str) -> Rgb:
     """Hue of an instance; all fixed ones share one."""
     free = list(scene.instances)
-    return object_hue(free.index(name)) if name in scene.instances else FIXED_HUE
+    return HUES[free.index(name) % len(HUES)] if name in scene.instances else FIXED_HUE
 
 
 def mask_outlines(
@@ -498,8 +487,12 @@ def _draw_object(
 
 def _supporting_object(name: str, layers: dict[str, SheetLayer]) -> str:
     """The object above which most of another lies."""
-    others = [other for other in layers if other != name]
-    return max(others, key=lambda other: pixels_above(layers[name], layers[other]))
+
+    def pixels_below(other: str) -> int:
+        mine, its = _shared_windows(layers[name], layers[other])
+        return int((layers[other].height[its] < layers[name].height[mine]).sum())
+
+    return max((other for other in layers if other != name), key=pixels_below)
 
 
 def _tint_rgb(hue: Rgb, luma: float) -> Rgb:

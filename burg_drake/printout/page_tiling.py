@@ -83,14 +83,15 @@ def paper_size(name: str) -> tuple[str, float, float]:
     own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", name.lower())
     if not own:
         raise UnknownNameError(
-            f"page {name!r} does not exist; {suggest_names(name, PAPERS)}; or give WxH in mm, such as"
-            " 700x500"
+            f"page {name!r} does not exist; {suggest_names(name, PAPERS)}; or give WxH in mm,"
+            " such as 700x500"
         )
     short, long = sorted(float(text) * 1e-3 for text in own.groups())
     if short < MIN_PAGE_HEIGHT or long < MIN_PAGE_WIDTH or long > max_length:
         raise InvalidInputError(
-            f"page {name!r} must be at least {1e3 * MIN_PAGE_WIDTH:g} x {1e3 * MIN_PAGE_HEIGHT:g} mm,"
-            f" for rulers and text, and at most {1e3 * max_length:g} mm long, the limit of PDF"
+            f"page {name!r} must be at least {1e3 * MIN_PAGE_WIDTH:g} x"
+            f" {1e3 * MIN_PAGE_HEIGHT:g} mm, for rulers and text, and at most"
+            f" {1e3 * max_length:g} mm long, the limit of PDF"
         )
     return f"{1e3 * long:g} x {1e3 * short:g} mm", short, long
 
@@ -285,7 +286,7 @@ def cut_axis(
 
     Args:
         span: first and last coordinate that have to be on paper [m].
-        bars: columns of markers, in order; cuts stay `CLEAR` of them, or midway in narrow gaps.
+        bars: columns of markers, in order; cuts stay 10 mm clear of them, or midway in narrow gaps.
         room: what a page holds [m].
         flap: what a page shows beyond a cut that follows [m].
 

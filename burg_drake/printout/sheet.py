@@ -151,6 +151,24 @@ def rectangle(lower: Sequence[float] | Array, upper: Sequence[float] | Array) ->
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
+def draw_arrow(
+    pen: Pen,
+    start: tuple[float, float],
+    tip: tuple[float, float],
+    color: Rgb,
+    *,
+    head: float,
+    width: float,
+) -> None:
+    """Draws a straight arrow whose head is `head` long and wide [m]."""
+    begin, end = np.array(start), np.array(tip)
+    along = (end - begin) / np.linalg.norm(end - begin)
+    across = np.array([-along[1], along[0]])
+    neck = end - head * along
+    pen.line(start, (neck[0], neck[1]), width=width, color=color)
+    pen.area([np.array([end, neck + head / 2 * across, neck - head / 2 * across])], color)
+
+
 EDGE_LABEL_SIZE = 6.5  # Points.
 EDGE_LABEL_HEIGHT = 0.72 * EDGE_LABEL_SIZE * POINT
 """Metres, of a capital letter."""
@@ -294,7 +312,7 @@ class FreeSpace:
             within: (H, W) cells that it may stand on; all if None.
 
         Returns:
-            (2,) its lower left corner [m]; None if there is no room within `REACH`.
+            (2,) its lower left corner [m]; None if there is no room within 5 cm.
         """
         max_distance = 0.05  # Metres between a label and its object.
         columns, rows = (max(1, int(np.ceil(e / LABEL_CELL_SIZE))) for e in extent)
@@ -344,6 +362,8 @@ def _mask_window(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
 
 NAME_SIZE = 8.5
 """Points."""
+NAME_CLEARANCE = 1e-3
+"""Metres between a name and objects."""
 OUT_OF_BOUNDS_COLOR: Rgb = (0.80, 0.10, 0.10)
 """Colour of arrows and names of objects out of bounds."""
 ALIGNMENT_MARK_RADIUS = 2e-3
@@ -409,45 +429,29 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     Returns:
         The sheet with names, and those words for which there was no room, quoted, with the page.
     """
-    name_clearance = 1e-3  # Metres between a name and objects.
     min_area = 0.5e-4  # Square metres of an object on a page that repeats its name.
-    space, masks = FreeSpace(sheet.size), {}
-    first, last = tiling.tiles[0], tiling.tiles[-1]
-    on_paper = (first.lower[0], last.lower[1]), (last.upper[0], first.upper[1])
-    inner = np.array([[0.0, 0.0], sheet.size]) + 2 * name_clearance * np.array([[1.0], [-1.0]])
-    space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
-    space.take((0.0, 0.0), (ORIGIN_CORNER_SIZE, ORIGIN_CORNER_SIZE))
-    clear = max(name_clearance, frame_width(sheet.layout))
-    for corners in sheet.layout.p_SQ[:, :, :2]:
-        space.take(corners.min(axis=0), corners.max(axis=0), clear)
-    for x in tiling.x_cuts:
-        space.take((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), name_clearance)
-    for y in tiling.y_cuts:
-        space.take((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), name_clearance)
-    for mark in sheet.marks:
-        space.take(mark, mark, ALIGNMENT_MARK_RADIUS + name_clearance)
-    for drawing in sheet.drawings:
-        masks[drawing.name] = space.take_layer(drawing.layer, name_clearance)
+    space = _space_for_names(sheet, tiling)
+    masks = {d.name: space.take_layer(d.layer, NAME_CLEARANCE) for d in sheet.drawings}
     beyond = {arrow.name for arrow in sheet.arrows}
     wanted = [
         (d.words, d.footprint_color, masks[d.name]) for d in sheet.drawings if d.name not in beyond
     ]
     for arrow in sheet.arrows:
         box = np.sort(np.array([arrow.start, arrow.tip]), axis=0)
-        space.take(box[0], box[1], 2 * name_clearance)
+        space.take(box[0], box[1], 2 * NAME_CLEARANCE)
         wanted.append(
             (arrow.words, OUT_OF_BOUNDS_COLOR, masks.get(arrow.name, space.cell(arrow.start)))
         )
     names: list[ObjectName] = []
     homeless: list[str] = []
     for words, color, beside in wanted:
-        extent = text_width(words, NAME_SIZE, BOLD_FONT) + 2 * name_clearance, NAME_SIZE * POINT
+        extent = text_width(words, NAME_SIZE, BOLD_FONT) + 2 * NAME_CLEARANCE, NAME_SIZE * POINT
         corner = space.place(extent, beside)
         if corner is None:
             homeless.append(repr(words))
             continue
         # a line's letters reach a fifth of its height below the baseline
-        shift = np.array([name_clearance, 0.22 * extent[1]])
+        shift = np.array([NAME_CLEARANCE, 0.22 * extent[1]])
         corners = [corner]
         for tile in tiling.tiles if len(tiling.tiles) > 1 else ():
             page = space.within(*tile.core)
@@ -465,6 +469,26 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     return dataclasses.replace(sheet, names=tuple(names)), homeless
 
 
+def _space_for_names(sheet: Sheet, tiling: Tiling) -> FreeSpace:
+    """The sheet without margins, markers, cuts, alignment marks and the corner of the origin."""
+    space = FreeSpace(sheet.size)
+    first, last = tiling.tiles[0], tiling.tiles[-1]
+    on_paper = (first.lower[0], last.lower[1]), (last.upper[0], first.upper[1])
+    inner = np.array([[0.0, 0.0], sheet.size]) + 2 * NAME_CLEARANCE * np.array([[1.0], [-1.0]])
+    space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
+    space.take((0.0, 0.0), (ORIGIN_CORNER_SIZE, ORIGIN_CORNER_SIZE))
+    clear = max(NAME_CLEARANCE, frame_width(sheet.layout))
+    for corners in sheet.layout.p_SQ[:, :, :2]:
+        space.take(corners.min(axis=0), corners.max(axis=0), clear)
+    for x in tiling.x_cuts:
+        space.take((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), NAME_CLEARANCE)
+    for y in tiling.y_cuts:
+        space.take((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), NAME_CLEARANCE)
+    for mark in sheet.marks:
+        space.take(mark, mark, ALIGNMENT_MARK_RADIUS + NAME_CLEARANCE)
+    return space
+
+
 def _grid_cell(space: FreeSpace, point: Array) -> tuple[int, int]:
     """Row and column of the cell at a point."""
     column, row = np.rint(space.grid.pixels(point + LABEL_CELL_SIZE)).astype(int)
@@ -476,7 +500,7 @@ def draw_sheet(pen: Pen, sheet: Sheet) -> None:
     for drawing in sheet.drawings:
         _draw_tints(pen, drawing)
     for arrow in sheet.arrows:
-        _draw_arrow(pen, arrow)
+        draw_arrow(pen, arrow.start, arrow.tip, OUT_OF_BOUNDS_COLOR, head=4e-3, width=0.8e-3)
     _draw_markers(pen, sheet.layout)
     _draw_outlines(pen, sheet)
     for x, y in sheet.marks.tolist():
@@ -501,15 +525,6 @@ def _draw_tints(pen: Pen, drawing: ObjectDrawing) -> None:
         for x in np.arange(lower[0] - high, upper[0], hatch_spacing).tolist():
             pen.line((x, lower[1]), (x + high, upper[1]), width=0.6e-3, color=WHITE)
         pen.canvas.restoreState()
-
-
-def _draw_arrow(pen: Pen, arrow: OutOfBoundsArrow) -> None:
-    start, tip = np.array(arrow.start), np.array(arrow.tip)
-    along = (tip - start) / np.linalg.norm(tip - start)
-    across = np.array([-along[1], along[0]])
-    neck = tip - 4e-3 * along
-    pen.line(arrow.start, (neck[0], neck[1]), width=0.8e-3, color=OUT_OF_BOUNDS_COLOR)
-    pen.area([np.array([tip, neck + 2e-3 * across, neck - 2e-3 * across])], OUT_OF_BOUNDS_COLOR)
 
 
 def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:

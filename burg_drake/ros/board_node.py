@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from burg_drake.cameras import BoardEstimate, BoardPose, Intrinsics, Overlay, draw_notice
-from burg_drake.core import InvalidInputError
+from burg_drake.core import Bytes, InvalidInputError
 from burg_drake.ros.camera_messages import decode_image_message, intrinsics_from_camera_info
 from burg_drake.scene import Scene
 
@@ -30,7 +27,7 @@ class Sighting:
     stamp: Any
     camera_frame: str
     estimate: BoardEstimate
-    image: NDArray[np.uint8] | None = None
+    image: Bytes | None = None
     intrinsics: Intrinsics | None = None
 
     @property
@@ -100,7 +97,7 @@ class BoardNode:
             intrinsics=intrinsics,
         )
 
-    def draw(self, sighting: Sighting) -> NDArray[np.uint8] | None:
+    def draw(self, sighting: Sighting) -> Bytes | None:
         """(H, W, 3) RGB with the scene's objects in it, or with a line that says why there are
         none; None if there is no image."""
         image, intrinsics = sighting.image, sighting.intrinsics
@@ -112,14 +109,12 @@ class BoardNode:
             self._overlay = Overlay(self._scene, intrinsics)
         return self._overlay.draw(image, sighting.estimate.X_SC)
 
-    def _intrinsics(self, camera_info: Any | None, image: NDArray[np.uint8]) -> Intrinsics:
+    def _intrinsics(self, camera_info: Any | None, image: Bytes) -> Intrinsics:
         if self._given is not None:
             found, source = self._given, "intrinsics are of"
         elif camera_info is not None:
-            found, source = (
-                intrinsics_from_camera_info(camera_info, rectified=self._rectified),
-                "camera_info says",
-            )
+            found = intrinsics_from_camera_info(camera_info, rectified=self._rectified)
+            source = "camera_info says"
         else:
             raise InvalidInputError(
                 "no camera_info message has arrived yet; if the camera publishes none, give its"

@@ -8,7 +8,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras import (
     ROS_FISHEYE_MODEL,
@@ -17,12 +16,12 @@ from burg_drake.cameras import (
     decode_image,
     is_ros_fisheye,
 )
-from burg_drake.core import InvalidInputError, list_names
+from burg_drake.core import Bytes, InvalidInputError, list_names
 from burg_drake.station import HALF_PIXEL
 
 
 @dataclass(frozen=True)
-class Encoding:
+class PixelEncoding:
     """How an encoding lays out a pixel.
 
     Attributes:
@@ -37,28 +36,28 @@ class Encoding:
 
 
 IMAGE_ENCODINGS = {
-    "rgb8": Encoding(3, ""),
-    "bgr8": Encoding(3, "BGR2RGB"),
-    "8UC3": Encoding(3, "BGR2RGB"),
-    "rgba8": Encoding(4, "RGBA2RGB"),
-    "bgra8": Encoding(4, "BGRA2RGB"),
-    "8UC4": Encoding(4, "BGRA2RGB"),
-    "mono8": Encoding(1, "GRAY2RGB"),
-    "8UC1": Encoding(1, "GRAY2RGB"),
-    "mono16": Encoding(1, "GRAY2RGB", "u2"),
-    "bayer_rggb8": Encoding(1, "BayerRGGB2RGB"),
-    "bayer_bggr8": Encoding(1, "BayerBGGR2RGB"),
-    "bayer_gbrg8": Encoding(1, "BayerGBRG2RGB"),
-    "bayer_grbg8": Encoding(1, "BayerGRBG2RGB"),
-    "yuv422": Encoding(2, "YUV2RGB_UYVY"),
-    "uyvy": Encoding(2, "YUV2RGB_UYVY"),
-    "yuv422_yuy2": Encoding(2, "YUV2RGB_YUYV"),
-    "yuyv": Encoding(2, "YUV2RGB_YUYV"),
+    "rgb8": PixelEncoding(3, ""),
+    "bgr8": PixelEncoding(3, "BGR2RGB"),
+    "8UC3": PixelEncoding(3, "BGR2RGB"),
+    "rgba8": PixelEncoding(4, "RGBA2RGB"),
+    "bgra8": PixelEncoding(4, "BGRA2RGB"),
+    "8UC4": PixelEncoding(4, "BGRA2RGB"),
+    "mono8": PixelEncoding(1, "GRAY2RGB"),
+    "8UC1": PixelEncoding(1, "GRAY2RGB"),
+    "mono16": PixelEncoding(1, "GRAY2RGB", "u2"),
+    "bayer_rggb8": PixelEncoding(1, "BayerRGGB2RGB"),
+    "bayer_bggr8": PixelEncoding(1, "BayerBGGR2RGB"),
+    "bayer_gbrg8": PixelEncoding(1, "BayerGBRG2RGB"),
+    "bayer_grbg8": PixelEncoding(1, "BayerGRBG2RGB"),
+    "yuv422": PixelEncoding(2, "YUV2RGB_UYVY"),
+    "uyvy": PixelEncoding(2, "YUV2RGB_UYVY"),
+    "yuv422_yuy2": PixelEncoding(2, "YUV2RGB_YUYV"),
+    "yuyv": PixelEncoding(2, "YUV2RGB_YUYV"),
 }
 """Encodings of `sensor_msgs/image_encodings.h`; OpenCV types such as 8UC3 hold BGR."""
 
 
-def decode_image_message(message: Any) -> NDArray[np.uint8]:
+def decode_image_message(message: Any) -> Bytes:
     """Image of a message.
 
     Args:
@@ -73,7 +72,7 @@ def decode_image_message(message: Any) -> NDArray[np.uint8]:
     return _decode_raw(message) if hasattr(message, "encoding") else _decode_compressed(message)
 
 
-def _decode_raw(message: Any) -> NDArray[np.uint8]:
+def _decode_raw(message: Any) -> Bytes:
     encoding = IMAGE_ENCODINGS.get(message.encoding)
     if encoding is None:
         raise InvalidInputError(
@@ -104,7 +103,7 @@ def _decode_raw(message: Any) -> NDArray[np.uint8]:
         ) from error
 
 
-def _decode_compressed(message: Any) -> NDArray[np.uint8]:
+def _decode_compressed(message: Any) -> Bytes:
     if "compressedDepth" in message.format:
         raise InvalidInputError("the topic publishes depth images; give a topic of colour images")
     data = bytes(message.data)
@@ -116,7 +115,7 @@ def _decode_compressed(message: Any) -> NDArray[np.uint8]:
     return image
 
 
-def jpeg_bytes(image: NDArray[np.uint8]) -> bytes:
+def jpeg_bytes(image: Bytes) -> bytes:
     """An (H, W, 3) RGB image as JPEG."""
     _, octets = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     return bytes(octets.tobytes())
@@ -178,8 +177,8 @@ def _read_distortion(message: Any) -> tuple[float, ...]:
     if message.distortion_model not in ROS_LENS_MODELS:
         raise InvalidInputError(
             f"camera_info has the distortion model {message.distortion_model!r}; supported are"
-            f" plumb_bob, rational_polynomial and {ROS_FISHEYE_MODEL}: rectify the images (image_proc)"
-            " and start the node for rectified ones"
+            f" plumb_bob, rational_polynomial and {ROS_FISHEYE_MODEL}: rectify the images"
+            " (image_proc) and start the node for rectified ones"
         ).about("rectified")
     return coefficients
 

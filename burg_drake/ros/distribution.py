@@ -43,11 +43,9 @@ def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.
         MissingDependencyError: it cannot be imported; says why, and what to install.
     """
     version_variable = environment.get("ROS_VERSION", "")
-    order = (
-        [wanted]
-        if wanted
-        else sorted(CLIENT_LIBRARIES, key=lambda version: str(version) != version_variable)
-    )
+    order = sorted(CLIENT_LIBRARIES, key=lambda version: str(version) != version_variable)
+    if wanted:
+        order = [wanted]
     failures = []
     for version in order:
         failure = _try_import(CLIENT_LIBRARIES[version])
@@ -64,13 +62,9 @@ def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) ->
         MissingDependencyError: message packages are not installed.
     """
     try:
-        if version == 1:
-            from burg_drake.ros.node_implementations import Ros1Node
+        from burg_drake.ros.node_implementations import Ros1Node, Ros2Node
 
-            return Ros1Node(names, with_camera_info=with_camera_info)
-        from burg_drake.ros.node_implementations import Ros2Node
-
-        return Ros2Node(names, with_camera_info=with_camera_info)
+        return (Ros1Node if version == 1 else Ros2Node)(names, with_camera_info=with_camera_info)
     except MissingDependencyError:
         raise
     except ImportError as error:
@@ -87,12 +81,10 @@ def _try_import(name: str) -> str | None:
     if not SYSTEM_PACKAGES.is_dir() or str(SYSTEM_PACKAGES) in sys.path:
         return failure
     sys.path.append(str(SYSTEM_PACKAGES))
-    try:
-        importlib.import_module(name)
-        return None
-    except ImportError as error:
+    second_failure = _try_import(name)
+    if second_failure is not None:
         sys.path.remove(str(SYSTEM_PACKAGES))
-        return str(error)
+    return second_failure
 
 
 def _installation_hint(versions: Sequence[int]) -> str:

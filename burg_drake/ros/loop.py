@@ -10,7 +10,7 @@ from burg_drake.ros.ros_node import RosNode
 
 
 class StatusLogIntervals:
-    """Status log intervals."""
+    """How often the log says what is going on, in seconds; see `StatusLog`."""
 
     no_image = 5.0  # Seconds without images until a hint is logged.
     no_pose = 0.5  # Seconds without a pose until the reason is logged.
@@ -58,7 +58,7 @@ class StatusLog:
         self._reported, self._reported_at = reason, now
         return sighting.status, True
 
-    def record_silence(self, publishers: Mapping[str, int], now: float) -> str | None:
+    def record_no_image(self, publishers: Mapping[str, int], now: float) -> str | None:
         """Without an image: a warning, once."""
         if self._hinted or now - self._last_image < StatusLogIntervals.no_image:
             return None
@@ -71,8 +71,8 @@ class StatusLog:
     def rate(self, now: float, *, last: bool = False) -> str | None:
         """Images answered a second, and how many of them with a pose.
 
-        None while the time since the last such line is less than RATE_EVERY, unless this is the
-        last one; and without images.
+        None without images, and while the time since the last such line is less than
+        `StatusLogIntervals.rate`, unless this is the last one.
         """
         elapsed = now - self._since
         if not self._images or elapsed <= 0.0 or not (last or elapsed >= StatusLogIntervals.rate):
@@ -90,27 +90,22 @@ def run_node(link: RosNode, node: BoardNode) -> None:
     replace each other: the latest is next."""
     account = StatusLog(time.monotonic())
     try:
-        _process_next_image(link, node, account)
+        while link.running():
+            image = link.next_image(0.5)  # Seconds; Ctrl-C may have to wait as long.
+            if image is None:
+                hint = account.record_no_image(link.publishers(), time.monotonic())
+                if hint:
+                    link.log(hint, warning=True)
+                continue
+            sighting = node.locate(image, link.camera_info)
+            link.publications.publish(sighting, node.draw)
+            news = account.record_image(sighting, time.monotonic())
+            if news:
+                link.log(news[0], warning=news[1])
+            rate = account.rate(time.monotonic())
+            if rate:
+                link.log(rate)
     finally:
         rate = account.rate(time.monotonic(), last=True)
-        if rate:
-            link.log(rate)
-
-
-def _process_next_image(link: RosNode, node: BoardNode, account: StatusLog) -> None:
-    image_timeout = 0.5  # Seconds to wait for an image; Ctrl-C may have to wait as long.
-    while link.running():
-        image = link.next_image(image_timeout)
-        if image is None:
-            hint = account.record_silence(link.publishers(), time.monotonic())
-            if hint:
-                link.log(hint, warning=True)
-            continue
-        sighting = node.locate(image, link.camera_info)
-        link.publications.publish(sighting, node.draw)
-        news = account.record_image(sighting, time.monotonic())
-        if news:
-            link.log(news[0], warning=news[1])
-        rate = account.rate(time.monotonic())
         if rate:
             link.log(rate)

@@ -14,13 +14,8 @@ from typing import Any
 from burg_drake.core import InvalidInputError
 from burg_drake.ros.ros_node import NodeNames, Publications, RosNode, message_classes
 
-
-class RosMaster:
-    """Ros master."""
-
-    variable = "ROS_MASTER_URI"  # Environment variable with the address of the ROS master.
-    default_uri = "http://localhost:11311"  # Address of the ROS master if the variable is not set.
-    timeout = 3.0  # Seconds for the master to answer; rospy itself would retry forever.
+MASTER_VARIABLE = "ROS_MASTER_URI"  # Environment variable with the address of the ROS master.
+MASTER_TIMEOUT = 3.0  # Seconds for the master to answer; rospy itself would retry forever.
 
 
 class Ros1Node(RosNode):
@@ -36,12 +31,11 @@ class Ros1Node(RosNode):
             InvalidInputError: no master answers.
             ImportError: rospy or a message package is not installed.
         """
-        # Bytes per read. With rospy's 65536, images pile up in the socket and arrive late.
-        buffer_size = 1 << 25
         import rospy
 
         classes = message_classes(bytes)
-        require_master(os.environ.get(RosMaster.variable, RosMaster.default_uri))
+        # Address of the ROS master if the variable is not set.
+        require_master(os.environ.get(MASTER_VARIABLE, "http://localhost:11311"))
         self._rospy = rospy
         rospy.init_node(names.node, argv=["burg-drake"], disable_signals=True)
         self._news = threading.Condition()
@@ -54,28 +48,29 @@ class Ros1Node(RosNode):
             ),
             lambda publisher: int(publisher.get_num_connections()),
         )
+        # Bytes per read. With rospy's 65536, images pile up in the socket and arrive late.
         self._topics = {
             names.image: rospy.Subscriber(
                 names.image,
                 classes.CompressedImage if names.compressed else classes.Image,
-                self._take_image,
+                self._store_image,
                 queue_size=1,
-                buff_size=buffer_size,
+                buff_size=1 << 25,
             )
         }
         if with_camera_info:
             self._topics[names.info_topic] = rospy.Subscriber(
-                names.info_topic, classes.CameraInfo, self._take_info, queue_size=1
+                names.info_topic, classes.CameraInfo, self._store_camera_info, queue_size=1
             )
 
     def running(self) -> bool:
         """See `RosNode`."""
         return not self._rospy.is_shutdown()
 
-    def next_image(self, patience: float) -> Any | None:
+    def next_image(self, timeout: float) -> Any | None:
         """See `RosNode`."""
         with self._news:
-            self._news.wait_for(lambda: self._image is not None, patience)
+            self._news.wait_for(lambda: self._image is not None, timeout)
             image, self._image = self._image, None
         return image
 
@@ -92,13 +87,10 @@ class Ros1Node(RosNode):
         """See `RosNode`."""
         self._rospy.signal_shutdown("the node ends")
 
-    def _take_image(self, message: Any) -> None:
+    def _store_image(self, message: Any) -> None:
         with self._news:
             self._image = message
             self._news.notify()
-
-    def _take_info(self, message: Any) -> None:
-        self.camera_info = message
 
 
 class _TimeoutTransport(xmlrpc.client.Transport):
@@ -106,7 +98,7 @@ class _TimeoutTransport(xmlrpc.client.Transport):
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         connection = super().make_connection(host)
-        connection.timeout = RosMaster.timeout
+        connection.timeout = MASTER_TIMEOUT
         return connection
 
 
@@ -130,7 +122,7 @@ def require_master(uri: str) -> None:
         reason = str(error) or type(error).__name__
     if reason:
         raise InvalidInputError(
-            f"no ROS master at {uri} ({reason}); start roscore, or set {RosMaster.variable}"
+            f"no ROS master at {uri} ({reason}); start roscore, or set {MASTER_VARIABLE}"
         )
 
 
@@ -171,11 +163,11 @@ class Ros2Node(RosNode):
         self._topics = {
             names.image: (
                 classes.CompressedImage if names.compressed else classes.Image,
-                self._take_image,
+                self._store_image,
             )
         }
         if with_camera_info:
-            self._topics[names.info_topic] = (classes.CameraInfo, self._take_info)
+            self._topics[names.info_topic] = (classes.CameraInfo, self._store_camera_info)
         self._subscriptions: dict[str, Any] = {}
         self._incompatible: set[str] = set()
         for topic in self._topics:
@@ -209,9 +201,9 @@ class Ros2Node(RosNode):
         """See `RosNode`."""
         return bool(self._rclpy.ok())
 
-    def next_image(self, patience: float) -> Any | None:
+    def next_image(self, timeout: float) -> Any | None:
         """See `RosNode`."""
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + timeout
         try:
             while self._image is None and (left := deadline - time.monotonic()) > 0.0:
                 self._executor.spin_once(timeout_sec=left)
@@ -248,8 +240,5 @@ class Ros2Node(RosNode):
         self._node.destroy_node()
         self._rclpy.try_shutdown()
 
-    def _take_image(self, message: Any) -> None:
+    def _store_image(self, message: Any) -> None:
         self._image = message
-
-    def _take_info(self, message: Any) -> None:
-        self.camera_info = message

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import (
     Array,
+    Bytes,
     InvalidInputError,
     MissingDependencyError,
     inverse,
@@ -69,7 +70,7 @@ def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
     return MessageClasses(**found, octets=octets)
 
 
-def image_message(classes: MessageClasses, sighting: Sighting, image: NDArray[np.uint8]) -> Any:
+def image_message(classes: MessageClasses, sighting: Sighting, image: Bytes) -> Any:
     """`sensor_msgs/Image` of (H, W, 3) RGB, with the header of the image that was seen."""
     message = classes.Image()
     _set_header(message, sighting, sighting.camera_frame)
@@ -81,9 +82,7 @@ def image_message(classes: MessageClasses, sighting: Sighting, image: NDArray[np
     return message
 
 
-def compressed_message(
-    classes: MessageClasses, sighting: Sighting, image: NDArray[np.uint8]
-) -> Any:
+def compressed_message(classes: MessageClasses, sighting: Sighting, image: Bytes) -> Any:
     """`sensor_msgs/CompressedImage` of (H, W, 3) RGB as JPEG."""
     message = classes.CompressedImage()
     _set_header(message, sighting, sighting.camera_frame)
@@ -229,7 +228,6 @@ class Publications:
             listeners: how many listen to a publisher.
         """
         queue_size = 10  # Small messages that may wait for a slow subscriber.
-        tf_queue_size = 100  # As in tf2_ros.
         self._names = names
         self._classes = classes
         self._listeners = listeners
@@ -244,7 +242,7 @@ class Publications:
                     "tf2_msgs is not installed, so the frame of the board cannot be published on"
                     " tf; install it, or give none as parent frame"
                 ).about("tf_parent")
-            self._frames = advertise("/tf", classes.TFMessage, tf_queue_size)
+            self._frames = advertise("/tf", classes.TFMessage, 100)  # As in tf2_ros.
 
     def publish(self, sighting: Sighting, draw: Callable[[Sighting], Any]) -> None:
         """Publishes what an image says; pose and frame only where they are known, and the overlay
@@ -254,12 +252,10 @@ class Publications:
         if sighting.estimate.valid:
             self._pose.publish(camera_pose_message(classes, sighting, names.board_frame))
             if self._frames is not None and sighting.camera_frame:
+                is_parent = names.parent is ParentFrame.BOARD
                 self._frames.publish(
                     transform_message(
-                        classes,
-                        sighting,
-                        names.board_frame,
-                        board_is_parent=names.parent is ParentFrame.BOARD,
+                        classes, sighting, names.board_frame, board_is_parent=is_parent
                     )
                 )
         plain, compressed = self._listeners(self._overlay), self._listeners(self._compressed)
@@ -286,8 +282,8 @@ class RosNode(ABC):
         """False once ROS, or Ctrl-C, has ended the node."""
 
     @abstractmethod
-    def next_image(self, patience: float) -> Any | None:
-        """The latest image that was not given yet, or None if none comes within `patience` [s]."""
+    def next_image(self, timeout: float) -> Any | None:
+        """The latest image that was not given yet, or None if none comes within `timeout` [s]."""
 
     @abstractmethod
     def publishers(self) -> Mapping[str, int]:
@@ -300,3 +296,6 @@ class RosNode(ABC):
     @abstractmethod
     def close(self) -> None:
         """Leaves the graph."""
+
+    def _store_camera_info(self, message: Any) -> None:
+        self.camera_info = message

@@ -1,6 +1,7 @@
 """Scene documents: which objects stand where on the board, and whether they can.
 
-Read `document` first; `arrangement` finds room for objects.
+Read `scene_document` first; `scene_validation` checks where objects stand, `arrangement` finds
+room for them.
 """
 
 import lazy_loader

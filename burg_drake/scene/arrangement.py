@@ -57,8 +57,8 @@ def place_beside(
     partner = occupied.standing[rng.integers(len(occupied.standing))]
     angle = rng.uniform(0.0, 2.0 * np.pi)
     direction = np.array([np.cos(angle), np.sin(angle)])
-    around = partner.shadow.forbids(turned.shadow)
-    middle = partner.shadow.middle - turned.shadow.middle
+    around = partner.footprint.no_fit_polygon(turned.footprint)
+    middle = partner.footprint.middle - turned.footprint.middle
     distance = exit_distance(around, middle, direction)
     distance += start_gap if touching else rng.uniform(*gap_range)
     place = middle + distance * direction
@@ -169,7 +169,7 @@ class Heap:
         return best
 
     def _lowered(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
-        """The pose of an object that is let down on what is below."""
+        """The pose of an object that is lowered onto what is below."""
         hull_gap = 0.004  # Metres between the hulls of dropped objects.
         top = max((float(body.points[..., 2].max()) for body in self._below), default=0.0)
         start = max(top, 0.0) + hull_gap - lowest
@@ -254,8 +254,8 @@ def arrange(
         rng: draws; the same one gives the same result.
         layout: how they stand to one another.
         poses: how stable poses are drawn.
-        obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as those of
-            `scene.occupancy.corners` and boxes of a station.
+        obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as the
+            boxes of a station.
         tries: places to look at for each object.
         needs_all: stop at the first object that finds no place.
 
@@ -369,9 +369,6 @@ def _indices_by_area(chosen: Sequence[tuple[ObjectShape, int]]) -> list[int]:
 def _make_arrangement(
     wanted: Sequence[ObjectRequest], X_SO: Sequence[Array | None], tries: int
 ) -> Arrangement:
-    placed = zip(wanted, X_SO, strict=True)
-    return Arrangement(
-        tuple(to_instance(one, X) for one, X in placed if X is not None),
-        tuple(one.name for one, X in zip(wanted, X_SO, strict=True) if X is None),
-        tries,
-    )
+    pairs = list(zip(wanted, X_SO, strict=True))
+    placed = tuple(to_instance(one, X) for one, X in pairs if X is not None)
+    return Arrangement(placed, tuple(one.name for one, X in pairs if X is None), tries)

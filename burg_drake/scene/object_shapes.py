@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from burg_drake.geometry import convex_hull
 from burg_drake.objects import ObjectLibrary, Primitive, primitive_mesh
 from burg_drake.scene.convex_sweep import ConvexShapes
 from burg_drake.scene.polygons import Footprint, convex_polygon, rotate_polygon, simplify_polygon
-from burg_drake.scene.scene_validation import read_vertices
+from burg_drake.scene.scene_validation import read_library_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +63,8 @@ class ObjectShape:
     name: str
     corners: Array
 
-    @cached_property
-    def _poses(self) -> dict[int, Array]:
-        return {}
-
-    @cached_property
-    def _outlines(self) -> dict[int, Outline]:
-        return {}
+    _poses: dict[int, Array] = field(default_factory=dict)
+    _outlines: dict[int, Outline] = field(default_factory=dict)
 
     def X_SO(self, pose: int) -> Array:
         """(4, 4) in a stable pose, its centre of mass above the board's corner."""
@@ -79,17 +74,14 @@ class ObjectShape:
 
     def outline(self, pose: int) -> Outline:
         """What it covers in a stable pose."""
-        if pose not in self._outlines:
-            self._outlines[pose] = self._outline(self.X_SO(pose))
-        return self._outlines[pose]
-
-    def _outline(self, X_SO: Array) -> Outline:
         outline_tolerance = 2e-4  # Metres that an outline may exceed the true one.
         coarse_tolerance = 1.5e-3  # Metres, of the coarse outline.
-        corners = transform_points(X_SO, self.corners)
-        hull = simplify_polygon(convex_polygon(corners[:, :2]), outline_tolerance)
-        coarse = simplify_polygon(hull, coarse_tolerance)
-        return Outline(np.concatenate([hull, coarse]), len(hull), float(corners[:, 2].max()))
+        if pose not in self._outlines:
+            corners = transform_points(self.X_SO(pose), self.corners)
+            hull = simplify_polygon(convex_polygon(corners[:, :2]), outline_tolerance)
+            both = np.concatenate([hull, simplify_polygon(hull, coarse_tolerance)])
+            self._outlines[pose] = Outline(both, len(hull), float(corners[:, 2].max()))
+        return self._outlines[pose]
 
     @property
     def shadows(self) -> tuple[Array, ...]:
@@ -140,7 +132,10 @@ def _read_object_shape(library: ObjectLibrary, name: str) -> ObjectShape:
             f"object {name!r} of library {library.root} has {why}; leave it out"
         )
     points = np.vstack(
-        [_read_mesh_vertices(library, entry.surface or entry.mesh), *_contact_points(library, name)]
+        [
+            read_library_vertices(library, entry.surface or entry.mesh),
+            *_contact_points(library, name),
+        ]
     )
     return ObjectShape(library, name, points[np.sort(convex_hull(points).vertices)])
 
@@ -150,8 +145,8 @@ def _contact_points(library: ObjectLibrary, name: str) -> list[Array]:
     entry = library.entry(name)
     if entry.contact.primitive is not None:
         return [np.asarray(primitive_mesh(entry.contact.primitive).vertices)]
-    return [_read_mesh_vertices(library, piece) for piece in entry.pieces] or [
-        _read_mesh_vertices(library, entry.surface or entry.mesh)
+    return [read_library_vertices(library, piece) for piece in entry.pieces] or [
+        read_library_vertices(library, entry.surface or entry.mesh)
     ]
 
 
@@ -166,11 +161,3 @@ def _primitive_shape(primitive: Primitive) -> ConvexShapes:
     else:
         points, spread = np.zeros((1, 3)), np.eye(3) * size[0]
     return ConvexShapes.of([points], [spread]).moved(primitive.X_OP.matrix())
-
-
-def _read_mesh_vertices(library: ObjectLibrary, file: str) -> Array:
-    path = library.path(file)
-    try:
-        return read_vertices(path)
-    except (OSError, ValueError) as error:
-        raise library.damaged(path) from error

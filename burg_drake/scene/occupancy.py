@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, InvalidInputError, Pose, make_pose, rot_z, transform_points
+from burg_drake.core import Array, InvalidInputError, Pose, make_pose, rot_z
 from burg_drake.scene.convex_sweep import ConvexShapes, contact_distances
 from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes, Outline
 from burg_drake.scene.polygons import Footprint, convex_polygon, distances_from_polygon
@@ -75,7 +75,7 @@ class StandingObject:
         return X_SO
 
     @property
-    def shadow(self) -> Footprint:
+    def footprint(self) -> Footprint:
         """The convex hull of what it covers."""
         return self.outline.hull
 
@@ -115,19 +115,19 @@ class OccupiedBoard:
     def add(self, one: StandingObject) -> None:
         """Something stands there from now on."""
         self.standing.append(one)
-        self._footprints.append((one.shadow, 0.0, one.outline.height))
+        self._footprints.append((one.footprint, 0.0, one.outline.height))
 
     def in_bounds(self, one: StandingObject) -> bool:
         """Whether nothing of it is beyond the board's edge."""
-        shadow = one.shadow
-        return bool((shadow.low >= 0.0).all() and (shadow.high <= self.size).all())
+        footprint = one.footprint
+        return bool((footprint.low >= 0.0).all() and (footprint.high <= self.size).all())
 
     def exit_distances(self, one: StandingObject, direction: Array) -> tuple[float, float]:
         """After which ways along a unit vector (2,) nothing of it may be beyond the board's edge
         [m]: from the former to the latter, and never if that is less."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            to_low = -one.shadow.low / direction
-            to_high = (self.size - one.shadow.high) / direction
+            to_low = -one.footprint.low / direction
+            to_high = (self.size - one.footprint.high) / direction
         distances = np.sort([to_low, to_high], axis=0)
         return float(distances[0].max()), float(distances[1].min())
 
@@ -136,15 +136,14 @@ class OccupiedBoard:
         that is there, (N,); what hangs above it and what is below the board is not in the way."""
         headroom = 0.005  # Metres between an object and one above it.
         free = np.ones(len(offsets), dtype=bool)
-        low, high = offsets + one.shadow.low, offsets + one.shadow.high
-        for shadow, bottom, top in self._footprints:
+        low, high = offsets + one.footprint.low, offsets + one.footprint.high
+        for footprint, bottom, top in self._footprints:
             if bottom <= one.outline.height + headroom and top >= 0.0:
-                beside = np.maximum(shadow.low - high, low - shadow.high).max(axis=1)
+                beside = np.maximum(footprint.low - high, low - footprint.high).max(axis=1)
                 near = np.flatnonzero(free & (beside < least + BOX_TOLERANCE))
                 if len(near):
-                    free[near] = (
-                        distances_from_polygon(shadow.forbids(one.shadow), offsets[near]) >= least
-                    )
+                    around = footprint.no_fit_polygon(one.footprint)
+                    free[near] = distances_from_polygon(around, offsets[near]) >= least
         return free
 
     def is_free(self, one: StandingObject, offset: Array, least: float) -> bool:
@@ -214,7 +213,7 @@ def random_place(
     Returns:
         The object there, or None; and the number of places that were looked at.
     """
-    low, high = -one.shadow.low, occupied.size - one.shadow.high
+    low, high = -one.footprint.low, occupied.size - one.footprint.high
     if (low > high).any():
         return None, tries
     offsets = rng.uniform(low, high, (tries, 2))
@@ -227,8 +226,3 @@ def to_instance(wanted: ObjectRequest, X_SO: Array) -> Instance:
     """An instance whose pose can be read; it has no name of its own if that is its object's."""
     name = "" if wanted.name == wanted.object else wanted.name
     return Instance(name=name, object=wanted.object, X_SO=Pose.readable(X_SO))
-
-
-def placed_corners(shape: ObjectShape, X_SO: Array) -> Array:
-    """Corners (N, 3) of an object's hull in S [m], to be an obstacle for others."""
-    return transform_points(X_SO, shape.corners)

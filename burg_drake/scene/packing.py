@@ -59,19 +59,19 @@ def pack_objects(
 
 
 def packing_density(placed: Sequence[StandingObject]) -> float:
-    """Share of the convex hull of all shadows that they cover."""
+    """Share of the convex hull of all footprints that they cover."""
     if not placed:
         return 0.0
-    hull = convex_polygon(np.concatenate([one.shadow.corners for one in placed]))
-    return sum(polygon_area(one.shadow.corners) for one in placed) / polygon_area(hull)
+    hull = convex_polygon(np.concatenate([one.footprint.corners for one in placed]))
+    return sum(polygon_area(one.footprint.corners) for one in placed) / polygon_area(hull)
 
 
-def _aligned_yaws(shadow: Array, others: Sequence[StandingObject]) -> list[float]:
-    """Yaws that lay the longest side of a shadow along a side of something [rad]."""
-    own = _side_headings(shadow)[0]
+def _aligned_yaws(footprint: Array, others: Sequence[StandingObject]) -> list[float]:
+    """Yaws that lay the longest side of a footprint along a side of something [rad]."""
+    own = _side_headings(footprint)[0]
     towards = [k * np.pi / 2.0 for k in range(4)]
     for one in others[::-1]:
-        towards += [heading + np.pi for heading in _side_headings(one.shadow.corners)]
+        towards += [heading + np.pi for heading in _side_headings(one.footprint.corners)]
     found: list[float] = []
     for heading in towards:
         yaw = float((heading - own) % (2.0 * np.pi))
@@ -91,11 +91,11 @@ def _side_headings(polygon: Array) -> Array:
 def _best_place(
     occupied: OccupiedBoard, turned: StandingObject
 ) -> tuple[StandingObject | None, float]:
-    """The place where the hull of all shadows is smallest, and its area [m^2]."""
-    low, high = -turned.shadow.low, occupied.size - turned.shadow.high
+    """The place where the hull of all footprints is smallest, and its area [m^2]."""
+    low, high = -turned.footprint.low, occupied.size - turned.footprint.high
     if (low > high).any():
         return None, np.inf
-    there = [one.shadow for one in occupied.standing]
+    there = [one.footprint for one in occupied.standing]
     coarse = [one.outline.coarse for one in occupied.standing]
     points = (
         _touching_positions(turned.outline.coarse, coarse, low, high)
@@ -106,19 +106,19 @@ def _best_place(
     points = points[occupied.are_free(turned, points, PACKING_GAP)]
     if not len(points):
         return None, np.inf
-    reaches = turned.shadow.reach + points @ SUPPORT_DIRECTIONS.T
-    for shadow in there:
-        reaches = np.maximum(reaches, shadow.reach)
+    reaches = turned.footprint.support_values + points @ SUPPORT_DIRECTIONS.T
+    for footprint in there:
+        reaches = np.maximum(reaches, footprint.support_values)
     areas = support_area(reaches)
     best = int(areas.argmin())
     return turned.shifted(points[best]), float(areas[best])
 
 
 def _touching_positions(
-    shadow: Footprint, there: Sequence[Footprint], low: Array, high: Array
+    footprint: Footprint, there: Sequence[Footprint], low: Array, high: Array
 ) -> Array:
-    """Places (N, 2) of a shadow's origin at which it touches what is there, once or twice."""
-    around = [_grow_polygon(other.forbids(shadow)) for other in there]
+    """Places (N, 2) of a footprint's origin at which it touches what is there, once or twice."""
+    around = [_grow_polygon(other.no_fit_polygon(footprint)) for other in there]
     starts = np.concatenate(around)
     ends = np.concatenate([next_vertices(polygon) for polygon in around])
     frame = np.array([low, (high[0], low[1]), high, (low[0], high[1])])

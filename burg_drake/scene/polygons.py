@@ -15,28 +15,9 @@ SUPPORT_DIRECTIONS = np.column_stack([np.cos(_DIRECTION_ANGLES), np.sin(_DIRECTI
 """(64, 2) unit vectors all around."""
 
 
-@dataclass(frozen=True, eq=False)
-class PolygonSides:
-    """A polygon as a walk along its sides.
-
-    Attributes:
-        start: (2,) the lowest corner, the left one of two [m].
-        along: (N, 2) the sides from there on [m].
-        heading: (N,) where they lead to, from 0 to 2 pi [rad].
-    """
-
-    start: Array
-    along: Array
-    heading: Array
-
-    @classmethod
-    def of(cls, polygon: Array) -> PolygonSides:
-        """From corners (N, 2)."""
-        first = int(np.lexsort((polygon[:, 0], polygon[:, 1]))[0])
-        corners = np.concatenate((polygon[first:], polygon[:first]))
-        along = next_vertices(corners) - corners
-        heading = np.arctan2(along[:, 1], along[:, 0]) % (2.0 * np.pi)
-        return cls(corners[0], along, heading)
+PolygonSides = tuple[Array, Array, Array]
+"""The lowest corner (2,) of a polygon, the left one of two [m]; its sides (N, 2) from there on [m];
+and the direction (N,) of each, from 0 to 2 pi [rad]."""
 
 
 def next_vertices(corners: Array) -> Array:
@@ -80,16 +61,23 @@ def no_fit_polygon(still: Array, moving: Array) -> Array:
         The Minkowski difference (K, 2): the two touch where the origin is on its edge, and are as
         far apart as the origin is from it.
     """
-    return no_fit_polygon_of_sides(PolygonSides.of(still), PolygonSides.of(-moving))
+    return _merge_sides(_polygon_sides(still), _polygon_sides(-moving))
 
 
-def no_fit_polygon_of_sides(still: PolygonSides, opposite: PolygonSides) -> Array:
-    """The same of polygons whose sides are known: of the other one, and of the one that is to be
-    placed, turned by half a turn about its origin."""
-    along = np.concatenate((still.along, opposite.along))
-    order = np.argsort(np.concatenate((still.heading, opposite.heading)), kind="stable")
-    along = along[order]
-    return np.asarray(still.start + opposite.start + np.cumsum(along, axis=0) - along)
+def _polygon_sides(polygon: Array) -> PolygonSides:
+    first = int(np.lexsort((polygon[:, 0], polygon[:, 1]))[0])
+    corners = np.concatenate((polygon[first:], polygon[:first]))
+    along = next_vertices(corners) - corners
+    return corners[0], along, np.arctan2(along[:, 1], along[:, 0]) % (2.0 * np.pi)
+
+
+def _merge_sides(still: PolygonSides, opposite: PolygonSides) -> Array:
+    """The Minkowski sum (K, 2) of two polygons."""
+    start, along, heading = still
+    other_start, other_along, other_heading = opposite
+    order = np.argsort(np.concatenate((heading, other_heading)), kind="stable")
+    sides = np.concatenate((along, other_along))[order]
+    return np.asarray(start + other_start + np.cumsum(sides, axis=0) - sides)
 
 
 def support_area(reach: Array) -> Array:
@@ -97,17 +85,13 @@ def support_area(reach: Array) -> Array:
 
     Args:
         reach: (..., K) largest `direction . point` of a shape along K directions, such as those of
-            `SUPPORT_DIRECTIONS`: the result is the area of its convex hull, and a little above it [m^2].
+            `SUPPORT_DIRECTIONS`: the result is the area of its convex hull, and a little above it
+            [m^2].
     """
     step = 2.0 * np.pi / reach.shape[-1]
     before, after = np.roll(reach, 1, axis=-1), np.roll(reach, -1, axis=-1)
     side = (before + after - 2.0 * np.cos(step) * reach) / np.sin(step)
     return np.asarray((reach * side).sum(axis=-1) / 2.0)
-
-
-def support_values(polygon: Array) -> Array:
-    """(K,) largest `direction . corner` of a polygon along `SUPPORT_DIRECTIONS` [m]."""
-    return np.asarray((polygon @ SUPPORT_DIRECTIONS.T).max(axis=0))
 
 
 def simplify_polygon(polygon: Array, most: float) -> Array:
@@ -181,36 +165,32 @@ class Footprint:
     @cached_property
     def low(self) -> Array:
         """The lower corner (2,) of the box around it."""
-        lower: Array = self.corners.min(axis=0)
-        return lower
+        return np.asarray(self.corners.min(axis=0))
 
     @cached_property
     def high(self) -> Array:
         """The upper corner (2,) of the box around it."""
-        upper: Array = self.corners.max(axis=0)
-        return upper
+        return np.asarray(self.corners.max(axis=0))
 
     @cached_property
     def middle(self) -> Array:
         """The mean (2,) of its corners."""
-        center: Array = self.corners.mean(axis=0)
-        return center
+        return np.asarray(self.corners.mean(axis=0))
 
     @cached_property
-    def reach(self) -> Array:
-        """How far it reaches along `polygons.DIRECTIONS`."""
-        return support_values(self.corners)
+    def support_values(self) -> Array:
+        """(K,) largest `direction . corner` along `SUPPORT_DIRECTIONS` [m]."""
+        return np.asarray((self.corners @ SUPPORT_DIRECTIONS.T).max(axis=0))
 
     @cached_property
-    def sides(self) -> PolygonSides:
-        """Its sides."""
-        return PolygonSides.of(self.corners)
+    def _sides(self) -> PolygonSides:
+        return _polygon_sides(self.corners)
 
     @cached_property
-    def opposite_sides(self) -> PolygonSides:
+    def _opposite_sides(self) -> PolygonSides:
         """Its sides when it is turned by half a turn about the origin."""
-        return PolygonSides.of(-self.corners)
+        return _polygon_sides(-self.corners)
 
-    def forbids(self, moving: Footprint) -> Array:
-        """Where another one's origin must not be, see `polygons.no_fit_polygon`."""
-        return no_fit_polygon_of_sides(self.sides, moving.opposite_sides)
+    def no_fit_polygon(self, moving: Footprint) -> Array:
+        """Where another one's origin must not be, see the function of this name."""
+        return _merge_sides(self._sides, moving._opposite_sides)

@@ -191,7 +191,7 @@ class Board:
 
     @cached_property
     def layout(self) -> MarkerLayout:
-        """Where its markers lie; see `scene.scene_document.marker_layout`.
+        """Where its markers lie; see `marker_layout`.
 
         Raises:
             InvalidInputError: they do not fit.
@@ -276,15 +276,10 @@ class SceneRecipe:
     attempts: int = setting(100, "scenes to sample until one is accepted", low=1)
     within_reach: bool = setting(False, "require that the arm can grasp each object")
     clear_grasps: int = setting(
-        0,
-        "require K grasps on each object with a clear hand",
-        metavar="K",
-        low=1,
+        0, "require K grasps on each object with a clear hand", metavar="K", low=1
     )
     visible_from: str = setting(
-        "",
-        "require that this camera of the station sees half of each object",
-        metavar="CAMERA",
+        "", "require that this camera of the station sees half of each object", metavar="CAMERA"
     )
 
     def __post_init__(self) -> None:
@@ -315,16 +310,15 @@ class SamplingProvenance:
 
     def differences(self, other: SamplingProvenance) -> list[str]:
         """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`."""
+        its content counts, not where it is, and of the versions those of packages that matter."""
         # Packages whose versions change sampled scenes.
         packages = ("burg_drake", "drake", "numpy", "scipy")
         found = []
         for name, mine in vars(self.recipe).items():
             theirs = getattr(other.recipe, name)
             if name not in ("library", "station") and mine != theirs:
-                found.append(
-                    f"{name.replace('_', ' ')} is {_value_text(mine)} there, {_value_text(theirs)} here"
-                )
+                there, here = _value_text(mine), _value_text(theirs)
+                found.append(f"{name.replace('_', ' ')} is {there} there, {here} here")
         for name in ("library", "station"):
             mine, theirs = (getattr(one, f"{name}_content") for one in (self, other))
             if mine != theirs:
@@ -455,7 +449,7 @@ class Scene:
         """Refuses a board whose markers cannot be, before anything is done with them.
 
         Raises:
-            InvalidInputError: see `scene.scene_document.marker_layout`; it names the file and the
+            InvalidInputError: see `marker_layout`; it names the file and the
             key.
         """
         try:
@@ -499,9 +493,7 @@ class Scene:
 
 
 def load_scene(
-    reference: str | Path,
-    *,
-    library: Callable[[str, Path | None], ObjectLibrary] = load_library,
+    reference: str | Path, *, library: Callable[[str, Path | None], ObjectLibrary] = load_library
 ) -> Scene:
     """Loads a scene and its library.
 

@@ -99,8 +99,11 @@ def validate_scene(
     """
     scene = as_scene(scene)
     if extents is None:
-        names = (*scene.instances, *scene.background)
-        extents = {name: _placed_extent(scene, name) for name in names}
+        extents = {}
+        for name in (*scene.instances, *scene.background):
+            p_OC = support_vertices(scene.library, scene.instance(name).object)
+            p_SC = transform_points(scene.X_SO(name), p_OC)
+            extents[name] = Extent.of(placed_vertices(scene, name), p_SC)
     issues: list[SceneIssue] = []
     for name in scene.instances:
         others = {other: extent for other, extent in extents.items() if other != name}
@@ -132,11 +135,6 @@ def placed_vertices(scene: Scene, instance: str) -> Array:
     return transform_points(scene.X_SO(instance), p_OV)
 
 
-def _placed_extent(scene: Scene, instance: str) -> Extent:
-    p_OC = support_vertices(scene.library, scene.instance(instance).object)
-    return Extent.of(placed_vertices(scene, instance), transform_points(scene.X_SO(instance), p_OC))
-
-
 def support_vertices(library: ObjectLibrary, name: str) -> Array:
     """(N, 3) points of an object with which it rests on a plane, in the object frame [m]: of its
     primitive, else of its pieces; of its surface if it has none.
@@ -159,11 +157,21 @@ def surface_vertices(library: ObjectLibrary, name: str) -> Array:
         MeshError: the mesh file is damaged.
     """
     entry = library.entry(name)
-    mesh = library.path(entry.surface or entry.mesh)
+    return read_library_vertices(library, entry.surface or entry.mesh)
+
+
+def read_library_vertices(library: ObjectLibrary, file: str) -> Array:
+    """(N, 3) vertices of a mesh file of a library [m].
+
+    Raises:
+        UnknownNameError: the file is missing.
+        MeshError: it is damaged.
+    """
+    path = library.path(file)
     try:
-        return read_vertices(mesh)
+        return read_vertices(path)
     except (OSError, ValueError) as error:
-        raise library.damaged(mesh) from error
+        raise library.damaged(path) from error
 
 
 def read_vertices(mesh: Path) -> Array:

@@ -1,6 +1,7 @@
 """Time stepping: grasp trials with their outcome and margins, and scenes that come to rest.
 
-Read `trials` first; `settling` builds on `rest`, and `robustness` repeats trials.
+Read `grasp_trial` first, then `trial_execution`, the phases of a trial. `settled_scene` brings a
+scene to rest; `perturbation` and `grip_limits` repeat trials.
 """
 
 import lazy_loader

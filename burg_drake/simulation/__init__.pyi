@@ -45,7 +45,7 @@ from .mujoco_trial import (
 from .mujoco_world import MujocoWorld as MujocoWorld, require_mujoco as require_mujoco
 from .object_motions import GripMotion as GripMotion, MotionTracker as MotionTracker
 from .perturbation import (
-    Perturbed as Perturbed,
+    PerturbedTrial as PerturbedTrial,
     SuccessRate as SuccessRate,
     perturb as perturb,
     success_rate as success_rate,

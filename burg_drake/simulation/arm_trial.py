@@ -31,7 +31,6 @@ from burg_drake.station import (
     ENGINES,
     Engine,
     MountedHand,
-    StationDiagram,
     StationLike,
     as_drake_engine,
     as_station,
@@ -124,7 +123,7 @@ class ArmCarrier:
         self._mounted = world.hand
         self._lift_clearance = lift_clearance
         self._step = diagram.engine.time_step
-        self._plant_context = diagram.plant.GetMyMutableContextFromRoot(world.context)
+        self._plant_context = world.plant_context
         self._port = diagram.diagram.GetInputPort("arm.desired_state")
         self._approach, self._commands = approach, tuple(segments)
         self._gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
@@ -203,12 +202,11 @@ class ArmCarrier:
         Not straight up, the load when the hand brakes is another one than when it accelerates, and
         both count.
         """
-        load_tolerance = 0.01  # Relative difference of loads.
         polls = self._world.settings.steady_polls
         window = self._loads[max(0, check + 1 - polls) : check + 1]
         ahead = np.append(self._loads[check + 1 :], self._gravity).max()
         brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
-        return bool(brakes and ahead <= (1.0 + load_tolerance) * window.max())
+        return bool(brakes and ahead <= 1.01 * window.max())
 
     def is_free_ahead(self) -> bool:
         """Looks along the planned motion."""
@@ -247,9 +245,9 @@ class ArmCarrier:
 
 def _hand_segment(commands: CommandSequence) -> HandSegment:
     """The straight segment along which a course leads the hand."""
-    digits = 3  # A plan may leave its straight segment by half a millimetre.
     p_GG_W = commands.p_WG[-1] - commands.p_WG[0]
-    direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), digits)
+    # A plan may leave its straight segment by half a millimetre.
+    direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), 3)
     direction_W /= np.linalg.norm(direction_W)
     return HandSegment(direction_W, float(p_GG_W @ direction_W), commands.checks)
 
@@ -299,6 +297,9 @@ class ArmTrial(DrakeTrial):
         InvalidInputError: the station has no arm.
     """
 
+    robot = "arm"
+    hand_type = MountedHand
+
     def __init__(
         self,
         scene: SceneLike,
@@ -315,22 +316,15 @@ class ArmTrial(DrakeTrial):
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
         super().__init__(
-            scene,
-            station,
-            "arm",
-            as_drake_engine(engine),
-            settings=settings,
-            clearance=clearance,
-            meshcat=meshcat,
+            scene, station, as_drake_engine(engine), settings=settings, clearance=clearance
         )
-        self._transfer = transfer
+        self._transfer, self._meshcat = transfer, meshcat
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(self._plain)
         self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
-        kept = lru_cache(maxsize=MAX_KEPT_WORLDS)
-        self._lift_clearance = kept(partial(ArmLiftClearance, self._plain))
+        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(partial(ArmLiftClearance, self._plain))
 
     @property
     def hand(self) -> MountedHand:
@@ -397,8 +391,7 @@ class ArmTrial(DrakeTrial):
             friction, mass: as in `run`.
             world: in which it runs; by default the complete one.
         """
-        rest_time = 0.05  # Seconds between arrival and closing.
-        world = self._enter(world)
+        world = self._use_world(world)
         assert isinstance(world.hand, MountedHand)
         target = world.diagram.free[instance]
         moving: set[BodyIndex] = set()
@@ -406,14 +399,13 @@ class ArmTrial(DrakeTrial):
         step = self.engine.time_step
         to_grasp = [plan.transfer, plan.approach] if self._transfer else [plan.approach]
         steps = 1 if self._transfer else self.steps_per_check
-        rest = max(1, round(rest_time / (steps * step)))
+        rest = max(1, round(0.05 / (steps * step)))  # 0.05 s between arrival and closing
         approach = CommandSequence(to_grasp, step, steps, self._p_WG, rest)
         segments = [
             CommandSequence([segment], step, self.steps_per_check, self._p_WG)
             for segment in _phases_with_target(plan)
         ]
-        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
-        world.hand.place(plant_context, approach.q_at_check(0))
+        world.hand.place(world.plant_context, approach.q_at_check(0))
         world.command("arm", approach.at(0))
         world.command("hand", world.hand.opening_command())
         world.simulator.Initialize()
@@ -422,9 +414,6 @@ class ArmTrial(DrakeTrial):
         carrier = ArmCarrier(world, target, approach, segments, closed, lift_clearance)
         return Execution(world, target, moving, carrier)
 
-    def _handle(self, diagram: StationDiagram) -> MountedHand:
-        return MountedHand(diagram)
-
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
         """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
         the grasp are all that can be told.
@@ -432,7 +421,6 @@ class ArmTrial(DrakeTrial):
         Raises:
             InvalidInputError: it is not.
         """
-        max_gap = 1e-6  # Radians between trajectories that follow one another.
         if plan.origin is not None:
             plan.require_for(self.scene, self.station)
         joints = len(self._plain.arm_joints)
@@ -450,10 +438,9 @@ class ArmTrial(DrakeTrial):
                     f"the plan's {name} has {part.q.shape[1]} joints, but the arm of station"
                     f" {self.station.name!r} has {joints}"
                 )
-        names = list(parts)
-        for one, other in pairwise(names):
+        for one, other in pairwise(parts):
             gap = float(np.abs(parts[other].q[0] - parts[one].q[-1]).max())
-            if gap > max_gap:
+            if gap > 1e-6:
                 raise InvalidInputError(
                     f"the plan's {other} starts {gap:.2g} rad from the end of its {one}"
                 )

@@ -7,8 +7,15 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph
-from pydrake.multibody.plant import ContactResults, MultibodyPlant
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    RoleAssign,
+    SceneGraph,
+)
+from pydrake.multibody.plant import ContactResults, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
@@ -183,9 +190,8 @@ class RobotContactWatch:
         Returns:
             What stops the robot: "panda_link5 vs shelf" of a link that touches something fixed or
             another link, "shelf" of the hand; on the way to the grasp `table`, if the hand presses
-            on it with more than `STOP_FORCE`. "" if nothing does.
+            on it with more than 20 N. "" if nothing does.
         """
-        stop_force = 20.0  # Newtons. Threshold of a Panda's reflex in the examples of libfranka.
         stops, on_table = [], np.zeros(3)
         for contact in contacts:
             for one, other, sign in (
@@ -204,7 +210,8 @@ class RobotContactWatch:
                     on_table += sign * contact.f_B_W
                 elif other not in self._free:
                     stops.append(self._names[other])
-        if not arrived and np.linalg.norm(on_table) > stop_force:
+        # 20 N is the threshold of a Panda's reflex in the examples of libfranka.
+        if not arrived and np.linalg.norm(on_table) > 20.0:
             stops.append(self._names[self._table])
         return min(stops, default="")
 
@@ -243,6 +250,36 @@ def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
     return found
 
 
+def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> list[GeometryId]:
+    """Collision geometries of bodies, in the plant's order."""
+    return [
+        geometry
+        for index in sorted(bodies)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
+    ]
+
+
+def assign_friction(
+    built: StationDiagram, root: Context, bodies: Iterable[BodyIndex], friction: float
+) -> None:
+    """Gives bodies one coefficient of friction in a Context.
+
+    Args:
+        built: the diagram.
+        root: its Context.
+        bodies: of the plant.
+        friction: static and dynamic coefficient.
+    """
+    graph, source = built.scene_graph, built.plant.get_source_id()
+    context = graph.GetMyMutableContextFromRoot(root)
+    for geometry in collision_geometries(built.plant, bodies):
+        known = graph.model_inspector().GetProximityProperties(geometry)
+        properties = ProximityProperties(known)
+        coulomb = CoulombFriction(friction, friction)
+        properties.UpdateProperty("material", "coulomb_friction", coulomb)
+        graph.AssignRole(context, source, geometry, properties, RoleAssign.kReplace)
+
+
 def freeze_bodies(built: StationDiagram, root: Context, bodies: Collection[BodyIndex]) -> None:
     """Locks bodies, and takes their contacts with each other and with what is fixed out.
 
@@ -254,13 +291,10 @@ def freeze_bodies(built: StationDiagram, root: Context, bodies: Collection[BodyI
     if not bodies:
         return
     plant, graph = built.plant, built.scene_graph
-    frozen = [plant.get_body(index) for index in bodies]
     context = plant.GetMyMutableContextFromRoot(root)
-    for body in frozen:
-        body.Lock(context)
-    fixed = [plant.get_body(index) for index in (built.table, *built.fixed.values())]
-    geometries = GeometrySet(
-        [g for body in (*frozen, *fixed) for g in plant.GetCollisionGeometriesForBody(body)]
-    )
+    for index in bodies:
+        plant.get_body(index).Lock(context)
+    resting = {*bodies, built.table, *built.fixed.values()}
+    geometries = GeometrySet(collision_geometries(plant, resting))
     declaration = CollisionFilterDeclaration().ExcludeWithin(geometries)
     graph.collision_filter_manager(graph.GetMyMutableContextFromRoot(root)).Apply(declaration)

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, SimulationError
 from burg_drake.scene import SceneLike, as_scene
 from burg_drake.simulation.contacts import contact_islands, freeze_bodies
-from burg_drake.simulation.falling import is_below
+from burg_drake.simulation.falling import free_poses, is_below
 from burg_drake.simulation.relaxation import resist_rolling
 from burg_drake.simulation.rest_criterion import (
     BodySpeed,
@@ -40,10 +39,10 @@ from burg_drake.station import (
 
 
 class StillnessLimits:
-    """Stillness limits."""
+    """How far an object of a settled scene may move."""
 
-    distance = 5e-4  # Metres that an object of a settled scene may move.
-    angle = float(np.deg2rad(0.1))  # Radians that it may turn.
+    distance = 5e-4  # Metres.
+    angle = float(np.deg2rad(0.1))  # Radians.
     duration = 5.0  # Seconds that are simulated to measure it.
 
 
@@ -109,27 +108,16 @@ def _without_sinking(built: StationDiagram, name: str, X_WO: Array) -> Array:
     return lifted
 
 
-def free_poses(built: StationDiagram, context: Context) -> dict[str, Array]:
-    """Where the free instances are: (4, 4) poses in the world by name.
-
-    Args:
-        built: the scene.
-        context: of its plant.
-    """
-    return {
-        name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
-        for name, index in built.free.items()
-    }
-
-
 def is_still(displacements: Mapping[str, Displacement]) -> bool:
     """Whether nothing has moved further than a settled scene may."""
-    return all(map(has_stayed, displacements.values()))
+    return all(map(_has_stayed, displacements.values()))
 
 
-def has_stayed(moved: Displacement) -> bool:
-    """Whether an object of a settled scene may move so far in `StillnessLimits.duration`."""
-    return moved.distance < StillnessLimits.distance and moved.angle < StillnessLimits.angle
+def _has_stayed(moved: Displacement, share: float = 1.0) -> bool:
+    """Whether an object has moved less than a share of what one of a settled scene may move in
+    `StillnessLimits.duration`; NaN is not less."""
+    limits = StillnessLimits
+    return moved.distance < share * limits.distance and moved.angle < share * limits.angle
 
 
 DRIFT_CHECK_TIMES = ((0.1, 0.2, 0.1), (0.2, 0.4, 0.4), (0.5, 1.0, 0.4), (1.0, 2.0, 0.8))
@@ -141,8 +129,8 @@ class DriftPrediction:
     """What becomes of a scene that is let go.
 
     Attributes:
-        moving: free objects that would move further in `StillnessLimits.duration` than those of a settled
-            scene may, and their mean speed in that time, by name; none if all is at rest.
+        moving: free objects that would move further in `StillnessLimits.duration` than those of a
+            settled scene may, with their mean speed in that time, by name.
         X_WO: (4, 4) poses in the world of the free objects that are still on the table, by name: at
             the end for those that were in doubt until then, else as in the document.
         doubtful: those that were in doubt until the end, and what touches them.
@@ -180,13 +168,13 @@ def predict_drift(
     watch.freeze_all_but(built.free if among is None else among)
     for start, end, share in DRIFT_CHECK_TIMES:
         shifts = watch.check_between(start, end)
-        watch.freeze_all_but([n for n, shift in shifts.items() if not _is_within(shift, share)])
-        if not watch.awake or (once and not all(map(has_stayed, shifts.values()))):
+        watch.freeze_all_but([n for n, shift in shifts.items() if not _has_stayed(shift, share)])
+        if not watch.awake or (once and not all(map(_has_stayed, shifts.values()))):
             break
     doubtful = frozenset(watch.awake)
     kept = {name: built.X_WO(name) for name in built.free if name not in doubtful}
     last = DRIFT_CHECK_TIMES[-1][-1]
-    moving = {n: _mean_speed(shifts[n]) for n in watch.awake if not _is_within(shifts[n], last)}
+    moving = {n: _mean_speed(shifts[n]) for n in watch.awake if not _has_stayed(shifts[n], last)}
     return DriftPrediction(moving, kept | watch.on_table(), doubtful)
 
 
@@ -239,15 +227,6 @@ class _DriftSimulation:
         return {name: X_WO[name] for name in above}
 
 
-def _is_within(shift: Displacement, share: float) -> bool:
-    """Whether a way is shorter than a share of what a settled scene may go; NaN is not."""
-    return (
-        shift.distance < share * StillnessLimits.distance
-        and shift.angle < share * StillnessLimits.angle
-    )
-
-
 def _mean_speed(shift: Displacement) -> BodySpeed:
-    return BodySpeed(
-        shift.distance / StillnessLimits.duration, shift.angle / StillnessLimits.duration
-    )
+    time = StillnessLimits.duration
+    return BodySpeed(shift.distance / time, shift.angle / time)

@@ -30,21 +30,19 @@ def compliant_while_falling(built: StationDiagram) -> list[str]:
     Args:
         built: a diagram; all is where the documents place it.
     """
-    min_height = 0.0005  # Metres above the table of an object that stands on another one or falls.
     lateral_margin = 0.01  # Metres between bounding boxes, seen from above.
-    max_pieces = 8  # Compliant objects of more pieces take twice the time.
     bounds = {name: _world_bounds(built, name) for name in built.free}
     found: set[str] = set()
     for lower, upper in bounds.values():
-        if lower[2] < min_height:
+        # Higher above the table an object stands on another one or falls.
+        if lower[2] < 0.0005:
             continue
         for other, (low, high) in bounds.items():
             near = (lower[:2] - lateral_margin < high[:2]) & (low[:2] - lateral_margin < upper[:2])
             if near.all():  # also itself: it may meet the background
                 found.add(other)
-    return [
-        name for name in built.free if name in found and _piece_count(built, name) <= max_pieces
-    ]
+    # Compliant objects of more than 8 pieces take twice the time.
+    return [name for name in built.free if name in found and _piece_count(built, name) <= 8]
 
 
 def _piece_count(built: StationDiagram, name: str) -> int:
@@ -69,7 +67,7 @@ SLOW_CRITERION = RestCriterion(speed=0.01, turning=0.1, dying=6.0)
 
 
 @dataclass(frozen=True)
-class Fall:
+class FallResult:
     """Where a fall ended.
 
     Attributes:
@@ -92,7 +90,7 @@ def fall(
     *,
     held: Collection[BodyIndex] = (),
     before_poll: Callable[[Context, Collection[BodyIndex]], None] | None = None,
-) -> Fall:
+) -> FallResult:
     """Simulates until all objects are slow, or time is up.
 
     Args:
@@ -107,7 +105,6 @@ def fall(
     Raises:
         RuntimeError, SystemExit: from Drake, or a pose is not finite.
     """
-    check_interval = 0.5  # Seconds between checks for objects that fell off the table.
     make_compliant(built, compliant_while_falling(built))
     simulator = Simulator(built.diagram)
     context = built.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
@@ -123,11 +120,12 @@ def fall(
             if before_poll is not None:
                 before_poll(context, watched)
 
+        # Every 0.5 s there is a check for objects that fell off the table.
         settled = settle(
             simulator,
             built.plant,
             watched,
-            min(check_interval, time_limit - now),
+            min(0.5, time_limit - now),
             SLOW_CRITERION,
             before_poll=intervene,
         )
@@ -141,12 +139,21 @@ def fall(
             progress(now - before, len(moving))
         if settled.at_rest or now >= time_limit - 1e-9:
             break
-    X_WO = {
+    X_WO = {n: X for n, X in free_poses(built, context).items() if n not in fallen}
+    return FallResult(X_WO, frozenset(fallen), moving, now)
+
+
+def free_poses(built: StationDiagram, context: Context) -> dict[str, Array]:
+    """Where the free instances are: (4, 4) poses in the world by name.
+
+    Args:
+        built: the scene.
+        context: of its plant.
+    """
+    return {
         name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
         for name, index in built.free.items()
-        if name not in fallen
     }
-    return Fall(X_WO, frozenset(fallen), moving, now)
 
 
 def is_below(built: StationDiagram, context: Context, index: BodyIndex) -> bool:

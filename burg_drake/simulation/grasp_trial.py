@@ -11,24 +11,23 @@ unless another motion is given, and holds. A trial succeeds if both fingers stil
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, Outcome, check_pose, make_pose
 from burg_drake.grasping import Clearance, HandClearance
 from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.simulation.contacts import ContactReader, Neighbours
-from burg_drake.simulation.hand_carrier import HandLiftClearance, LiftCarrier, LiftPath, lift_paths
+from burg_drake.simulation.hand_carrier import HandLiftClearance, LiftCarrier, LiftPath
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
-from burg_drake.simulation.trial_execution import Execution, OtherTouched
+from burg_drake.simulation.trial_execution import Execution, OtherTouched, SteppedWorld
 from burg_drake.simulation.trial_result import (
     GripLoad,
     TrialResult,
@@ -43,6 +42,7 @@ from burg_drake.station import (
     FloatingHand,
     GraspMotion,
     HandHandle,
+    MountedHand,
     Robot,
     Station,
     StationDiagram,
@@ -57,29 +57,7 @@ MAX_KEPT_WORLDS = 16
 """Worlds of a target alone that are kept; each takes 20 MB, and 0.1 s to build."""
 
 
-class KeptWorld(Protocol):
-    """A world in which trials begin."""
-
-    @property
-    def time(self) -> float:
-        """Since the start of the trial [s]."""
-        ...
-
-    @property
-    def robot_meets_hull(self) -> bool:
-        """Whether, in a world of a target alone, parts of the robot meet a hull in its place."""
-        ...
-
-    def is_usable(self) -> bool:
-        """Whether trials can begin in it."""
-        ...
-
-    def invalidate(self) -> None:
-        """Has the next trial prepare it from scratch."""
-        ...
-
-
-W = TypeVar("W", bound=KeptWorld)
+W = TypeVar("W", bound=SteppedWorld)
 
 
 class GraspTrial(ABC, Generic[W]):
@@ -240,7 +218,7 @@ class GraspTrial(ABC, Generic[W]):
         excess = self.scene.entry(instance).contact.excess / travel
         return max(0.0, self.clearance.free_travel(X_WG) - excess)
 
-    def _enter(self, world: W | None) -> W:
+    def _use_world(self, world: W | None) -> W:
         """Makes a world, the complete one if None, the present one."""
         self._world = self.complete_world if world is None else world
         return self._world
@@ -265,29 +243,14 @@ class GraspTrial(ABC, Generic[W]):
 class DrakeTrial(GraspTrial[TrialWorld]):
     """A trial in Drake.
 
-    Args:
-        scene, station, engine, settings, clearance, motion, lock: see `GraspTrial`.
+    Attributes:
         robot: what of the station moves.
-        meshcat: where to show the trials.
+        hand_type: the handle on the hand in its diagrams.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        station: Station,
-        robot: Robot,
-        engine: Engine,
-        *,
-        settings: TrialSettings,
-        clearance: HandClearance,
-        motion: GraspMotion | None = None,
-        lock: bool = True,
-        meshcat: Meshcat | None = None,
-    ) -> None:
-        super().__init__(
-            scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
-        )
-        self._robot, self._meshcat = robot, meshcat
+    robot: ClassVar[Robot]
+    hand_type: ClassVar[type[FloatingHand] | type[MountedHand]]
+    _meshcat: Meshcat | None
 
     @property
     def diagram(self) -> StationDiagram:
@@ -300,21 +263,6 @@ class DrakeTrial(GraspTrial[TrialWorld]):
         return self.world.hand
 
     @property
-    def contacts(self) -> ContactReader:
-        """Of `world`."""
-        return self.world.contacts
-
-    @property
-    def neighbours(self) -> Neighbours:
-        """Of `world`."""
-        return self.world.neighbours
-
-    @property
-    def simulator(self) -> Simulator:
-        """Of `world`."""
-        return self.world.simulator
-
-    @property
     def context(self) -> Context:
         """Of the trial that runs or ran last."""
         return self.world.context
@@ -323,20 +271,37 @@ class DrakeTrial(GraspTrial[TrialWorld]):
         diagram = build_station_diagram(
             self.scene,
             self.station,
-            robot=self._robot,
+            robot=self.robot,
             engine=self.engine,
             meshcat=self._meshcat,
             for_trials=alone or True,
         )
-        return TrialWorld(diagram, self._handle(diagram), self.settings)
-
-    @abstractmethod
-    def _handle(self, diagram: StationDiagram) -> HandHandle:
-        """The hand in a diagram."""
+        return TrialWorld(diagram, self.hand_type(diagram), self.settings)
 
 
 class HandAloneTrial(GraspTrial[W]):
-    """Where the hand alone goes, of whatever engine."""
+    """A trial of the hand alone, in any engine.
+
+    Args:
+        scene, station, engine, settings, motion, lock: see `GraspTrial`.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        engine: Engine,
+        *,
+        settings: TrialSettings,
+        motion: GraspMotion | None,
+        lock: bool,
+    ) -> None:
+        self._plain = build_station_diagram(scene, station, robot="hand")
+        clearance = HandClearance(self._plain)
+        super().__init__(
+            scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
+        )
+        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(partial(HandLiftClearance, self._plain))
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
         """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
@@ -351,7 +316,14 @@ class HandAloneTrial(GraspTrial[W]):
         Raises:
             InvalidInputError: the hand would not move, or a length is not one.
         """
-        return lift_paths(self.motion, X_WG, lift)
+        motion, height = self.motion, self.motion.lift_height if lift is None else lift
+        if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
+            raise InvalidInputError(
+                f"lift is {height:g} m and retreat {motion.retreat:g} m; give a finite lift of 0 or"
+                " more, and above 0 if there is no retreat"
+            )
+        paths = LiftPath(-X_WG[:3, 2], motion.retreat), LiftPath(motion.direction_W, height)
+        return tuple(path for path in paths if path.length > 0.0)
 
     def X_WG_start(self, X_WG: Array) -> Array:
         """Where (4, 4) the hand begins, of a grasp in the world: there, or at its pregrasp."""
@@ -403,6 +375,9 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         scene, station, engine, settings, motion, clearance: see `GraspTrial`.
     """
 
+    robot = "hand"
+    hand_type = FloatingHand
+
     def __init__(
         self,
         scene: SceneLike,
@@ -414,21 +389,15 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         lock: bool = True,
         meshcat: Meshcat | None = None,
     ) -> None:
-        scene, station = as_scene(scene), as_station(station)
-        self._plain = build_station_diagram(scene, station, robot="hand")
+        self._meshcat = meshcat
         super().__init__(
-            scene,
-            station,
-            "hand",
+            as_scene(scene),
+            as_station(station),
             as_drake_engine(engine),
             settings=settings,
-            clearance=HandClearance(self._plain),
             motion=motion,
             lock=lock,
-            meshcat=meshcat,
         )
-        kept = lru_cache(maxsize=MAX_KEPT_WORLDS)
-        self._lift_clearance = kept(partial(HandLiftClearance, self._plain))
 
     @property
     def hand(self) -> FloatingHand:
@@ -501,7 +470,7 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
             friction, mass: as in `run`.
             world: in which it runs; by default the complete one.
         """
-        world = self._enter(world)
+        world = self._use_world(world)
         target = world.diagram.free[instance]
         everything = set(world.diagram.free.values())
         approach = self._approach(X_WG)
@@ -509,21 +478,17 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         moving = beside_hand if self._lock else everything
         world.prepare(instance, moving, friction, mass)
         paths = self.lift_paths(X_WG) if paths is None else paths
-        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
         assert isinstance(world.hand, FloatingHand)
         if approach is None:
             closed = self.closed_before_contact(instance, X_WG)
-            world.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
+            world.hand.place(world.plant_context, X_WG, closed, direction_W=paths[0].direction_W)
             world.command("hand", world.hand.closing_command())
         else:
             X_WP = self._pregrasp(X_WG)
-            world.hand.place(plant_context, X_WP, direction_W=approach.direction_W)
+            world.hand.place(world.plant_context, X_WP, direction_W=approach.direction_W)
             world.command("hand", world.hand.opening_command())
         world.command("lift", np.zeros(2))
         world.simulator.Initialize()
         lift_clearance = partial(self._lift_clearance, instance)
         carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
         return Execution(world, target, moving, carrier)
-
-    def _handle(self, diagram: StationDiagram) -> FloatingHand:
-        return FloatingHand(diagram)

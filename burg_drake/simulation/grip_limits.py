@@ -128,8 +128,6 @@ class Grip:
         Raises:
             RuntimeError, SystemExit: from Drake.
         """
-        # Checks in a row. What slides under 1 % of excess load is faster by then.
-        steady_checks = 3
         self._context.SetTime(self._time)
         self._context.SetDiscreteState(self._state)
         self._world.simulator.Initialize()
@@ -146,7 +144,8 @@ class Grip:
                 if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
                 at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
-                if check * steps_per_check * self._step >= steady_from and at_rest >= steady_checks:
+                # What slides under 1 % of excess load is faster by the third check.
+                if check * steps_per_check * self._step >= steady_from and at_rest >= 3:
                     return True
             return True
         finally:
@@ -166,9 +165,8 @@ class Grip:
 
     def _is_at_rest(self, before: Array, after: Array) -> bool:
         """Whether the target has hardly moved in the hand from one look to the next."""
-        rest_speed = 0.002  # Metres per second.
         distance, angle = motion_in_hand(before, after)
-        return max(distance, angle * SLIP_LEVER) <= rest_speed * self._world.settings.poll
+        return max(distance, angle * SLIP_LEVER) <= 0.002 * self._world.settings.poll
 
     def _brake(self) -> None:
         """Stops the hand as gently as it was accelerated."""
@@ -183,14 +181,12 @@ class Grip:
 
     def _rest(self) -> None:
         """Waits until the target is at rest in the hand."""
-        rest_checks = 10  # Checks in a row at which the target is at rest.
-        max_checks = 50  # Checks after which the grip is loaded in any case.
         at_rest, X_GO = 0, self._current_X_GO()
-        for _ in range(max_checks):
+        for _ in range(50):  # then the grip is loaded in any case
             self._advance()
             before, X_GO = X_GO, self._current_X_GO()
             at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
-            if at_rest >= rest_checks:
+            if at_rest >= 10:
                 return
 
     def _advance(self) -> None:

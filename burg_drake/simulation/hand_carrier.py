@@ -13,20 +13,19 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
-from burg_drake.core import Array, InvalidInputError, inverse
+from burg_drake.core import Array, inverse
 from burg_drake.simulation.contacts import (
     BodyContact,
-    NamedBodies,
     RobotContactWatch,
+    collision_geometries,
     touched_bodies,
 )
 from burg_drake.simulation.settings import TrialSettings
-from burg_drake.simulation.trial_execution import HandSegment
-from burg_drake.simulation.trial_world import TrialWorld, collision_geometries
+from burg_drake.simulation.trial_execution import HandSegment, SteppedWorld
+from burg_drake.simulation.trial_world import TrialWorld
 from burg_drake.station import (
     ROBOT_MODELS,
     FloatingHand,
-    GraspMotion,
     MountedHand,
     StationDiagram,
     replace_meshes_by_pieces,
@@ -69,9 +68,8 @@ class HandLiftClearance:
         carried = {target, *station_diagram.robot_bodies}
         everything = {station_diagram.table, *station_diagram.free.values()}
         everything |= set(station_diagram.fixed.values())
-        query = self._query()
-        self._carried = self._boxes(query, carried)
-        self._others = self._boxes(query, everything - carried)
+        self._carried = self._boxes(carried)
+        self._others = self._boxes(everything - carried)
         manager = station_diagram.scene_graph.collision_filter_manager(
             station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
         )
@@ -122,17 +120,14 @@ class HandLiftClearance:
         port = self._diagram.scene_graph.get_query_output_port()
         return port.Eval(self._diagram.scene_graph.GetMyContextFromRoot(self._context))
 
-    def _boxes(
-        self, query: QueryObject, bodies: set[BodyIndex]
-    ) -> list[tuple[GeometryId, tuple[Array, Array]]]:
+    def _boxes(self, bodies: set[BodyIndex]) -> list[tuple[GeometryId, tuple[Array, Array]]]:
         """Collision geometries with the pose (4, 4) and half size (3,) of a box about each."""
-        inspector = query.inspector()
+        inspector = self._query().inspector()
         found = []
-        for index in sorted(bodies):
-            for geometry in self._plant.GetCollisionGeometriesForBody(self._plant.get_body(index)):
-                box = inspector.GetObbInGeometryFrame(geometry)
-                assert box is not None  # only half spaces have none
-                found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
+        for geometry in collision_geometries(self._plant, bodies):
+            box = inspector.GetObbInGeometryFrame(geometry)
+            assert box is not None  # only half spaces have none
+            found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
         return found
 
 
@@ -223,22 +218,7 @@ class LiftPath(NamedTuple):
     length: float
 
 
-class RobotWorld(NamedBodies, Protocol):
-    """Bodies of a world with a robot; see `StationDiagram`."""
-
-    @property
-    def fixed(self) -> Mapping[str, BodyIndex]: ...
-
-
-class HandWorld(PlacedRobot, Protocol):
-    """A world with the floating hand; see `TrialWorld`."""
-
-    @property
-    def settings(self) -> TrialSettings: ...
-    def X_WG(self) -> Array: ...
-
-
-W = TypeVar("W", bound=HandWorld)
+W = TypeVar("W", bound=SteppedWorld)
 
 
 class FloatingCarrier(ABC, Generic[W]):
@@ -248,8 +228,6 @@ class FloatingCarrier(ABC, Generic[W]):
     Args:
         world: that of a trial which has been brought to its start, with the joint along the first
             of all paths: the floating hand is at the grasp, or where the approach begins.
-        bodies: of that world.
-        time_step: of the engine [s].
         paths: of the hand from the grasp on, straight, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
         approach: the path to the grasp; None if the hand is there.
@@ -261,30 +239,28 @@ class FloatingCarrier(ABC, Generic[W]):
     def __init__(
         self,
         world: W,
-        bodies: RobotWorld,
-        time_step: float,
         paths: Sequence[LiftPath],
         lift_clearance: Callable[[], HandLiftClearance],
         approach: LiftPath | None,
         target: BodyIndex,
     ) -> None:
-        rest_checks = 1  # Checks between arrival and closing, in which the hand comes to rest.
         settings = world.settings
-        self._world, self._bodies = world, bodies
+        self._world = world
         self._lift_clearance = lift_clearance
-        self._hand = set(bodies.robot_bodies)
+        self._hand = set(world.robot)
         self.segments = tuple(
             HandSegment(*path, check_count(path.length, settings) + (number + 1 < len(paths)))
             for number, path in enumerate(paths)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._approach = approach
-        self.approach_steps = max(1, round(settings.poll / time_step))
+        self.approach_steps = max(1, round(settings.poll / world.engine.time_step))
         self.approach_checks = 0
         self._touches: RobotContactWatch | None = None
         if approach is not None:
-            self.approach_checks = check_count(approach.length, settings) + rest_checks
-            self._touches = RobotContactWatch(bodies, (), target)
+            # In one more interval, before it closes, the hand comes to rest.
+            self.approach_checks = check_count(approach.length, settings) + 1
+            self._touches = RobotContactWatch(world, (), target)
         self._number = 0 if approach is None else -1
         self._is_approaching = self._is_lifting = False
         self._X_WG_start = world.X_WG()
@@ -297,16 +273,15 @@ class FloatingCarrier(ABC, Generic[W]):
     def watch(self, contacts: list[BodyContact]) -> str:
         """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
         goes down with the target, or presses on it on its way to the grasp."""
-        max_descent = -1e-6  # z of a unit vector. Smaller values go down by more than rounding.
         if self._touches is not None:
             stop = self._touches.update(contacts, arrived=not self._is_approaching)
             if self._is_approaching:
                 return stop
-        fixed = set(self._bodies.fixed.values()) - {self._bodies.table}
-        if self._is_lifting and self.segments[self._number].direction_W[2] < max_descent:
-            fixed.add(self._bodies.table)
+        fixed = set(self._world.fixed.values()) - {self._world.table}
+        if self._is_lifting and self.segments[self._number].direction_W[2] < -1e-6:
+            fixed.add(self._world.table)
         hit = touched_bodies(contacts, self._hand, fixed)
-        return self._bodies.body_names[min(hit)] if hit else ""
+        return self._world.body_names[min(hit)] if hit else ""
 
     @abstractmethod
     def travelled(self) -> float:
@@ -323,8 +298,8 @@ class FloatingCarrier(ABC, Generic[W]):
             self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
 
-    def _enter(self, number: int) -> bool:
-        """Goes on in a segment; whether it begins."""
+    def _begin_segment(self, number: int) -> bool:
+        """Makes a segment the present one. Returns whether it was not yet."""
         self._is_lifting = True
         if number == self._number:
             return False
@@ -342,19 +317,10 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
     """
 
-    def __init__(
-        self,
-        world: TrialWorld,
-        paths: Sequence[LiftPath],
-        lift_clearance: Callable[[], HandLiftClearance],
-        approach: LiftPath | None,
-        target: BodyIndex,
-    ) -> None:
-        assert isinstance(world.hand, FloatingHand)
-        self._floating = world.hand
-        time_step = world.diagram.engine.time_step
-        super().__init__(world, world.diagram, time_step, paths, lift_clearance, approach, target)
-        self._plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+    @property
+    def _floating(self) -> FloatingHand:
+        assert isinstance(self._world.hand, FloatingHand)
+        return self._world.hand
 
     def approach(self) -> None:
         """Begins the way to the grasp; the speed is commanded from look to look."""
@@ -371,8 +337,8 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
         segment = self.segments[number]
-        if self._enter(number):
-            self._floating.set_lift_direction(self._plant_context, segment.direction_W)
+        if self._begin_segment(number):
+            self._floating.set_lift_direction(self._world.plant_context, segment.direction_W)
             self._world.simulator.Initialize()
         self._command_speed(segment.length, check, self._world.settings.poll)
 
@@ -383,14 +349,14 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
     def advance_to(self, time: float) -> None:
         """Steps; commands change only from look to look."""
         if self._is_approaching and self._approach is not None:
-            interval = self.approach_steps * self._world.diagram.engine.time_step
+            interval = self.approach_steps * self._world.engine.time_step
             check = round(self._world.context.get_time() / interval)
             self._command_speed(self._approach.length, check, interval)
         self._world.simulator.AdvanceTo(time)
 
     def travelled(self) -> float:
         """Position of the joint [m]."""
-        return self._floating.travelled(self._plant_context)
+        return self._floating.travelled(self._world.plant_context)
 
     def _command_speed(self, length: float, check: int, interval: float) -> None:
         """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
@@ -417,30 +383,3 @@ def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> b
 def check_count(length: float, settings: TrialSettings) -> int:
     """Looks on a path of a length [m]: as many to speed up as to brake."""
     return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))
-
-
-def lift_paths(motion: GraspMotion, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
-    """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
-
-    Args:
-        motion: where the hand goes.
-        X_WG: (4, 4) grasp in the world.
-        lift: length of the lift [m], in place of the motion's.
-
-    Returns:
-        One or two, each longer than 0.
-
-    Raises:
-        InvalidInputError: the hand would not move, or a length is not one.
-    """
-    height = motion.lift_height if lift is None else lift
-    if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
-        raise InvalidInputError(
-            f"lift is {height:g} m and retreat {motion.retreat:g} m; give a finite lift of 0 or"
-            " more, and above 0 if there is no retreat"
-        )
-    paths = (
-        LiftPath(-X_WG[:3, 2], motion.retreat),
-        LiftPath(motion.direction_W, height),
-    )
-    return tuple(path for path in paths if path.length > 0.0)

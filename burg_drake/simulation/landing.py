@@ -120,7 +120,6 @@ class BoardEdgeGuard:
             context: the plant's; its velocities change.
             bodies: free ones; those that are locked stay where they are.
         """
-        tolerance = 0.001  # Metres beyond the margin.
         for index in bodies:
             body = self._plant.get_body(index)
             X_WO = self._plant.EvalBodyPoseInWorld(context, body)
@@ -129,7 +128,7 @@ class BoardEdgeGuard:
             outwards = np.maximum(0.0, p_S.max(axis=0) - self._most)
             shift = np.append(inwards - outwards, 0.0)
             distance = np.linalg.norm(shift)
-            if distance > tolerance and not body.is_locked(context):
+            if distance > 0.001 and not body.is_locked(context):
                 direction = self._X_WS[:3, :3] @ shift / distance
                 V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, body)
                 V_WOcm = V_WO.Shift(X_WO.rotation() @ body.default_com())
@@ -164,11 +163,9 @@ def drop_onto_scene(
     Raises:
         RuntimeError, SystemExit: from Drake.
     """
-    tumbling_time = 1.2  # Seconds.
-    landing_time = 2.0  # Seconds.
     if len(falling) == len(scene.instances):
-        scene = _let_fall(scene, station, falling, shapes, margin, TUMBLING_ENGINE, tumbling_time)
-    return _let_fall(scene, station, falling, shapes, margin, LANDING_ENGINE, landing_time)
+        scene = _let_fall(scene, station, falling, shapes, margin, TUMBLING_ENGINE, 1.2)
+    return _let_fall(scene, station, falling, shapes, margin, LANDING_ENGINE, 2.0)
 
 
 def _let_fall(

@@ -8,25 +8,21 @@ complete world.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 import trimesh
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.export import lay_out
-from burg_drake.grasping import HandClearance
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.simulation.grasp_trial import MAX_KEPT_WORLDS, HandAloneTrial, HandTrial
+from burg_drake.simulation.grasp_trial import HandAloneTrial, HandTrial
 from burg_drake.simulation.hand_carrier import (
     FloatingCarrier,
-    HandLiftClearance,
     LiftPath,
     check_count,
 )
@@ -64,8 +60,6 @@ def check_objects(scene: Scene) -> None:
 
 
 def _check_object(library: ObjectLibrary, name: str) -> None:
-    min_points = 4  # Points of a piece that has a volume.
-    max_flat_ratio = 1e-7  # Thickness over the largest extent of a piece without volume.
     entry: ObjectEntry = library.entry(name)
     if entry.contact.kind == "primitive" and entry.contact.primitive is not None:
         return
@@ -81,7 +75,7 @@ def _check_object(library: ObjectLibrary, name: str) -> None:
         except Exception as error:  # the reader raises whatever it stumbles over
             raise library.damaged(path) from error
         extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        if len(points) < min_points or extents[-1] <= max_flat_ratio * extents[0]:
+        if len(points) < 4 or extents[-1] <= 1e-7 * extents[0]:
             raise InvalidInputError(
                 f"object {name!r}: convex piece {path.name} has no volume ({len(points)} points),"
                 " which engine mujoco needs; build the object again"
@@ -123,28 +117,18 @@ class WorldPicture:
 
 class MujocoCarrier(FloatingCarrier[MujocoWorld]):
     """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`
-    and `trials.LiftCarrier`. Here commands change at every step.
+    and `LiftCarrier`. Here commands change at every step.
 
     Args:
         world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
     """
 
-    def __init__(
-        self,
-        world: MujocoWorld,
-        paths: Sequence[LiftPath],
-        lift_clearance: Callable[[], HandLiftClearance],
-        approach: LiftPath | None,
-        target: BodyIndex,
-    ) -> None:
-        time_step = world.engine.time_step
-        super().__init__(world, world, time_step, paths, lift_clearance, approach, target)
-        self._path = approach
-        self._step: int | None = None
+    _path: LiftPath | None = None
+    _step: int | None = None
 
     def approach(self) -> None:
         """Begins the way to the grasp."""
-        self._is_approaching, self._step = True, 0
+        self._is_approaching, self._path, self._step = True, self._approach, 0
 
     def close(self) -> None:
         """Closes the fingers; without an approach they have been closing from the start."""
@@ -157,7 +141,7 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
         """Commands one interval; where another segment follows, the hand comes to rest in one
         more."""
         segment = self.segments[number]
-        if self._enter(number):
+        if self._begin_segment(number):
             self._world.turn_lift(segment.direction_W)
         self._path = LiftPath(segment.direction_W, segment.length)
         self._step = check * self.approach_steps
@@ -239,22 +223,9 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
             )
         self.failures = (*self.failures, mujoco.FatalError)
         check_objects(scene)
-        self._plain = build_station_diagram(scene, station, robot="hand")
-        self._picture: WorldPicture | None = None
-        if meshcat is not None:
-            self._picture = WorldPicture(scene, station, meshcat)
+        super().__init__(scene, station, engine, settings=settings, motion=motion, lock=lock)
+        self._picture = None if meshcat is None else WorldPicture(scene, station, meshcat)
         self._layout, self._parts = lay_out(scene, station), read_hand(self._plain)
-        super().__init__(
-            scene,
-            station,
-            engine,
-            settings=settings,
-            clearance=HandClearance(self._plain),
-            motion=motion,
-            lock=lock,
-        )
-        kept = lru_cache(maxsize=MAX_KEPT_WORLDS)
-        self._lift_clearance = kept(partial(HandLiftClearance, self._plain))
 
     @property
     def diagram(self) -> StationDiagram:
@@ -276,7 +247,7 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
         paths = self.lift_paths(X_WG, lift)
 
         def begin(world: MujocoWorld) -> Execution:
-            self._enter(world)
+            self._use_world(world)
             approach, target = self._approach(X_WG), world.free[instance]
             X_WF = X_WG if approach is None else self._pregrasp(X_WG)
             closed = self.closed_before_contact(instance, X_WG) if approach is None else None

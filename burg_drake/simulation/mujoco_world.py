@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,23 +63,23 @@ def load_mujoco() -> Any:
     """
     require_mujoco()
     module = importlib.import_module("mujoco")
-    module.set_mju_user_warning(_ignore)
+    module.set_mju_user_warning(lambda message: None)
     return module
 
 
-def _ignore(message: str) -> None:
-    """Takes a warning."""
-
-
-@dataclass(frozen=True, eq=False)
 class ModelIndex:
-    """Bodies, and geoms, as numbers.
+    """Numbers of bodies, geoms and joints in a model.
+
+    Args:
+        model: MuJoCo's.
+        parts: of the hand.
 
     Attributes:
         objects: bodies of what can move, by the names of instances.
         fixed: bodies of what cannot, by name, the table too.
         geoms: of both, by name.
         pairs: with the table's plane, by name.
+        table: body of the table's box.
         carrier, hand, fingers: bodies.
         spheres: geoms of each finger's pad.
         finger_geoms: geoms of both fingers.
@@ -89,76 +89,38 @@ class ModelIndex:
         finger_qpos, finger_dofs, finger_servos: of both fingers.
     """
 
-    objects: dict[str, int]
-    fixed: dict[str, int]
-    geoms: dict[str, Indices]
-    pairs: dict[str, Indices]
-    carrier: int
-    hand: int
-    fingers: tuple[int, int]
-    spheres: tuple[Indices, Indices]
-    finger_geoms: Indices
-    palm: Indices
-    lift_joint: int
-    lift_qpos: int
-    lift_dof: int
-    lift_place: int
-    lift_speed: int
-    finger_qpos: Indices
-    finger_dofs: Indices
-    finger_servos: Indices
-
-    @property
-    def table(self) -> int:
-        """Body of the table's box."""
-        return self.fixed[MjcfBodyNames.table]
-
-    @classmethod
-    def of(cls, model: Any, parts: HandDescription) -> ModelIndex:
-        """Looks them up by their names."""
+    def __init__(self, model: Any, parts: HandDescription) -> None:
         bodies = {model.body(k).name: k for k in range(model.nbody)}
         geoms = [model.geom(k).name for k in range(model.ngeom)]
         pairs = [model.pair(k).name for k in range(model.npair)]
-        objects, fixed = (
-            _name_bodies(bodies, word) for word in (MjcfBodyNames.object, MjcfBodyNames.fixed)
-        )
-        named = {name: f"{MjcfBodyNames.object} {name} " for name in objects}
-        named |= {name: f"{MjcfBodyNames.fixed} {name} " for name in fixed}
-        one, other = (finger.name for finger in parts.fingers)
-        joints = [model.joint(link_name(f.joint)) for f in parts.document.fingers]
-        lift = model.joint(LIFT_JOINT.name)
+        self.objects = _name_bodies(bodies, MjcfBodyNames.object)
+        self.fixed = _name_bodies(bodies, MjcfBodyNames.fixed)
+        self.table = self.fixed[MjcfBodyNames.table]
+        prefixes = {name: f"{MjcfBodyNames.object} {name} " for name in self.objects}
+        self.pairs = {n: _numbers_with_prefix(pairs, words) for n, words in prefixes.items()}
+        prefixes |= {name: f"{MjcfBodyNames.fixed} {name} " for name in self.fixed}
+        self.geoms = {n: _numbers_with_prefix(geoms, words) for n, words in prefixes.items()}
+        names = [finger.name for finger in parts.fingers]
+        self.carrier = bodies[HAND_CARRIER_BODY]
+        self.hand = bodies[link_name(parts.body.name)]
+        self.fingers = [bodies[link_name(name)] for name in names]
+        self.spheres = [_numbers_with_prefix(geoms, f"{PAD_SPHERE_PREFIX} {n} ") for n in names]
         of_fingers = [
-            f"{word} {name} "
-            for name in (one, other)
+            _numbers_with_prefix(geoms, f"{word} {name} ")
+            for name in names
             for word in (PAD_SPHERE_PREFIX, PAD_BACKING_PREFIX, HAND_SHAPE_PREFIX)
         ]
-        return cls(
-            objects=objects,
-            fixed=fixed,
-            geoms={name: _numbers_with_prefix(geoms, words) for name, words in named.items()},
-            pairs={name: _numbers_with_prefix(pairs, named[name]) for name in objects},
-            carrier=bodies[HAND_CARRIER_BODY],
-            hand=bodies[link_name(parts.body.name)],
-            fingers=(bodies[link_name(one)], bodies[link_name(other)]),
-            spheres=(
-                _numbers_with_prefix(geoms, f"{PAD_SPHERE_PREFIX} {one} "),
-                _numbers_with_prefix(geoms, f"{PAD_SPHERE_PREFIX} {other} "),
-            ),
-            finger_geoms=np.concatenate(
-                [_numbers_with_prefix(geoms, words) for words in of_fingers]
-            ),
-            palm=_numbers_with_prefix(geoms, f"{HAND_SHAPE_PREFIX} {parts.body.name} "),
-            lift_joint=int(lift.id),
-            lift_qpos=int(lift.qposadr[0]),
-            lift_dof=int(lift.dofadr[0]),
-            lift_place=int(model.actuator(LIFT_JOINT.name).id),
-            lift_speed=int(model.actuator(LIFT_JOINT.speed).id),
-            finger_qpos=np.array([joint.qposadr[0] for joint in joints]),
-            finger_dofs=np.array([joint.dofadr[0] for joint in joints]),
-            finger_servos=np.array(
-                [model.actuator(link_name(f.joint)).id for f in parts.document.fingers]
-            ),
-        )
+        self.finger_geoms = np.concatenate(of_fingers)
+        self.palm = _numbers_with_prefix(geoms, f"{HAND_SHAPE_PREFIX} {parts.body.name} ")
+        lift = model.joint(LIFT_JOINT.name)
+        self.lift_joint, self.lift_qpos = int(lift.id), int(lift.qposadr[0])
+        self.lift_dof = int(lift.dofadr[0])
+        self.lift_place = int(model.actuator(LIFT_JOINT.name).id)
+        self.lift_speed = int(model.actuator(LIFT_JOINT.speed).id)
+        joints = [link_name(finger.joint) for finger in parts.document.fingers]
+        self.finger_qpos = np.array([model.joint(name).qposadr[0] for name in joints])
+        self.finger_dofs = np.array([model.joint(name).dofadr[0] for name in joints])
+        self.finger_servos = np.array([model.actuator(name).id for name in joints])
 
 
 def _name_bodies(bodies: dict[str, int], word: str) -> dict[str, int]:
@@ -234,7 +196,7 @@ class MujocoWorld:
     Attributes:
         model, data: MuJoCo's.
         engine: as given.
-        settings: as given, but for `STEADY_TIME`.
+        settings: as given, but `steady_time` is at least 0.1 s.
         free, standing, fixed: bodies by name: what moves, what could but does not, and what never
             does; the table is a fixed one.
         table: its body.
@@ -262,12 +224,12 @@ class MujocoWorld:
         alone: str | None = None,
         shown: Callable[[MujocoWorld], None] | None = None,
     ) -> None:
-        min_steady_time = 0.1  # Seconds. Half of it wrongly decides 1 of 60 grasps early.
         scene, station = as_scene(scene), as_station(station)
         self._mj = mj = load_mujoco()
         self._scene, self._station, self._parts = scene, station, hand
         self._shown = shown
-        steady_time = max(settings.steady_time, min_steady_time)
+        # Half of 0.1 s wrongly decides 1 of 60 grasps early.
+        steady_time = max(settings.steady_time, 0.1)
         self.settings = replace(settings, steady_time=steady_time)
         self.engine, step = engine, engine.time_step
         self.hand_document = hand.document
@@ -281,7 +243,7 @@ class MujocoWorld:
             ) from error
         self.data: Any = mj.MjData(self.model)
         self._scratch: Any = mj.MjData(self.model)
-        self._index = index = ModelIndex.of(self.model, hand)
+        self._index = index = ModelIndex(self.model, hand)
         could_move = {name: index.objects[name] for name in scene.instances}
         moving = (alone,) if alone is not None else tuple(scene.instances)
         self.free = {name: BodyIndex(could_move[name]) for name in moving}
@@ -384,11 +346,6 @@ class MujocoWorld:
         """Since the start of the trial [s]."""
         return float(self.data.time)
 
-    @property
-    def is_finite(self) -> bool:
-        """Whether the state is one."""
-        return bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
-
     def look(self) -> list[BodyContact]:
         """All that touch, by pairs of bodies; areas are those of the pads.
 
@@ -436,13 +393,9 @@ class MujocoWorld:
         """Position of the carrier's joint [m]."""
         return float(self.data.qpos[self._index.lift_qpos])
 
-    def X_WH(self) -> Array:
-        """(4, 4) hand body."""
-        return self.X_WB(BodyIndex(self._index.hand))
-
     def X_WG(self) -> Array:
         """(4, 4) grasp frame."""
-        X_WG: Array = self.X_WH() @ self._station.hand.X_HG.matrix()
+        X_WG: Array = self.X_WB(self.robot_bodies[0]) @ self._station.hand.X_HG.matrix()
         return X_WG
 
     def X_WB(self, body: BodyIndex) -> Array:

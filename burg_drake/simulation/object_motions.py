@@ -46,7 +46,7 @@ class MotionTracker:
     def __init__(self, world: PlacedBodies, bodies: Iterable[BodyIndex]) -> None:
         self._world = world
         self._start = {index: self._pose(index) for index in bodies}
-        self._last = {index: self._center(index) for index in self._start}
+        self._last = {index: self._world.center(index) for index in self._start}
         self._height = {index: self._own_height(index) for index in self._start}
         self._overturned: set[BodyIndex] = set()
         self.farthest = dict.fromkeys(self._start, 0.0)
@@ -65,7 +65,7 @@ class MotionTracker:
             self.turned[index] = max(self.turned[index], angle)
             if self._is_tilted(index) and self._is_higher_or_lower(index):
                 self._overturned.add(index)
-            center = self._center(index)
+            center = self._world.center(index)
             largest = max(largest, float(np.linalg.norm(center - self._last[index])))
             self._last[index] = center
         return largest
@@ -81,10 +81,8 @@ class MotionTracker:
 
     def _is_tilted(self, index: BodyIndex) -> bool:
         """Whether the axis that was upright no longer is."""
-        # Radians between the axis that was upright and the vertical.
-        topple_angle = math.radians(45.0)
         cosine = self._pose(index)[0][2] @ self._start[index][0][2]
-        return bool(cosine < math.cos(topple_angle))
+        return bool(cosine < math.cos(math.radians(45.0)))
 
     def _is_higher_or_lower(self, index: BodyIndex) -> bool:
         """Whether the centre of mass is at another height above the body's lowest point."""
@@ -99,7 +97,7 @@ class MotionTracker:
         """Of the centre of mass above the body's lowest point [m]; what is below does not count."""
         R_WB, p_WB = self._pose(index)
         lowest = (self._world.corners(index) @ R_WB[2]).min() + p_WB[2]
-        return float(self._center(index)[2] - lowest)
+        return float(self._world.center(index)[2] - lowest)
 
     def _since_start(self, index: BodyIndex) -> tuple[float, float]:
         """How far the farthest point of a body is from where it was [m], and its rotation [rad].
@@ -116,9 +114,6 @@ class MotionTracker:
         """Rotation (3, 3) and position (3,) of a body in the world [m]."""
         X_WB = self._world.X_WB(index)
         return X_WB[:3, :3], X_WB[:3, 3]
-
-    def _center(self, index: BodyIndex) -> Array:
-        return self._world.center(index)
 
 
 SLIP_LEVER = 0.01
@@ -143,7 +138,7 @@ class GripMotion:
         """Both fingers hold the target, as it was at the last look."""
         self._X_GO_grip = self._X_GO_last
 
-    def look(self, X_GO: Array, *, others_rest: bool) -> None:
+    def record(self, X_GO: Array, *, others_rest: bool) -> None:
         """Takes down where the target is.
 
         Args:
@@ -158,7 +153,7 @@ class GripMotion:
         else:
             self._motions.clear()
 
-    def begin_again(self) -> None:
+    def reset(self) -> None:
         """From now on only later looks tell what is to come."""
         self._motions.clear()
 
@@ -194,26 +189,27 @@ class GripMotion:
         """
         n = self._settings.steady_polls
         before, now = sum(self._motions[-2 * n : -n]), sum(self._motions[-n:])
-        enough = len(self._motions) >= 2 * n
-        return enough and now <= before and self._creep(time) <= self._settings.creep_distance
+        if len(self._motions) < 2 * n or now > before:
+            return False
+        return self._further_creep(time) <= self._settings.creep_distance
 
-    def stays_on_one_side(self, time: float) -> bool:
+    def is_verdict_stable(self, time: float) -> bool:
         """Whether the target is beyond the limits for good, or will not come there, whatever creep
         still adds.
 
         Args:
             time: that is left at most [s].
         """
-        settings, creep = self._settings, self._creep(time)
+        settings, creep = self._settings, self._further_creep(time)
         slip, tilt = self.since_grip
         slid = creep * (1.0 + slip / SLIP_LEVER)  # turning moves what has slid by its distance
         turned = creep / SLIP_LEVER
         if slip - slid > settings.slip_limit or tilt - turned > settings.tilt_limit:
             return True
-        most = min(math.pi, tilt + turned)
-        return slip + slid <= settings.slip_limit and most <= settings.tilt_limit
+        max_tilt = min(math.pi, tilt + turned)
+        return slip + slid <= settings.slip_limit and max_tilt <= settings.tilt_limit
 
-    def _creep(self, time: float) -> float:
+    def _further_creep(self, time: float) -> float:
         """How far the target gets in a time [s] if it goes on as during the last looks [m]."""
         recent = self._motions[-self._settings.steady_polls :]
         return sum(recent) / len(recent) * (time / self._settings.poll)

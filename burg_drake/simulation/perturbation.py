@@ -16,7 +16,7 @@ from burg_drake.simulation.settings import Noise
 
 
 @dataclass(frozen=True, eq=False)
-class Perturbed:
+class PerturbedTrial:
     """What a perturbed trial is executed with.
 
     Attributes:
@@ -62,7 +62,7 @@ class SuccessRate:
 
 def perturb(
     X_OG: Array, mass: float, friction: float, noise: Noise, *, seed: int, grasp: str, repeat: int
-) -> Perturbed:
+) -> PerturbedTrial:
     """Draws one perturbed repeat of a trial.
 
     The draw follows from seed, grasp and number of the repeat alone. The same ones with other
@@ -84,7 +84,7 @@ def perturb(
         Rotation.from_rotvec(noise.rotation * turn).as_matrix(), noise.translation * p_GG
     )
     still = noise.translation == noise.rotation == 0.0
-    return Perturbed(
+    return PerturbedTrial(
         X_OG=X_OG if still else X_OG @ X_GG,
         friction=friction * math.exp(noise.friction * log_friction) if noise.friction else None,
         mass=mass * math.exp(noise.mass * log_mass) if noise.mass else None,

@@ -5,9 +5,9 @@ to its equilibrium directly: a body that has slowed down has passed its equilibr
 (dynamic relaxation, P. Cundall 1976).
 
 Rolling resistance is a moment of at most c R N, for a radius R pressed on with N, so that balls
-and lying cylinders stay on slopes up to c. Below that limit the moment is that of a damped spring from
-where the body stopped: the elastic-plastic model (C) of Ai, Chen, Rotter and Ooi, "Assessment of
-rolling resistance models in discrete element simulations", Powder Technology 206, 2011.
+and lying cylinders stay on slopes up to c. Below that limit the moment is that of a damped spring
+from where the body stopped: the elastic-plastic model (C) of Ai, Chen, Rotter and Ooi, "Assessment
+of rolling resistance models in discrete element simulations", Powder Technology 206, 2011.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ ZERO_VELOCITY = SpatialVelocity(np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
-class Relaxed:
+class RelaxationResult:
     """Where relaxing ended.
 
     Attributes:
@@ -131,7 +131,7 @@ def relax(
     moving: Iterable[str],
     time_limit: float,
     before_window: Callable[[Context, Collection[BodyIndex]], None] | None = None,
-) -> Relaxed:
+) -> RelaxationResult:
     """Steps objects of a scene, from where the documents place everything, until they are calm.
 
     Objects that touch each other come to rest together; once they are, they are left alone.
@@ -166,12 +166,12 @@ class _Island:
 
 class _Relaxation:
     def __init__(self, built: StationDiagram, loose: Set[BodyIndex]) -> None:
-        rolling_share = 0.5  # The other half of the rolling resistance is a margin.
         self._built, self._plant = built, built.plant
         self._simulator = Simulator(built.diagram)
         self._root = self._simulator.get_mutable_context()
         self.context = self._plant.GetMyMutableContextFromRoot(self._root)
-        resist_rolling(built, self._simulator, share=rolling_share)
+        # The other half of the rolling resistance is a margin.
+        resist_rolling(built, self._simulator, share=0.5)
         found = contact_islands(built)
         self._islands = [_Island(bodies) for bodies in found if not loose.isdisjoint(bodies)]
         self._alone = {bodies[0] for bodies in found if len(bodies) == 1}
@@ -203,7 +203,7 @@ class _Relaxation:
             self._inspect(island)
         return len(self._islands)
 
-    def result(self) -> Relaxed:
+    def result(self) -> RelaxationResult:
         """Where everything is now."""
         built, together = self._built, self._loose - self._alone
         X_WO = {}
@@ -213,11 +213,10 @@ class _Relaxation:
             elif index not in self._fallen:
                 body = self._plant.get_body(index)
                 X_WO[name] = body.EvalPoseInWorld(self.context).GetAsMatrix4()
-        return Relaxed(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
+        return RelaxationResult(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
 
     def _inspect(self, island: _Island) -> None:
         """Takes what has fallen out of an island, and freezes it once it is calm."""
-        calm_windows = 2  # Windows in succession.
         for index in [i for i in island.bodies if is_below(self._built, self.context, i)]:
             island.bodies.remove(index)
             self._fallen.add(index)
@@ -225,7 +224,7 @@ class _Relaxation:
         limit = CALM_SPEED if self._alone.issuperset(island.bodies) else GROUP_CALM_SPEED
         calm = all(is_slower(self._speed[index], limit) for index in island.bodies)
         island.calm = island.calm + 1 if calm else 0
-        if island.calm == calm_windows:
+        if island.calm == 2:
             self._islands.remove(island)
             freeze_bodies(self._built, self._root, island.bodies)
 

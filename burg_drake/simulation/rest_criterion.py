@@ -59,7 +59,7 @@ class BodySpeed:
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettlingResult:
     """How settling ended.
 
     Attributes:
@@ -84,7 +84,7 @@ def settle(
     time_limit: float,
     criterion: RestCriterion = RestCriterion(),
     before_poll: Callable[[], None] | None = None,
-) -> Settled:
+) -> SettlingResult:
     """Advances a simulator until bodies are at rest, or time is up.
 
     Args:
@@ -122,7 +122,7 @@ def settle(
         if len(recent) == needed and not any(recent):
             break
     moved = {index: speed for moving in recent for index, speed in moving.items()}
-    return Settled(simulator.get_context().get_time() - start, moved)
+    return SettlingResult(simulator.get_context().get_time() - start, moved)
 
 
 def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:

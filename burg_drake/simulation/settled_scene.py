@@ -73,8 +73,8 @@ def settle_scene(
     """Simulates the objects of a scene until they are at rest.
 
     Background objects and the station's obstacles stay where they are. The robot is left out. What
-    has fallen below the table's top is taken out of the simulation. Turning is braked a little, see
-    `BRAKING_TIME`; what is at rest does not notice.
+    has fallen below the table's top is taken out of the simulation. Turning is braked a little,
+    with a time constant of 0.1 s; what is at rest does not notice.
 
     Example::
 
@@ -137,9 +137,6 @@ def _bring_to_rest(
     progress: Callable[[float, int], None] | None,
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene once it is at rest in the world of its own diagram, and what will not rest."""
-    relaxing_time = 1.0  # Seconds.
-    max_rounds = 4  # Objects may touch others after each round, so the diagram is built again.
-    max_pace_ratio = 0.9  # Objects that creep must get slower by this factor in each round.
     suspects: frozenset[str] | None = None
     pace = np.inf
     for rounds in itertools.count():
@@ -152,16 +149,18 @@ def _bring_to_rest(
         before = scene
         if rounds == 0:
             reduce_friction(built)
-            relaxed = relax(built, predicted.moving, relaxing_time)
+            relaxed = relax(built, predicted.moving, time_limit=1.0)
             scene = placed_scene(built, relaxed.X_WO, exact=relaxed.together)
         else:
             beside = touching_bodies(built, built.free.values())
             exact = [name for name in predicted.doubtful if built.free[name] in beside]
             scene = placed_scene(built, predicted.X_WO, exact)
         suspects = predicted.doubtful & scene.instances.keys()
-        goes_on = rounds <= 1 or predicted.pace < max_pace_ratio * pace
+        # Objects that creep must get slower by 10 % in each round.
+        goes_on = rounds <= 1 or predicted.pace < 0.9 * pace
         stays = rounds > 0 and scene.document == before.document  # the first look is a short one
-        if rounds == max_rounds or not goes_on or stays:
+        # Objects may touch others after each round, so the diagram is built again.
+        if rounds == 4 or not goes_on or stays:
             break
         pace = predicted.pace
     return scene, predicted.moving

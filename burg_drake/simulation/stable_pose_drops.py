@@ -15,9 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import ProximityProperties, RoleAssign
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
@@ -32,6 +30,7 @@ from burg_drake.objects import (
     primitive_mesh,
 )
 from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.contacts import assign_friction
 from burg_drake.simulation.rest_criterion import settle
 from burg_drake.station import (
     Engine,
@@ -45,7 +44,7 @@ from burg_drake.station import (
 
 
 class DropSettings:
-    """Drop settings."""
+    """How objects are dropped."""
 
     tilt = np.deg2rad(2.0)  # Radians. Tilt of an object when it is dropped, as by a careful hand.
     height = 5e-4  # Metres from the table to the lowest point of the object.
@@ -106,12 +105,10 @@ class DropTest:
         self._body.SetSpatialInertiaInBodyFrame(
             plant_context,
             SpatialInertia.MakeFromCentralInertia(
-                mass,
-                np.array(properties.center_of_mass),
-                RotationalInertia(*(mass * moments)),
+                mass, np.array(properties.center_of_mass), RotationalInertia(*(mass * moments))
             ),
         )
-        self._set_friction()
+        assign_friction(self.built, self._default, [self._body.index()], DropSettings.friction)
         self._simulator = Simulator(self.built.diagram, self._default.Clone())
 
     def run(self, X_SO: Array, side: float) -> DropResult:
@@ -168,21 +165,6 @@ class DropTest:
             x, y, z = X_WO.translation()
             X_WO.set_translation([x, y, z + depth + DropSettings.height])
             self.built.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, self._body, X_WO)
-
-    def _set_friction(self) -> None:
-        graph, plant = self.built.scene_graph, self.built.plant
-        graph_context = graph.GetMyMutableContextFromRoot(self._default)
-        inspector = graph.model_inspector()
-        for geometry in plant.GetCollisionGeometriesForBody(self._body):
-            properties = ProximityProperties(inspector.GetProximityProperties(geometry))
-            properties.UpdateProperty(
-                "material",
-                "coulomb_friction",
-                CoulombFriction(DropSettings.friction, DropSettings.friction),
-            )
-            graph.AssignRole(
-                graph_context, plant.get_source_id(), geometry, properties, RoleAssign.kReplace
-            )
 
 
 def _build_drop_diagram(library: ObjectLibrary, name: str) -> StationDiagram:
@@ -273,13 +255,12 @@ def _drop_all_poses(
 
 def _drop_pose(drop: DropTest, classes: PoseClasses, k: int) -> _DropOutcome:
     tilt_count = 4  # Drops of each pose, tilted to evenly spread sides.
-    max_resumes = 2  # Extensions of the time limit for objects that topple.
     X_SO, residual = classes.poses[k].X_SO.matrix(), 0.0
     weakest = weakest_side(classes.landscape, X_SO[:3, :3], drop.tilt)
     for side in weakest + 2.0 * np.pi * np.arange(tilt_count) / tilt_count:
         dropped = drop.run(X_SO, float(side))
         found = classes.find(dropped.down)
-        for _ in range(max_resumes):
+        for _ in range(2):  # more time for objects that topple
             if dropped.at_rest or (found is not None and found[0] == k):
                 break
             dropped = drop.resume()

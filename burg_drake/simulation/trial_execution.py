@@ -17,11 +17,12 @@ from burg_drake.core import Array, Margins, Outcome, inverse
 from burg_drake.simulation.contacts import (
     NO_FINGER_CONTACT,
     BodyContact,
+    NamedBodies,
     finger_contact,
     is_touched_from_outside,
     touched_bodies,
 )
-from burg_drake.simulation.object_motions import GripMotion, MotionTracker
+from burg_drake.simulation.object_motions import GripMotion, MotionTracker, PlacedBodies
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_result import TrialResult
 from burg_drake.station import Engine, Hand
@@ -123,16 +124,19 @@ class OtherTouched(Exception):
     """In a world of the target alone, target or robot meet something else that could move."""
 
 
-class SteppedWorld(Protocol):
-    """A world that is stepped, by whatever engine, as far as the phases have to know it.
+class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
+    """A world in which trials run, of any engine.
 
     Attributes:
         settings: phases of a trial.
         engine: how it is stepped.
-        free, standing: bodies by name: what can move, and what could in another world.
+        free, standing, fixed: bodies by name: what can move, what could in another world, and what
+            never does, the table among it.
         robot: all bodies of the robot.
         fingers: of these the fingers.
         hand_document: the hand.
+        robot_meets_hull: whether, in a world of the target alone, parts of the robot meet a hull in
+            its place.
     """
 
     settings: TrialSettings
@@ -140,15 +144,17 @@ class SteppedWorld(Protocol):
     @property
     def engine(self) -> Engine: ...
     @property
-    def free(self) -> Mapping[str, BodyIndex]: ...
-    @property
     def standing(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def fixed(self) -> Mapping[str, BodyIndex]: ...
     @property
     def robot(self) -> AbstractSet[BodyIndex]: ...
     @property
     def fingers(self) -> tuple[BodyIndex, BodyIndex]: ...
     @property
     def hand_document(self) -> Hand: ...
+    @property
+    def robot_meets_hull(self) -> bool: ...
 
     @property
     def time(self) -> float:
@@ -163,16 +169,16 @@ class SteppedWorld(Protocol):
         """(4, 4) grasp frame."""
         ...
 
-    def X_WB(self, body: BodyIndex) -> Array:
-        """(4, 4) of a body."""
+    def robot_positions(self, model: str) -> Array | None:
+        """Of one of `ROBOT_MODELS`, in the order of a station diagram; None if there is none."""
         ...
 
-    def center(self, body: BodyIndex) -> Array:
-        """Centre of mass (3,) of a body in the world [m]."""
+    def is_usable(self) -> bool:
+        """Whether trials can begin in it."""
         ...
 
-    def corners(self, body: BodyIndex) -> Array:
-        """(N, 3) corners of the convex hull of a free object in its frame [m]."""
+    def invalidate(self) -> None:
+        """Has the next trial prepare it from scratch."""
         ...
 
     def look(self) -> list[BodyContact]:
@@ -223,14 +229,13 @@ class Execution:
         self._carrier = carrier
         self._settings = world.settings
         self._target = target
-        self._itself = {name: index for name, index in world.free.items() if index == target}
         self._others = {name: index for name, index in world.free.items() if index != target}
-        self._still = set(world.free.values()) - moving
+        self._locked = set(world.free.values()) - moving
         self._path_length = sum(segment.length for segment in carrier.segments)
         self._direction = carrier.segments[0].direction_W
         self._center_start = self._center()
         self._followed = 0.0
-        self._moved = self._displacements(self._others.values())
+        self._others_motion = MotionTracker(self._world, self._others.values())
         self._pushed: dict[str, float] = {}
         self.contact = NO_FINGER_CONTACT
         self._in_hand = GripMotion(self._settings, self.X_GO())
@@ -254,23 +259,23 @@ class Execution:
             outcome = phase()
             if outcome is not None:
                 return self.result(outcome)
-        return self.result(self.held())
+        return self.result(self.outcome_if_held())
 
     def approach(self) -> Outcome | None:
         """Brings the hand to the grasp; None if nothing fixed is in its way."""
         carrier = self._carrier
         if not carrier.approach_checks:
             return None
-        target = self._displacements(self._itself.values())
+        target = MotionTracker(self._world, [self._target])
         carrier.approach()
         for _ in range(carrier.approach_checks):
             self.advance(carrier.approach_steps)
-            target.update(self._still)
+            target.update(self._locked)
             if self._blocker:
                 break
-        self._pushed = self._of_others(self._moved.farthest) | _by_name(
-            self._itself, target.farthest
-        )
+        name = next(name for name, index in self._world.free.items() if index == self._target)
+        self._pushed = self._by_name_of_others(self._others_motion.farthest)
+        self._pushed[name] = target.farthest[self._target]
         return Outcome.BLOCKED if self._blocker else None
 
     def close(self) -> Outcome | None:
@@ -305,7 +310,7 @@ class Execution:
         carrier = self._carrier
         last = len(carrier.segments) - 1
         for number, segment in enumerate(carrier.segments):
-            self._turn(segment)
+            self._start_segment(segment)
             for check in range(segment.checks):
                 carrier.lift(number, check)
                 self.advance()
@@ -318,9 +323,9 @@ class Execution:
                     and carrier.carries_full_load(check)
                     and self._is_decided(segment)
                 ):
-                    return self.held()
+                    return self.outcome_if_held()
         carrier.stop()
-        if self.contact.both and self.followed() >= MIN_LIFT_SHARE * self._path_length:
+        if self.contact.both and self.distance_followed() >= MIN_LIFT_SHARE * self._path_length:
             return None
         return Outcome.SLIPPED
 
@@ -330,7 +335,7 @@ class Execution:
         Unless the whole trial is asked for, the end is early when the grip is steady.
         """
         settings = self._settings
-        self._in_hand.begin_again()
+        self._in_hand.reset()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
             if self._blocker:
@@ -339,21 +344,21 @@ class Execution:
                 return Outcome.DROPPED
             if self._world.engine.whole_trial:
                 continue
-            if self._in_hand.is_steady and self._in_hand.stays_on_one_side(settings.hold_time):
+            if self._in_hand.is_steady and self._in_hand.is_verdict_stable(settings.hold_time):
                 break
         return None if self.contact.both else Outcome.DROPPED
 
-    def held(self) -> Outcome:
+    def outcome_if_held(self) -> Outcome:
         """The outcome of a target that is held to the end."""
         if self._in_hand.is_beyond_limits:
             return Outcome.LIFTED_TURNED
-        disturbed = _largest(self._moved.farthest) > self._settings.disturbance
+        disturbed = _largest(self._others_motion.farthest) > self._settings.disturbance
         return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
 
-    def _turn(self, segment: HandSegment) -> None:
+    def _start_segment(self, segment: HandSegment) -> None:
         """From now on the way of the target counts along a segment."""
         if segment.direction_W is not self._direction:
-            self._followed, self._center_start = self.followed(), self._center()
+            self._followed, self._center_start = self.distance_followed(), self._center()
             self._direction = segment.direction_W
 
     def _is_decided(self, last: HandSegment) -> bool:
@@ -374,9 +379,9 @@ class Execution:
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
         left = last.length - self._carrier.travelled()
-        if self.followed() + left < MIN_LIFT_SHARE * self._path_length:
+        if self.distance_followed() + left < MIN_LIFT_SHARE * self._path_length:
             return False
-        if not in_hand.stays_on_one_side(time):
+        if not in_hand.is_verdict_stable(time):
             return False
         self._path_is_blocked = not self._carrier.is_free_ahead()
         if not self._path_is_blocked:
@@ -397,19 +402,19 @@ class Execution:
         self._steps += self._steps_per_check if steps is None else steps
         time = self._time()
         while True:
-            state = self._world.state() if self._still else None
+            state = self._world.state() if self._locked else None
             self._carrier.advance_to(time)
             if not math.isfinite(self._center()[2]):
                 raise RuntimeError(f"the state is not finite at {time:.3f} s")
             contacts = self._world.look()
-            moving = self._world.robot | (set(self._world.free.values()) - self._still)
-            found = touched_bodies(contacts, moving, self._still)
+            moving = self._world.robot | (set(self._world.free.values()) - self._locked)
+            found = touched_bodies(contacts, moving, self._locked)
             if not found:
                 break
             self._world.go_back(before, state)
-            found = self._world.close_to(found) & self._still
-            self._still -= found
-            self._world.release(found, self._still)
+            found = self._world.close_to(found) & self._locked
+            self._locked -= found
+            self._world.release(found, self._locked)
         self._record_contacts(contacts)
         return time
 
@@ -422,13 +427,14 @@ class Execution:
         settings, target = self._settings, self._target
         self.contact = finger_contact(contacts, self._world.fingers, target)
         self._touched = self._touched or self.contact.any
-        others_rest = self._moved.update(self._still) <= settings.settled_speed * settings.poll
-        self._in_hand.look(self.X_GO(), others_rest=others_rest)
+        largest_motion = self._others_motion.update(self._locked)
+        others_rest = largest_motion <= settings.settled_speed * settings.poll
+        self._in_hand.record(self.X_GO(), others_rest=others_rest)
         self._blocker = self._carrier.watch(contacts)
         free = not is_touched_from_outside(contacts, self._world.robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
-    def followed(self) -> float:
+    def distance_followed(self) -> float:
         """How far the target's centre of mass has gone along the segments of the hand's way, that
         is, risen in a lift straight up [m]."""
         return self._followed + float((self._center() - self._center_start) @ self._direction)
@@ -442,14 +448,10 @@ class Execution:
         """The target's centre of mass (3,) in the world [m]."""
         return self._world.center(self._target)
 
-    def _displacements(self, bodies: Iterable[BodyIndex]) -> MotionTracker:
-        """Of bodies, from where they are now."""
-        return MotionTracker(self._world, bodies)
-
-    def _of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
+    def _by_name_of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
         """Motions of the others by name; what can only stand has none."""
         standing = dict.fromkeys(self._world.standing, 0.0)
-        return standing | _by_name(self._others, values)
+        return standing | {name: values[index] for name, index in self._others.items()}
 
     def result(self, outcome: Outcome) -> TrialResult:
         """The outcome with the margins at this moment."""
@@ -465,9 +467,9 @@ class Execution:
             tilt=tilt,
             pad_force=force,
             patch_area=area,
-            lift=self.followed() + self._left_to_go,
-            others_moved=_largest(self._moved.farthest),
-            others_turned=_largest(self._moved.turned),
+            lift=self.distance_followed() + self._left_to_go,
+            others_moved=_largest(self._others_motion.farthest),
+            others_turned=_largest(self._others_motion.turned),
             end_time=self._world.time,
             tracking_error=self._carrier.tracking_error,
             tracking_distance=self._carrier.tracking_distance,
@@ -478,18 +480,12 @@ class Execution:
             grip_start=self._grip_start,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
-            displacements=self._of_others(self._moved.farthest),
-            turned=self._of_others(self._moved.turned),
-            toppled=", ".join(self._moved.toppled(self._others)),
+            displacements=self._by_name_of_others(self._others_motion.farthest),
+            turned=self._by_name_of_others(self._others_motion.turned),
+            toppled=", ".join(self._others_motion.toppled(self._others)),
             pushed=self._pushed,
             touched=self._carrier.touched,
         )
-
-
-def _by_name(
-    bodies: Mapping[str, BodyIndex], values: Mapping[BodyIndex, float]
-) -> dict[str, float]:
-    return {name: values[index] for name, index in bodies.items()}
 
 
 def _largest(values: Mapping[BodyIndex, float]) -> float:

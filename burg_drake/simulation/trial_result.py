@@ -123,9 +123,11 @@ class GripLoad:
 
     @property
     def limit(self) -> float:
-        """How far the load is from what friction carries at most: size of the logarithm of their
-        ratio, to the base of 10, `MAX_LIMIT_DISTANCE` at most. At its limit a load that hangs straight below the
-        pads slides down; one that turns more than it pulls comes to hang below them, and is held.
+        """Distance of the load from the most that friction carries: absolute value of the logarithm
+        (base 10) of their ratio, at most `MAX_LIMIT_DISTANCE`.
+
+        At its limit a load straight below the pads slides down. A load that turns more than it
+        pulls comes to hang below the pads, and is held.
         """
         if self.turned > self.carried:
             return MAX_LIMIT_DISTANCE

@@ -8,24 +8,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from pydrake.geometry import (
-    CollisionFilterDeclaration,
-    GeometryId,
-    GeometrySet,
-    ProximityProperties,
-    RoleAssign,
-)
-from pydrake.multibody.plant import ContactResults, CoulombFriction, MultibodyPlant
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet
+from pydrake.multibody.plant import ContactResults
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.objects import hull_corners
-from burg_drake.simulation.contacts import BodyContact, ContactReader, Neighbours
+from burg_drake.simulation.contacts import (
+    BodyContact,
+    ContactReader,
+    Neighbours,
+    assign_friction,
+    collision_geometries,
+)
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_execution import OtherTouched
-from burg_drake.station import Engine, Hand, HandHandle, StationDiagram, filter_contact_pairs
+from burg_drake.station import HandHandle, StationDiagram, filter_contact_pairs
 
 
 class TrialWorld:
@@ -41,32 +41,33 @@ class TrialWorld:
 
     Attributes:
         diagram, hand, settings: as given.
+        engine: how it is stepped.
+        free, standing: bodies by name: what can move, and what could in the complete world.
+        robot: bodies of the robot.
+        fingers: of these the fingers.
+        hand_document: the hand.
+        fixed, table, body_names, robot_bodies: those of the diagram.
+        plant_context: the plant's part of `context`.
         contacts: reader of the diagram's contact results.
         neighbours: which free objects stand close to each other.
         simulator: the simulator that runs the trials.
     """
 
-    hand: HandHandle
-
-    def __init__(
-        self,
-        diagram: StationDiagram,
-        hand: HandHandle,
-        settings: TrialSettings,
-    ) -> None:
-        self.diagram = diagram
-        self.hand = hand
-        self.settings = settings
+    def __init__(self, diagram: StationDiagram, hand: HandHandle, settings: TrialSettings) -> None:
+        self.diagram, self.hand, self.settings = diagram, hand, settings
+        self.engine, self.free, self.standing = diagram.engine, diagram.free, diagram.standing
+        self.table, self.fixed, self.body_names = diagram.table, diagram.fixed, diagram.body_names
+        self.fingers, self.hand_document = hand.fingers, hand.document
+        self.robot_bodies = diagram.robot_bodies
         self.contacts = ContactReader(diagram.plant, diagram.scene_graph)
         self.neighbours = Neighbours(diagram)
-        self._hulls = frozenset(
-            [*diagram.parts.hulls, *self._geometries(set(diagram.standing.values()))]
-        )
+        standing = self._geometries(set(diagram.standing.values()))
+        self._hulls = frozenset([*diagram.parts.hulls, *standing])
         self._default = diagram.diagram.CreateDefaultContext()
         self.simulator = Simulator(diagram.diagram, self._default.Clone())
-        self._plant_context = diagram.plant.GetMyContextFromRoot(self.context)
+        self.plant_context = diagram.plant.GetMyMutableContextFromRoot(self.context)
         self._results_port = diagram.plant.get_contact_results_output_port()
-        self._robot = frozenset(diagram.robot_bodies)
+        self.robot = frozenset(diagram.robot_bodies)
         self._corners: dict[BodyIndex, Array] = {}
         self._prepared: tuple[str, float | None, float | None] | None = None
         """Target, friction and mass that the Context is prepared for; None if for nothing."""
@@ -75,36 +76,6 @@ class TrialWorld:
     def context(self) -> Context:
         """Context of the trial that runs or ran last."""
         return self.simulator.get_mutable_context()
-
-    @property
-    def engine(self) -> Engine:
-        """How it is stepped."""
-        return self.diagram.engine
-
-    @property
-    def free(self) -> dict[str, BodyIndex]:
-        """What can move, by name."""
-        return self.diagram.free
-
-    @property
-    def standing(self) -> dict[str, BodyIndex]:
-        """What could move in the complete world, by name."""
-        return self.diagram.standing
-
-    @property
-    def robot(self) -> frozenset[BodyIndex]:
-        """Bodies of the robot."""
-        return self._robot
-
-    @property
-    def fingers(self) -> tuple[BodyIndex, BodyIndex]:
-        """Of the robot."""
-        return self.hand.fingers
-
-    @property
-    def hand_document(self) -> Hand:
-        """The hand."""
-        return self.hand.document
 
     @property
     def time(self) -> float:
@@ -117,27 +88,27 @@ class TrialWorld:
         if not plant.HasModelInstanceNamed(model):
             return None
         return np.asarray(
-            plant.GetPositions(self._plant_context, plant.GetModelInstanceByName(model))
+            plant.GetPositions(self.plant_context, plant.GetModelInstanceByName(model))
         )
 
     def finger_speed(self) -> float:
         """Speed of the faster finger [m/s]."""
-        return self.hand.finger_speed(self._plant_context)
+        return self.hand.finger_speed(self.plant_context)
 
     def X_WG(self) -> Array:
         """(4, 4) grasp frame."""
-        return self.hand.X_WG(self._plant_context)
+        return self.hand.X_WG(self.plant_context)
 
     def X_WB(self, body: BodyIndex) -> Array:
         """(4, 4) of a body."""
         plant = self.diagram.plant
-        X_WB = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
+        X_WB = plant.EvalBodyPoseInWorld(self.plant_context, plant.get_body(body))
         return np.asarray(X_WB.GetAsMatrix4())
 
     def center(self, body: BodyIndex) -> Array:
         """Centre of mass (3,) of a body in the world [m]."""
         found = self.diagram.plant.get_body(body)
-        X_WB = self.diagram.plant.EvalBodyPoseInWorld(self._plant_context, found)
+        X_WB = self.diagram.plant.EvalBodyPoseInWorld(self.plant_context, found)
         return np.asarray(X_WB.multiply(found.default_com()))
 
     def look(self) -> list[BodyContact]:
@@ -146,7 +117,7 @@ class TrialWorld:
         Raises:
             OtherTouched: what happens now is for the complete world to say.
         """
-        results = self._results_port.Eval(self._plant_context)
+        results = self._results_port.Eval(self.plant_context)
         if self.meets_another(results):
             raise OtherTouched
         return self.contacts.read(results)
@@ -175,12 +146,12 @@ class TrialWorld:
     def is_usable(self) -> bool:
         """Whether trials can begin in it. In a world of a target alone that is so if there is
         nothing but the table that the target may lean on where it stands."""
-        touching_distance = 0.001  # Metres. A target closer to another body may lean on it.
         if not self._hulls:
             return True
         graph = self.diagram.scene_graph
         query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._default))
-        pairs = query.ComputeSignedDistancePairwiseClosestPoints(touching_distance)
+        # A target closer than 1 mm to another body may lean on it.
+        pairs = query.ComputeSignedDistancePairwiseClosestPoints(0.001)
         return not any(pair.id_A in self._hulls or pair.id_B in self._hulls for pair in pairs)
 
     def meets_another(self, results: ContactResults) -> bool:
@@ -193,7 +164,7 @@ class TrialWorld:
         """Whether, in a world of a target alone, parts of the robot meet the target's hull and not
         the target as it is: those that are not hydroelastic."""
         inspector = self.diagram.scene_graph.model_inspector()
-        robot = self._geometries(set(self.diagram.robot_bodies))
+        robot = self._geometries(set(self.robot))
         hulls = self.diagram.parts.hulls
         return any(not inspector.CollisionFiltered(h, part) for h in hulls for part in robot)
 
@@ -231,9 +202,8 @@ class TrialWorld:
             still: those that stay locked.
         """
         self._prepared = None
-        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
         for index in released:
-            self.diagram.plant.get_body(index).Unlock(plant_context)
+            self.diagram.plant.get_body(index).Unlock(self.plant_context)
         resting = GeometrySet(self._geometries(self._resting(still)))
         declaration = CollisionFilterDeclaration()
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
@@ -264,16 +234,7 @@ class TrialWorld:
             friction = self.diagram.scene.entry(instance).friction
         else:
             bodies.append(self.diagram.free[instance])
-        coulomb = CoulombFriction(friction, friction)
-        graph, plant = self.diagram.scene_graph, self.diagram.plant
-        graph_context = graph.GetMyMutableContextFromRoot(self.context)
-        inspector = graph.model_inspector()
-        for geometry in self._geometries(set(bodies)):
-            properties = ProximityProperties(inspector.GetProximityProperties(geometry))
-            properties.UpdateProperty("material", "coulomb_friction", coulomb)
-            graph.AssignRole(
-                graph_context, plant.get_source_id(), geometry, properties, RoleAssign.kReplace
-            )
+        assign_friction(self.diagram, self.context, bodies, friction)
 
     def command(self, model: str, desired_state: Array) -> None:
         """Sets the servo command of `hand` (4,), `lift` (2,) or an `arm` with n joints (2 n,)."""
@@ -282,9 +243,8 @@ class TrialWorld:
 
     def _set_still(self, still: set[BodyIndex]) -> None:
         """Locks free objects in place, and drops their contact with what never moves."""
-        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
         for index in still:
-            self.diagram.plant.get_body(index).Lock(plant_context)
+            self.diagram.plant.get_body(index).Lock(self.plant_context)
         geometries = GeometrySet(self._geometries(self._resting(still)))
         self._filter(CollisionFilterDeclaration().ExcludeWithin(geometries))
 
@@ -306,19 +266,8 @@ class TrialWorld:
             return
         body = self.diagram.plant.get_body(target)
         unit = body.default_spatial_inertia().get_unit_inertia()
-        body.SetSpatialInertiaInBodyFrame(
-            self.diagram.plant.GetMyMutableContextFromRoot(self.context),
-            SpatialInertia(mass, body.default_com(), unit),
-        )
-
-
-def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> list[GeometryId]:
-    """Collision geometries of bodies, in the plant's order."""
-    return [
-        geometry
-        for index in sorted(bodies)
-        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
-    ]
+        inertia = SpatialInertia(mass, body.default_com(), unit)
+        body.SetSpatialInertiaInBodyFrame(self.plant_context, inertia)
 
 
 def check_overrides(friction: float | None, mass: float | None) -> None:

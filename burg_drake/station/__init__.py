@@ -1,7 +1,8 @@
 """Stations (robot, table, cameras) and the one place that builds Drake diagrams.
 
-Read `document` first, then `diagram.builder`, which puts together what `world` adds to a plant and
-`control` to a diagram.
+Read `station_document` first, then `diagram_builder`: it puts together what `robot`,
+`surroundings`, `object_bodies` and `contact_parts` add to a plant, and `ports` and
+`camera_sensors` to a diagram.
 """
 
 import lazy_loader

@@ -63,7 +63,7 @@ class AreaCamera(LeafSystem):
         """Declares the ports.
 
         Args:
-            rendered: Drake's camera of `finer(camera)`.
+            rendered: Drake's camera of `supersampled_camera(camera)`.
             samples: of the camera.
             world: the scene graph's world frame.
         """

@@ -43,7 +43,7 @@ def build_station_diagram(
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
-    Objects are rigid, but those that touch other objects are compliant (see `diagram.leaning`).
+    Objects are rigid, but those that touch other objects are compliant.
 
     Example::
 
@@ -66,13 +66,11 @@ def build_station_diagram(
             libraries. The board's markers are drawn with `meshcat`, or where names are given, also
             none of them, `()`; it is plain where nobody looks.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
-            stands where it is placed, and can be lifted off by a joint `RISE` of its model along
-            world z, and moved sideways with its frame `PLACEMENT_FRAME_NAME`; rigid meshes are replaced by pieces
-            (see `world.mesh_pieces`).
+            stands where it is placed, and can be lifted off by a joint `rise` of its model along
+            world z, and moved sideways with its frame `place`; rigid meshes are replaced by pieces.
         for_trials: have the hand meet the own surfaces of objects, and let these stand on the table
-            with feet (see `world.contact_parts`). The name of an instance: it alone can move, and a
-            hull of it meets all but the hand and the table; of the others there are only hulls (see
-            `world.standing`).
+            with feet (see `add_contact_parts`). The name of an instance: it alone can move, and a
+            hull of it meets all but the hand and the table; of the others there are only hulls.
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -166,23 +164,20 @@ def build_station_diagram(
 
 
 def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
-    plant.set_contact_model(
-        {
-            "hydroelastic_with_fallback": ContactModel.kHydroelasticWithFallback,
-            "point": ContactModel.kPoint,
-        }[engine.contact_model]
-    )
-    plant.set_discrete_contact_approximation(
-        {
-            "lagged": DiscreteContactApproximation.kLagged,
-            "similar": DiscreteContactApproximation.kSimilar,
-            "sap": DiscreteContactApproximation.kSap,
-        }[engine.contact_approximation]
-    )
+    models = {
+        "hydroelastic_with_fallback": ContactModel.kHydroelasticWithFallback,
+        "point": ContactModel.kPoint,
+    }
+    approximations = {
+        "lagged": DiscreteContactApproximation.kLagged,
+        "similar": DiscreteContactApproximation.kSimilar,
+        "sap": DiscreteContactApproximation.kSap,
+    }
+    surfaces = {
+        "polygon": HydroelasticContactRepresentation.kPolygon,
+        "triangle": HydroelasticContactRepresentation.kTriangle,
+    }
+    plant.set_contact_model(models[engine.contact_model])
+    plant.set_discrete_contact_approximation(approximations[engine.contact_approximation])
     plant.set_stiction_tolerance(engine.stiction_tolerance)
-    plant.set_contact_surface_representation(
-        {
-            "polygon": HydroelasticContactRepresentation.kPolygon,
-            "triangle": HydroelasticContactRepresentation.kTriangle,
-        }[engine.contact_surface]
-    )
+    plant.set_contact_surface_representation(surfaces[engine.contact_surface])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -10,7 +10,14 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, State
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    InputPort,
+    LeafSystem,
+    State,
+)
 from pydrake.trajectories import PiecewisePolynomial
 
 from burg_drake.core import Array, InvalidInputError
@@ -106,7 +113,7 @@ class PlanPlayer:
         if plan is None:
             return None
         if self._samples is None or plan is not self._plan:
-            self._samples, self._plan = self._checked(plan), plan
+            self._samples, self._plan = self._check_plan(plan), plan
         if np.isnan(time):
             raise InvalidInputError(
                 "plan.start_time is nan; give the time in seconds at which the plan begins"
@@ -120,26 +127,24 @@ class PlanPlayer:
         closed = [closing for start, closing in samples.switches if start <= time]
         return PlannedCommand(q, v, bool(closed and closed[-1]), samples.opening)
 
-    def _checked(self, plan: object) -> _PlannedSamples:
+    def _check_plan(self, plan: object) -> _PlannedSamples:
         if not isinstance(plan, PlayablePlan):
             got = type(plan).__name__
             if hasattr(plan, "outcome"):  # a planner's answer where it found no plan
                 got += f" ({plan.outcome})"
             raise InvalidInputError(f"port 'plan' got a {got}; give a burg_drake Plan")
         if plan.origin is not None:
-            self._check_joints(plan.origin.joints)
+            joints = plan.origin.joints
+            if tuple(joints) != self._joints:
+                raise InvalidInputError(
+                    f"the plan moves the joints {', '.join(joints)}; the arm of station"
+                    f" {self._station.name!r} has {', '.join(self._joints)}"
+                )
             plan.require_for(self._scene, self._station)
         opening = plan.opening
         if np.isnan(opening):
             opening = self._station.hand.opening[1]
         return _sample_plan(plan.phases, len(self._joints), opening)
-
-    def _check_joints(self, joints: Sequence[str]) -> None:
-        if tuple(joints) != self._joints:
-            raise InvalidInputError(
-                f"the plan moves the joints {', '.join(joints)}; the arm of station"
-                f" {self._station.name!r} has {', '.join(self._joints)}"
-            )
 
 
 def _sample_plan(
@@ -176,7 +181,41 @@ def _sample_plan(
     )
 
 
-class ArmDriver(LeafSystem):
+class _PlanFollower(LeafSystem):
+    """Follows a plan that has begun, else one of the ports `position` and `desired_state`."""
+
+    _position: InputPort
+    _desired_state: InputPort
+
+    def _declare_plan_ports(self, player: PlanPlayer, ahead: float = 0.0) -> None:
+        """Declares the ports of the plan, which is commanded for `ahead` [s] later."""
+        self._player, self._ahead = player, ahead
+        self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
+        self._start = self.DeclareVectorInputPort("plan.start_time", 1)
+
+    def _planned_command(self, context: Context) -> PlannedCommand | None:
+        """What the plan wants now; None without one, and before it starts."""
+        if not self._plan.HasValue(context):
+            return None
+        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
+        time = context.get_time() - start
+        ahead = self._ahead if time >= 0.0 else 0.0
+        return self._player.command(self._plan.Eval(context), time + ahead)
+
+    def _connected_inputs(self, context: Context, role: str) -> tuple[bool, bool]:
+        """Whether positions, or a desired state, are commanded."""
+        position, desired_state = (
+            port.HasValue(context) for port in (self._position, self._desired_state)
+        )
+        if position and desired_state:
+            raise InvalidInputError(
+                f"ports {role}.position and {role}.desired_state are both connected; connect one of"
+                " them"
+            )
+        return position, desired_state
+
+
+class ArmDriver(_PlanFollower):
     """Follows a plan that has begun, else a position or a desired state; without any of them it
     holds what was commanded last.
 
@@ -205,25 +244,24 @@ class ArmDriver(LeafSystem):
         """
         super().__init__()
         n = len(joints)
-        self._joints, self._period, self._ahead, self._player = joints, period, ahead, player
+        self._joints, self._period = joints, period
         self._position = self.DeclareVectorInputPort("position", n)
         self._desired_state = self.DeclareVectorInputPort("desired_state", 2 * n)
-        self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
-        self._start = self.DeclareVectorInputPort("plan.start_time", 1)
+        self._declare_plan_ports(player, ahead)
         self._state = self.DeclareVectorInputPort("state", 2 * n)
         # The last command, and whether there has been one.
         self._last = self.DeclareDiscreteState(np.append(home, 0.0))
-        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+        self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._store_command)
         self._command = self.DeclareVectorOutputPort("command", 2 * n, self._calc)
 
-    def _begin(self, context: Context, values: DiscreteValues) -> None:
+    def _initialize(self, context: Context, values: DiscreteValues) -> None:
         n = len(self._joints)
         values.set_value(self._last, np.append(self._state.Eval(context)[:n], 0.0))
 
-    def _remember(self, context: Context, values: DiscreteValues) -> None:
+    def _store_command(self, context: Context, values: DiscreteValues) -> None:
         q = self._command.Eval(context)[: len(self._joints)]
-        if self._planned(context) is not None:
+        if self._planned_command(context) is not None:
             self._check_jump(q - context.get_discrete_state(self._last).value()[:-1])
         values.set_value(self._last, np.append(q, 1.0))
 
@@ -240,14 +278,8 @@ class ArmDriver(LeafSystem):
     def _calc(self, context: Context, output: BasicVector) -> None:
         last = context.get_discrete_state(self._last).value()
         source, q, v = "the last command", last[:-1], np.zeros(len(self._joints))
-        position, desired_state = (
-            port.HasValue(context) for port in (self._position, self._desired_state)
-        )
-        if position and desired_state:
-            raise InvalidInputError(
-                "ports arm.position and arm.desired_state are both connected; connect one of them"
-            )
-        planned = self._planned(context)
+        position, desired_state = self._connected_inputs(context, "arm")
+        planned = self._planned_command(context)
         if planned is not None:
             source, q, v = "the plan", planned.q, planned.v
         elif desired_state:
@@ -263,15 +295,6 @@ class ArmDriver(LeafSystem):
                 f"{v[joint]:g} rad/s; give finite numbers"
             )
         output.SetFromVector(np.concatenate([q, v]))
-
-    def _planned(self, context: Context) -> PlannedCommand | None:
-        """What the plan wants now; None without one, and before it starts."""
-        if not self._plan.HasValue(context):
-            return None
-        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
-        time = context.get_time() - start
-        ahead = self._ahead if time >= 0.0 else 0.0
-        return self._player.command(self._plan.Eval(context), time + ahead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,15 +352,7 @@ class Fingers:
         return float(low + share.mean() * (high - low))
 
 
-@dataclass(frozen=True, eq=False)
-class _FingerCommand:
-    """Positions that the fingers go to, (2,) [m], and with which velocities now, (2,) [m/s]."""
-
-    q: Array
-    v: Array
-
-
-class HandDriver(LeafSystem):
+class HandDriver(_PlanFollower):
     """Follows a plan that has begun, else a distance between the pads or a desired state; without
     any of them it holds what was commanded last.
 
@@ -362,46 +377,44 @@ class HandDriver(LeafSystem):
         """Declares ports, state and events; the arguments are those of the diagram."""
         super().__init__()
         hand = fingers.hand
-        self._fingers, self._player, self._size = fingers, player, plant.num_velocities()
+        self._fingers, self._size = fingers, plant.num_velocities()
         self._damping = STALL_FORCE_RATIO * hand.force / hand.closing_speed
         self._position = self.DeclareVectorInputPort("position", 1)
         self._force_limit = self.DeclareVectorInputPort("force_limit", 1)
         self._desired_state = self.DeclareVectorInputPort("desired_state", 4)
-        self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
-        self._start = self.DeclareVectorInputPort("plan.start_time", 1)
+        self._declare_plan_ports(player)
         self._state = self.DeclareVectorInputPort("state", plant.num_multibody_states(model))
         # Where the fingers are held, and the brake of the last step.
         self._held = self.DeclareDiscreteState(fingers.open)
         self._braked = self.DeclareDiscreteState(np.zeros(2))
-        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
+        self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         # A discrete update would come after the plant's step, which is an unrestricted one, and
         # would remember the brake of the step to come.
-        self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._remember)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._store_command)
         self.DeclareVectorOutputPort("command", 4, self._calc_command)
         self._brake = self.DeclareVectorOutputPort("brake", self._size, self._calc_brake)
         self.DeclareStateOutputPort("braked", self._braked)
 
-    def _begin(self, context: Context, values: DiscreteValues) -> None:
+    def _initialize(self, context: Context, values: DiscreteValues) -> None:
         values.set_value(self._held, self._state.Eval(context)[self._fingers.q])
         values.set_value(self._braked, np.zeros(2))
 
-    def _remember(self, context: Context, state: State) -> None:
+    def _store_command(self, context: Context, state: State) -> None:
         values = state.get_mutable_discrete_state()
-        wanted = self._finger_command(context)
-        values.set_value(self._held, wanted.q)
+        values.set_value(self._held, self._finger_command(context)[0])
         values.set_value(self._braked, self._brake.Eval(context)[self._fingers.dofs])
 
     def _calc_command(self, context: Context, output: BasicVector) -> None:
-        wanted = self._finger_command(context)
-        eased = wanted.v - self._against(context, wanted.v) / self._damping
-        output.SetFromVector([*wanted.q, *eased])
+        q, v = self._finger_command(context)
+        output.SetFromVector([*q, *(v - self._braking_force(context, v) / self._damping)])
 
     def _calc_brake(self, context: Context, output: BasicVector) -> None:
         brake = np.zeros(self._size)
-        brake[self._fingers.dofs] = self._against(context, self._finger_command(context).v)
+        _, v = self._finger_command(context)
+        brake[self._fingers.dofs] = self._braking_force(context, v)
         output.SetFromVector(brake)
 
-    def _against(self, context: Context, speed: Array) -> Array:
+    def _braking_force(self, context: Context, speed: Array) -> Array:
         """(2,) force against the motion that is wanted [N]."""
         most = self._fingers.hand.force
         limit = most
@@ -414,19 +427,14 @@ class HandDriver(LeafSystem):
                 )
         return np.asarray(-np.sign(speed) * (most - limit))
 
-    def _finger_command(self, context: Context) -> _FingerCommand:
+    def _finger_command(self, context: Context) -> tuple[Array, Array]:
+        """Positions that the fingers go to, (2,) [m], and their velocities now, (2,) [m/s]."""
         position_gain = 50.0  # Finger speed over distance from the goal, 1/s.
-        position, desired_state = (
-            port.HasValue(context) for port in (self._position, self._desired_state)
-        )
-        if position and desired_state:
-            raise InvalidInputError(
-                "ports hand.position and hand.desired_state are both connected; connect one of them"
-            )
+        position, desired_state = self._connected_inputs(context, "hand")
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
-        q, planned = self._state.Eval(context)[self._fingers.q], self._planned(context)
+        q, planned = self._state.Eval(context)[self._fingers.q], self._planned_command(context)
         if planned is not None and planned.closed:
-            return _FingerCommand(fingers.closed, fingers.towards_closed * fastest)
+            return fingers.closed, fingers.towards_closed * fastest
         if planned is None and desired_state:
             speeds = self._desired_state.Eval(context)[2:]
             if not np.isfinite(speeds).all():
@@ -434,21 +442,14 @@ class HandDriver(LeafSystem):
                     f"hand.desired_state asks for finger speeds of {speeds.tolist()} m/s;"
                     " give finite numbers"
                 )
-            return _FingerCommand(q, speeds)
+            return q, speeds
         goal = context.get_discrete_state(self._held).value()
         if planned is not None:
             goal = fingers.at(self._distance(planned.opening, "the plan's opening"))
         elif position:
             wanted = float(self._position.Eval(context)[0])
             goal = fingers.at(self._distance(wanted, "hand.position"))
-        return _FingerCommand(goal, np.clip(position_gain * (goal - q), -fastest, fastest))
-
-    def _planned(self, context: Context) -> PlannedCommand | None:
-        """What the plan wants now; None without one, and before it starts."""
-        if not self._plan.HasValue(context):
-            return None
-        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
-        return self._player.command(self._plan.Eval(context), context.get_time() - start)
+        return goal, np.clip(position_gain * (goal - q), -fastest, fastest)
 
     def _distance(self, wanted: float, source: str) -> float:
         tolerance = 1e-3  # Metres beyond the range of the hand.

@@ -54,26 +54,16 @@ class GraspMotion:
 
     RANGES: ClassVar[Ranges] = MOTION_LENGTH_RANGES
 
-    standoff: float = _length_setting(
-        0.10,
-        "standoff",
-        "length of the straight approach",
-    )
+    standoff: float = _length_setting(0.10, "standoff", "length of the straight approach")
     retreat: float = _length_setting(
-        0.0,
-        "retreat",
-        ("length of the retreat along the approach, before the lift"),
+        0.0, "retreat", "length of the retreat along the approach, before the lift"
     )
     lift_height: float = _length_setting(0.30, "lift_height", "length of the lift", "lift_mm")
     least_lift: float | None = _length_setting(
-        None,
-        "least_lift",
-        "lift as far as there is room, at least by this",
+        None, "least_lift", "lift as far as there is room, at least by this"
     )
     lift_direction: Vector3 = setting(
-        (0.0, 0.0, 1.0),
-        "direction of the lift in the world (0 0 1: up)",
-        metavar=("X", "Y", "Z"),
+        (0.0, 0.0, 1.0), "direction of the lift in the world (0 0 1: up)", metavar=("X", "Y", "Z")
     )
 
     def __post_init__(self) -> None:

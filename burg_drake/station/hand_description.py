@@ -12,6 +12,7 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.scene import convex_polygon, polygon_area
 from burg_drake.station.hand_document import Finger, Hand
 from burg_drake.station.station_diagram import FloatingHand, StationDiagram
 
@@ -59,9 +60,8 @@ def find_pad_front(
     flat_tolerance = 1e-5  # Metres behind the foremost point that belong to the front.
     min_area_share = 0.5  # Share of the pad's outline; less is an edge, or curved.
     max_hull_ratio = 1.01  # Volume of the pad's hull over that of the pad.
-    p_BV = transform_points(
-        X_BC, np.array([volume.vertex(i) for i in range(_vertex_count(volume))])
-    )
+    vertices = [volume.vertex(i) for i in range(int(volume.num_vertices()))]
+    p_BV = transform_points(X_BC, np.array(vertices))
     hull = ConvexHull(p_BV)
     if hull.volume > max_hull_ratio * volume.CalcVolume():
         raise ValueError("cannot be modelled by springs, as the pad is not convex")
@@ -70,7 +70,10 @@ def find_pad_front(
     flat = p_BV @ np.stack([side_B, other_B], axis=1)
     front = flat[heights > heights.max() - flat_tolerance]
     outline = _convex_outline(front)
-    area, whole = (0.0 if o is None else _outline_area(o) for o in (outline, _convex_outline(flat)))
+    area, whole = (
+        0.0 if polygon is None else polygon_area(polygon)
+        for polygon in (outline, _convex_outline(flat))
+    )
     if outline is None or area < min_area_share * whole:
         raise ValueError(
             f"has only {1e6 * area:.0f} mm2 of the pad's {1e6 * whole:.0f} mm2 facing the"
@@ -103,23 +106,14 @@ def find_pad_front(
     )
 
 
-def _vertex_count(volume: VolumeMesh) -> int:
-    return int(volume.num_vertices())
-
-
 def _convex_outline(points: Array) -> Array | None:
     """(N, 2) outline of points (M, 2), counter-clockwise; None if they lie on a line."""
     if len(points) < 3:
         return None
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
+        return convex_polygon(points)
     except QhullError:
         return None
-
-
-def _outline_area(outline: Array) -> float:
-    x, y = outline.T
-    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
 def _smallest_rectangle(outline: Array) -> tuple[Array, Array, Array]:

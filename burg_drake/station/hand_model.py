@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -38,7 +36,12 @@ from burg_drake.core import (
 )
 from burg_drake.formats import Gripper, GripperJoint
 from burg_drake.station.hand_document import Finger, Hand
-from burg_drake.station.model_file import add_models, require_free_model, without_hydroelastic
+from burg_drake.station.model_file import (
+    add_models,
+    buffer_drake_log,
+    require_free_model,
+    without_hydroelastic,
+)
 from burg_drake.station.station_document import Station
 
 STALL_FORCE_RATIO = 1.25
@@ -115,10 +118,7 @@ def add_hand(
 
 
 def find_hand(
-    plant: MultibodyPlant,
-    inspector: SceneGraphInspector,
-    hand: Hand,
-    instance: ModelInstanceIndex,
+    plant: MultibodyPlant, inspector: SceneGraphInspector, hand: Hand, instance: ModelInstanceIndex
 ) -> HandModel:
     """Looks up what a document names in a plant.
 
@@ -169,7 +169,8 @@ def _require_known_name(hand: Hand, key: str, name: str, known: Iterable[str]) -
 
 def _add_servo(plant: MultibodyPlant, hand: Hand, finger: Finger, joint: PrismaticJoint) -> None:
     """Gives a finger its velocity servo, and an actuator where the model has none."""
-    actuator = _find_actuator(plant, joint)
+    own = (a for a in _all_actuators(plant) if a.joint().index() == joint.index())
+    actuator = next(own, None) or plant.AddJointActuator(joint.name(), joint)
     if hand.force > actuator.effort_limit():
         raise InvalidInputError(
             f"hand {hand.name!r}: force is {hand.force:g} N, but the effort limit of"
@@ -191,21 +192,11 @@ def _all_actuators(plant: MultibodyPlant) -> list[JointActuator]:
     return [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
 
 
-def _find_actuator(plant: MultibodyPlant, joint: PrismaticJoint) -> JointActuator:
-    for actuator in _all_actuators(plant):
-        if actuator.joint().index() == joint.index():
-            return actuator
-    return plant.AddJointActuator(joint.name(), joint)
-
-
-class HandCheck:
-    """Hand check."""
-
-    length_tolerance = 5e-4  # Metres between lengths of document and model.
-    time_step = 1e-3  # Seconds.
-    steps = 20  # Steps in which released fingers show whether they are coupled.
-    rest_tolerance = 1e-6  # Metres that a finger at rest moves in these steps.
-    displacement = 2e-3  # Metres by which one finger is displaced.
+LENGTH_TOLERANCE = 5e-4  # Metres between lengths of document and model.
+TIME_STEP = 1e-3  # Seconds.
+COUPLING_STEPS = 20  # Steps in which released fingers show whether they are coupled.
+REST_TOLERANCE = 1e-6  # Metres that a finger at rest moves in these steps.
+FINGER_DISPLACEMENT = 2e-3  # Metres by which one finger is displaced.
 
 
 @dataclass(frozen=True)
@@ -276,11 +267,9 @@ class _HandBench:
 
     def __init__(self, hand: Hand, path: Path, packages: Packages) -> None:
         self._hand = hand
-        builder = RobotDiagramBuilder(time_step=HandCheck.time_step)
+        builder = RobotDiagramBuilder(time_step=TIME_STEP)
         self._plant = plant = builder.plant()
-        with (
-            _silence_drake_log()
-        ):  # what the parser warns of is said when the hand is added to a scene
+        with buffer_drake_log():  # dropped: it is said when the hand is added to a scene
             instance = add_hand(builder, hand, path, packages).instance
         body = plant.GetBodyByName(hand.body, instance)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform())
@@ -302,7 +291,7 @@ class _HandBench:
             low, high = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
             for key in ("closed", "open"):
                 q = getattr(finger, key)
-                if not low - HandCheck.length_tolerance <= q <= high + HandCheck.length_tolerance:
+                if not low - LENGTH_TOLERANCE <= q <= high + LENGTH_TOLERANCE:
                     raise self._error(
                         f"fingers[{i}].{key} is {q:g} m, but joint {finger.joint!r} goes"
                         f" from {low:g} to {high:g} m"
@@ -326,7 +315,7 @@ class _HandBench:
             one, other = (self.bounds(i).mean(axis=0) for i in (0, 1))
             gaps.append(one - other)
         gap = gaps[0] - gaps[1]
-        if np.hypot(gap[1], gap[2]) > HandCheck.length_tolerance:
+        if np.hypot(gap[1], gap[2]) > LENGTH_TOLERANCE:
             x, y, z = np.round(gap / np.linalg.norm(gap), 2) + 0.0
             raise self._error(
                 "x of G is not the closing direction: the fingers open along"
@@ -339,28 +328,29 @@ class _HandBench:
         opening = self._hand.opening[1 if end == "open" else 0]
         self._put(self._at(0.0 if end == "open" else 1.0))
         one, other = self.bounds(0), self.bounds(1)
-        if one[:, 0].mean() < other[:, 0].mean() - HandCheck.length_tolerance:
+        if one[:, 0].mean() < other[:, 0].mean() - LENGTH_TOLERANCE:
             raise self._error(
                 "the first finger is on the side of -x of G; exchange the fingers, or turn X_HG by"
                 " 180 deg about its z"
             )
         distance, middle = one[0, 0] - other[1, 0], (one[0, 0] + other[1, 0]) / 2
-        if abs(distance - opening) > HandCheck.length_tolerance:
+        if abs(distance - opening) > LENGTH_TOLERANCE:
             raise self._error(
                 f"with both fingers {end} the pads are {_format_mm(distance)} apart along x of"
                 f" G, but opening says {_format_mm(opening)}"
             )
-        if abs(middle) > HandCheck.length_tolerance:
+        if abs(middle) > LENGTH_TOLERANCE:
             raise self._error(
                 f"with both fingers {end} the middle between the pads is at x = "
                 f"{_format_mm(middle)} of G; it must be at 0"
             )
         for i, bounds in enumerate((one, other)):
             for name, (low, high) in zip("yz", bounds.T[1:], strict=True):
-                if not low - HandCheck.length_tolerance <= 0.0 <= high + HandCheck.length_tolerance:
+                if not low - LENGTH_TOLERANCE <= 0.0 <= high + LENGTH_TOLERANCE:
                     raise self._error(
                         f"G is not between the pads: with both fingers {end} the pad of"
-                        f" fingers[{i}] reaches from {_format_mm(low)} to {_format_mm(high)} along {name} of G"
+                        f" fingers[{i}] reaches from {_format_mm(low)} to {_format_mm(high)} along"
+                        f" {name} of G"
                     )
         return float(distance)
 
@@ -378,7 +368,7 @@ class _HandBench:
         """Fingers that the document places stay; of one that is put aside the other one follows,
         if they are coupled."""
         one, other = self._at(0.5)
-        aside = one + HandCheck.displacement * np.sign(
+        aside = one + FINGER_DISPLACEMENT * np.sign(
             self._hand.fingers[0].open - self._hand.fingers[0].closed
         )
         follows = self._moves((aside, other))
@@ -443,24 +433,12 @@ class _HandBench:
         self._simulator.get_mutable_context().SetTime(0.0)
         self._put(positions)
         self._simulator.Initialize()
-        self._simulator.AdvanceTo(HandCheck.steps * HandCheck.time_step)
+        self._simulator.AdvanceTo(COUPLING_STEPS * TIME_STEP)
         q = self._model.joints[1].get_translation(self._plant_context)
-        return bool(abs(q - positions[1]) > HandCheck.rest_tolerance)
+        return bool(abs(q - positions[1]) > REST_TOLERANCE)
 
     def _error(self, message: str) -> InvalidInputError:
         return InvalidInputError(f"hand {self._hand.name!r}: {message} ({self._hand.model})")
-
-
-@contextmanager
-def _silence_drake_log() -> Iterator[None]:
-    """Keeps Drake's warnings off the screen."""
-    logger = logging.getLogger("drake")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)
 
 
 def _format_mm(length: float) -> str:

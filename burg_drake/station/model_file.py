@@ -29,43 +29,38 @@ from burg_drake.core import (
     referenced_packages,
 )
 
-
-class NumberRule:
-    """Number rule."""
-
-    finite = "finite"  # Any finite number.
-    not_zero = "finite and not 0"  # Any finite number but 0.
-    not_negative = "finite and at least 0"  # A finite number of at least 0.
-    positive = "finite and above 0"  # A finite number above 0.
-    limit = "a number, or inf where there is no limit"  # A number, or infinity.
-
-
-INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")  # Moments and products of inertia.
-SDF_NUMBER_RULES = {
-    **dict.fromkeys(("pose", "xyz", "rpy", "multiplier"), NumberRule.finite),
-    **dict.fromkeys(INERTIA_NAMES, NumberRule.finite),
-    **dict.fromkeys(("scale", "gear_ratio"), NumberRule.not_zero),
-    **dict.fromkeys(
-        ("mass", "damping", "stiffness", "friction", "mu", "mu2"), NumberRule.not_negative
+INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+"""Moments and products of inertia."""
+NUMBER_RULES: dict[str, tuple[Callable[[float], bool], tuple[str, ...]]] = {
+    "finite": (math.isfinite, ("pose", "xyz", "rpy", "multiplier", *INERTIA_NAMES)),
+    "finite and not 0": (
+        lambda value: math.isfinite(value) and value != 0.0,
+        ("scale", "gear_ratio"),
     ),
-    **dict.fromkeys(
-        ("mu_static", "mu_dynamic", "hunt_crossley_dissipation"), NumberRule.not_negative
+    "finite and at least 0": (
+        lambda value: 0.0 <= value < math.inf,
+        (
+            *("mass", "damping", "stiffness", "friction", "mu", "mu2", "mu_static", "mu_dynamic"),
+            *("hunt_crossley_dissipation", "relaxation_time", "hydroelastic_margin"),
+            *("rotor_inertia", "acceleration"),
+        ),
     ),
-    **dict.fromkeys(
-        ("relaxation_time", "hydroelastic_margin", "rotor_inertia"), NumberRule.not_negative
+    "finite and above 0": (
+        lambda value: 0.0 < value < math.inf,
+        (
+            *("hydroelastic_modulus", "mesh_resolution_hint", "density"),
+            *("point_contact_stiffness", "size", "radius", "length", "radii"),
+        ),
     ),
-    "acceleration": NumberRule.not_negative,
-    **dict.fromkeys(
-        ("hydroelastic_modulus", "mesh_resolution_hint", "density"), NumberRule.positive
+    "a number, or inf where there is no limit": (
+        lambda value: not math.isnan(value),
+        ("lower", "upper", "effort", "velocity"),
     ),
-    **dict.fromkeys(
-        ("point_contact_stiffness", "size", "radius", "length", "radii"), NumberRule.positive
-    ),
-    **dict.fromkeys(("lower", "upper", "effort", "velocity"), NumberRule.limit),
 }
-"""Rules by the name of an element or attribute without the prefix `drake:`."""
+"""Tests of numbers and the elements and attributes (without `drake:`) they are for, by the rule."""
+SDF_NUMBER_RULES = {name: rule for rule, (_, names) in NUMBER_RULES.items() for name in names}
 URDF_NUMBER_RULES = SDF_NUMBER_RULES | dict.fromkeys(
-    ("effort", "velocity"), NumberRule.not_negative
+    ("effort", "velocity"), "finite and at least 0"
 )
 """In SDF, negative limits mean no limit."""
 _CHECKED_MODELS: set[tuple[Path, bytes]] = set()
@@ -154,7 +149,7 @@ def _parse_model(text: bytes, path: Path) -> _XmlElement | None:
     """The root of a model; None if it is not XML.
 
     Raises:
-        InvalidInputError: it is nested deeper than `MAX_DEPTH`.
+        InvalidInputError: it is nested deeper than 200 elements.
     """
     max_depth = 200  # Nested elements; Drake's parser refuses more than 500.
     parser = expat.ParserCreate()
@@ -205,15 +200,7 @@ def _require_rule(key: str, text: str, rule: str) -> None:
             value = float(word)
         except ValueError:
             raise ValueError(f"{key} is {quote_value(text)}; it must be {rule}") from None
-        finite = math.isfinite(value)
-        sound = {
-            NumberRule.finite: finite,
-            NumberRule.not_zero: finite and value != 0.0,
-            NumberRule.not_negative: finite and value >= 0.0,
-            NumberRule.positive: finite and value > 0.0,
-            NumberRule.limit: not math.isnan(value),
-        }
-        if not sound[rule]:
+        if not NUMBER_RULES[rule][0](value):
             raise ValueError(f"{key} is {text}; it must be {rule}")
 
 

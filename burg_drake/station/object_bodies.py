@@ -103,7 +103,7 @@ def add_instance(
         scene: the scene.
         packages: what the station says of packages.
         name: the instance.
-        by_pieces: for point queries alone, see `mesh_pieces`.
+        by_pieces: for point queries alone, with pieces in the place of rigid meshes.
         bare: without its contact geometry.
     """
     plant, parser = builder.plant(), builder.parser()

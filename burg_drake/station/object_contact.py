@@ -116,7 +116,7 @@ LEANING_DISTANCE = 0.001
 def touching_bodies(
     station_diagram: StationDiagram, bodies: Collection[BodyIndex]
 ) -> Mapping[BodyIndex, frozenset[BodyIndex]]:
-    """Which bodies are closer to each other than `LEANING_DISTANCE`, where the documents place them.
+    """Finds bodies closer to each other than `LEANING_DISTANCE`, where the documents place them.
 
     Args:
         station_diagram: a built diagram.

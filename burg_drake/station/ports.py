@@ -62,12 +62,11 @@ class ExternalTorque(LeafSystem):
             plant.SetPositionsAndVelocities(self._context, self._state.Eval(context))
             forces = MultibodyForces(plant)
             for force in applied:
-                plant.get_body(force.body_index).AddInForce(
+                body = plant.get_body(force.body_index)
+                R_WB = plant.EvalBodyPoseInWorld(self._context, body).rotation()
+                body.AddInForce(
                     context=self._context,
-                    p_BP_E=plant.EvalBodyPoseInWorld(
-                        self._context, plant.get_body(force.body_index)
-                    ).rotation()
-                    @ force.p_BoBq_B,
+                    p_BP_E=R_WB @ force.p_BoBq_B,
                     F_Bp_E=force.F_Bq_W,
                     frame_E=plant.world_frame(),
                     forces=forces,
@@ -391,10 +390,7 @@ def _measure_arm(
     n = plant.num_velocities(model)
     commanded = system.AddNamedSystem("arm.commanded", Demultiplexer(2 * n, n))
     measured = system.AddNamedSystem("arm.measured", Demultiplexer(2 * n, n))
-    state, torque = (
-        plant.get_state_output_port(model),
-        plant.get_net_actuation_output_port(model),
-    )
+    state, torque = (plant.get_state_output_port(model), plant.get_net_actuation_output_port(model))
     system.Connect(driver.GetOutputPort("command"), commanded.get_input_port())
     system.Connect(state, measured.get_input_port())
     external = system.AddNamedSystem("arm.external", ExternalTorque(plant, model))
@@ -436,13 +432,9 @@ def _measure_hand(
 def _wrist_joint(plant: MultibodyPlant, station: Station, models: Models) -> JointIndex:
     """The weld between arm and hand."""
     hand = plant.GetBodyByName(station.hand.body, models["hand"])
-    welds = [
-        index
-        for index in plant.GetJointIndices()
-        if plant.get_joint(index).type_name() == "weld"
-        and plant.get_joint(index).child_body().index() == hand.index()
-    ]
-    (weld,) = welds
+    joints = map(plant.get_joint, plant.GetJointIndices())
+    welds = [joint for joint in joints if joint.type_name() == "weld"]
+    (weld,) = (joint.index() for joint in welds if joint.child_body().index() == hand.index())
     return weld
 
 

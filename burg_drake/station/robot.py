@@ -61,7 +61,10 @@ def add_robot(
     plant.RenameModelInstance(added.instance, "hand")
     models = {"hand": added.instance}
     if robot == "hand":
-        models["lift"] = _add_lift(plant, added.body, _initial_hand_pose(station))
+        X_SG = np.diag([1.0, -1.0, -1.0, 1.0])  # down, well above the origin of the board
+        X_SG[2, 3] = 0.5
+        X_WH = station.hand.X_AH(station.document.X_WS.matrix() @ X_SG)
+        models["lift"] = _add_lift(plant, added.body, X_WH)
     else:
         models["arm"] = _add_arm(builder, station, added.body, simulated)
     for model in models.values():
@@ -73,14 +76,6 @@ def has_inverse_dynamics(station: Station) -> bool:
     """Whether the station's arm has an inverse-dynamics controller."""
     arm = station.document.arm
     return arm is not None and arm.control.kind == "inverse_dynamics"
-
-
-def _initial_hand_pose(station: Station) -> Array:
-    """`X_WH` (4, 4) of a hand that points down, well above the origin of the board."""
-    height = 0.5  # Metres of the hand above the origin of the board.
-    X_SG = np.diag([1.0, -1.0, -1.0, 1.0])
-    X_SG[2, 3] = height
-    return station.hand.X_AH(station.document.X_WS.matrix() @ X_SG)
 
 
 def _add_lift(plant: MultibodyPlant, hand: RigidBody, X_WH: Array) -> ModelInstanceIndex:
@@ -152,13 +147,11 @@ def _find_arm_frame(
     plant: MultibodyPlant, arm: ModelInstanceIndex, station: Station, key: str, name: str
 ) -> Frame:
     """The frame of the arm that a key of the station names."""
-    # Endings of frames that Drake's parser adds for each joint.
-    joint_frame_endings = ("_parent", "_child")
     if not plant.HasFrameNamed(name, arm):
         frames = [plant.get_frame(index).name() for index in plant.GetFrameIndices(arm)]
-        frames = [
-            f for f in frames if not f.startswith("__") and not f.endswith(joint_frame_endings)
-        ]
+        # Drake's parser adds frames for each joint, which end so.
+        frames = [f for f in frames if not f.startswith("__")]
+        frames = [f for f in frames if not f.endswith(("_parent", "_child"))]
         raise UnknownNameError(
             f"{station.path}: arm.{key}: {station.arm_model} has no frame {name!r};"
             f" {suggest_names(name, frames)}"

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.geometry import Box, Convex, Cylinder, Mesh, Shape
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import BodyIndex
 from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.core import Array, InvalidInputError, check_pose, transform_points
@@ -56,7 +55,7 @@ from burg_drake.station.object_bodies import name_taken_error
 from burg_drake.station.object_contact import LEANING_DISTANCE, replace_meshes_by_pieces
 from burg_drake.station.robot import ROBOT_MODELS, Robot
 from burg_drake.station.station_diagram import StationDiagram
-from burg_drake.station.station_document import Station, StationLike, as_station
+from burg_drake.station.station_document import StationLike, as_station
 from burg_drake.station.surroundings import SurroundingsProperties, obstacle_name_error
 
 
@@ -80,19 +79,19 @@ def _volume_below(shape: Shape, X_WG: RigidTransform) -> float:
     """Of the part of a convex shape that is below z = 0 [m^3]."""
     if isinstance(shape, Box):
         corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-        p_WV = transform_points(X_WG.GetAsMatrix4(), corners * shape.size())
+        p_GV = corners * shape.size()
     elif isinstance(shape, Cylinder):
-        p_WV = transform_points(
-            X_WG.GetAsMatrix4(), _cylinder_corners(shape.radius(), shape.length())
-        )
+        p_GV = _cylinder_corners(shape.radius(), shape.length())
     elif isinstance(shape, (Convex, Mesh)):
         hull = shape.GetConvexHull()
         p_GV = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-        p_WV = transform_points(X_WG.GetAsMatrix4(), p_GV)
     else:
         return np.inf
-    below = p_WV[p_WV[:, 2] < 0.0]
-    return _hull_volume(np.vstack([below, _ground_crossings(below, p_WV[p_WV[:, 2] >= 0.0])]))
+    p_WV = transform_points(X_WG.GetAsMatrix4(), p_GV)
+    below, above = p_WV[p_WV[:, 2] < 0.0], p_WV[p_WV[:, 2] >= 0.0]
+    share = below[:, None, 2:] / (below[:, None, 2:] - above[None, :, 2:])
+    crossings = below[:, None] + share * (above[None] - below[:, None])
+    return _hull_volume(np.vstack([below, crossings.reshape(-1, 3)]))
 
 
 def _cylinder_corners(radius: float, length: float) -> Array:
@@ -102,12 +101,6 @@ def _cylinder_corners(radius: float, length: float) -> Array:
     angle = 2.0 * np.pi * np.arange(sides) / sides
     rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.vstack([np.insert(rim, 2, end, axis=1) for end in (-length / 2, length / 2)])
-
-
-def _ground_crossings(below: Array, above: Array) -> Array:
-    """Where the lines between points below (N, 3) and above (M, 3) z = 0 cross it: (N M, 3)."""
-    share = below[:, None, 2:] / (below[:, None, 2:] - above[None, :, 2:])
-    return (below[:, None] + share * (above[None] - below[:, None])).reshape(-1, 3)
 
 
 def _hull_volume(points: Array) -> float:
@@ -144,7 +137,7 @@ class _PlacedInstance:
 class SceneCheck:
     """Says of scenes of one library what is wrong with them on a station.
 
-    Verdicts are those of `burg_drake.station.scene_check.check_scene`, which looks at the
+    Verdicts are those of `check_scene`, which looks at the
     objects' true surfaces as well. Overlaps are those of the convex shapes that objects touch
     others with; the arm is in its home posture. To be used from one thread at a time.
 
@@ -160,7 +153,10 @@ class SceneCheck:
         station = as_station(station)
         self._station, self._library = station, library
         self._X_WS = station.document.X_WS.matrix()
-        self._around = _build_empty_station(station, library)
+        empty = SceneDocument(name="empty_board", library=str(library.root))
+        robot: Robot = "arm" if station.document.arm is not None else "none"
+        scene = Scene(empty, library, library.root)
+        self._around = build_station_diagram(scene, station, robot=robot)
         self._parts = _describe_robot_parts(self._around)
         fixed = surrounding_shapes(self._around)
         shapes = partial(read_object_shapes, library, packages=station.packages)
@@ -188,17 +184,15 @@ class SceneCheck:
         self._place(scene)
         placed = self._placed
         issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
-        issues = [i for i in issues if i.kind != "in_ground" or not self._may_sink(i, scene)]
+        issues = [i for i in issues if i.kind != "in_ground" or not self._may_sink_in(i, scene)]
         issues = [i for i in issues if i.kind != "hovering"]  # of which boxes say too little
-        hovering = (self._hovering_issue(name) for name in scene.instances)
-        issues += [issue for issue in hovering if issue is not None]
+        issues += filter(None, map(self._hovering_issue, scene.instances))
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
-        beside = (self._table_issue(name) for name in scene.instances)
-        issues += [issue for issue in beside if issue is not None]
+        issues += filter(None, map(self._table_issue, scene.instances))
         overlapping = self._overlaps(scene)
         buried |= {a for a, b, _ in overlapping if b == "table"}
-        sunken = (self._sunken_issue(name) for name in scene.instances if name not in buried)
-        issues += [issue for issue in sunken if issue is not None]
+        lifted = (name for name in scene.instances if name not in buried)
+        issues += filter(None, map(self._sunken_issue, lifted))
         for a, b, depth in overlapping:
             if b == "table" and any(i.instance == a and i.kind == "in_ground" for i in issues):
                 continue
@@ -282,7 +276,7 @@ class SceneCheck:
         stands = not reaches_into_ground(self._placed[name].surface)
         return stands or (depth < MAX_SINK_DEPTH and self._is_supported(name, scene))
 
-    def _may_sink(self, issue: SceneIssue, scene: Scene) -> bool:
+    def _may_sink_in(self, issue: SceneIssue, scene: Scene) -> bool:
         return issue.amount < MAX_SINK_DEPTH and self._is_supported(issue.instance, scene)
 
     def _is_supported(self, name: str, scene: Scene) -> bool:
@@ -391,13 +385,6 @@ class SceneCheck:
         )
 
 
-def _build_empty_station(station: Station, library: ObjectLibrary) -> StationDiagram:
-    """The station with nothing on it; the arm is in its home posture."""
-    document = SceneDocument(name="empty_board", library=str(library.root))
-    robot: Robot = "arm" if station.document.arm is not None else "none"
-    return build_station_diagram(Scene(document, library, library.root), station, robot=robot)
-
-
 def _describe_robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
     """Of each body of the robot, by name: what to say of it, and what of the station puts it
     there."""
@@ -428,7 +415,7 @@ def _overlap_issue(
 def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...]:
     """Finds what is wrong with a scene on a station.
 
-    That is what `burg.scenes.validate_scene` checks, overlaps with other objects and with the
+    That is what `validate_scene` checks, overlaps with other objects and with the
     station, and overlaps of the objects' true surfaces.
 
     Example::
@@ -499,7 +486,7 @@ def find_overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], floa
         before everything else; robot links go by their own names.
     """
     plant = station_diagram.plant
-    names = _body_labels(station_diagram)
+    names = station_diagram.body_names
     order = {name: i for i, name in enumerate(station_diagram.scene.instances)}
     context = station_diagram.diagram.CreateDefaultContext()
     replace_meshes_by_pieces(station_diagram, context)
@@ -515,10 +502,3 @@ def find_overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], floa
         if a in order:
             found[a, b] = max(found.get((a, b), 0.0), pair.depth)
     return dict(sorted(found.items(), key=lambda item: order[item[0][0]]))
-
-
-def _body_labels(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
-    named = {**station_diagram.free, **station_diagram.fixed, "table": station_diagram.table}
-    names = {index: name for name, index in named.items()}
-    plant = station_diagram.plant
-    return names | {i: plant.get_body(i).name() for i in station_diagram.robot_bodies}

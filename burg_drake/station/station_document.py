@@ -64,7 +64,7 @@ class ArmControl:
 
     Attributes:
         kind: `impedance`: a spring and a damper for each joint; gravity does not pull the robot.
-            `has_inverse_dynamics`: torques from a model of arm and hand, which knows nothing of what
+            `inverse_dynamics`: torques from a model of arm and hand, which knows nothing of what
             the hand holds.
         kp: position gains, one for all joints or one for each: [Nm/rad] with `impedance`, [1/s^2]
             with `has_inverse_dynamics`.

@@ -100,7 +100,7 @@ PRINTED_BOARD_COLORS = {"paper": (0.97, 0.97, 0.95, 1.0), "markers": (0.06, 0.06
 
 
 class SurroundingsProperties:
-    """Surroundings properties."""
+    """Contact properties, colours and thickness of table, obstacles and printed board."""
 
     hydroelastic_modulus = 1e6  # Pascal; at 1e7 contact chatters.
     dissipation = 5.0  # s/m, Hunt-Crossley.
@@ -166,7 +166,9 @@ def add_board(plant: MultibodyPlant, board: Board, station: Station, markers: bo
         for name, mesh in board_meshes(board).items():
             part = GeometryInstance(RigidTransform(), mesh, name)
             part.set_illustration_properties(MakePhongIllustrationProperties(pale_colors[name]))
-            part.set_perception_properties(_perception_properties(PRINTED_BOARD_COLORS[name]))
+            printed = PerceptionProperties()
+            printed.AddProperty("phong", "diffuse", Rgba(*PRINTED_BOARD_COLORS[name]))
+            part.set_perception_properties(printed)
             plant.RegisterVisualGeometry(body, part)
     else:
         X_SB = RigidTransform(size * [0.5, 0.5, -0.5])
@@ -206,25 +208,6 @@ def _add_box(
     size = np.array(fixed.size)
     instance = plant.AddModelInstance(name)
     body = plant.AddRigidBody(name, instance, SpatialInertia.SolidBoxWithMass(1.0, *size))
-    box, properties = Box(*size), _compliant_box(size, fixed.friction, point_stiffness)
-    plant.RegisterCollisionGeometry(body, RigidTransform(), box, "collision", properties)
-    drawn = Box(
-        *np.maximum(size - 2 * SurroundingsProperties.paper_thickness, size / 2)
-    )  # thin ones, too, remain
-    plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(fixed.color))
-    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(fixed.X_WB))
-    return body
-
-
-def _perception_properties(color: tuple[float, ...]) -> PerceptionProperties:
-    properties = PerceptionProperties()
-    properties.AddProperty("phong", "diffuse", Rgba(*color))
-    return properties
-
-
-def _compliant_box(
-    size: Array, friction: float, point_stiffness: float | None
-) -> ProximityProperties:
     properties = ProximityProperties()
     AddCompliantHydroelasticProperties(
         float(np.max(size)), SurroundingsProperties.hydroelastic_modulus, properties
@@ -232,7 +215,12 @@ def _compliant_box(
     AddContactMaterial(
         dissipation=SurroundingsProperties.dissipation,
         point_stiffness=point_stiffness,
-        friction=CoulombFriction(friction, friction),
+        friction=CoulombFriction(fixed.friction, fixed.friction),
         properties=properties,
     )
-    return properties
+    plant.RegisterCollisionGeometry(body, RigidTransform(), Box(*size), "collision", properties)
+    # thin ones, too, remain
+    drawn = Box(*np.maximum(size - 2 * SurroundingsProperties.paper_thickness, size / 2))
+    plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(fixed.color))
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(fixed.X_WB))
+    return body

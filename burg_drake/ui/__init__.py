@@ -1,7 +1,7 @@
 """Pages in the browser, on viser; whatever they do is a command of a session in `compose`.
 
-Read `setup_page` first; `panels` stand beside the `view`, both are made of `widgets`, and `server`
-decides who comes in.
+Read `setup_page` first: it puts the panels (`*_panels`) beside the `scene_view`. `page_server`
+opens the page, and `admission` decides which browsers may use it.
 """
 
 import lazy_loader

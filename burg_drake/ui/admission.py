@@ -73,15 +73,13 @@ class Uploads:
             raise RefusedError("the file name is not allowed")
         if key in self._transfers or len(self._transfers) >= max_uploads:
             raise RefusedError("too many files are uploaded at once")
-        if (
-            size + sum(transfer.size for transfer in self._transfers.values())
-            > MAX_ALL_UPLOADS_BYTES
-        ):
+        announced = sum(transfer.size for transfer in self._transfers.values())
+        if size + announced > MAX_ALL_UPLOADS_BYTES:
             raise RefusedError("the files uploaded at once are too large")
         if parts:
             self._transfers[key] = _Upload(owner, size, size, parts)
 
-    def take(self, owner: object, key: str, size: int) -> bool:
+    def receive_part(self, owner: object, key: str, size: int) -> bool:
         """A part of a file comes.
 
         Returns:
@@ -126,10 +124,9 @@ def initial_page(title: str) -> str:
     Args:
         title: of the page.
     """
-    # Text for browsers with scripts switched off.
     no_scripts_text = (
-        "This page needs JavaScript, which is switched off in this browser: allow it for this address"
-        " and reload."
+        "This page needs JavaScript, which is switched off in this browser: allow it for this"
+        " address and reload."
     )
     script = _read_resource("burg_drake", "ui/first_page.js")
     script = script.replace("LARGEST_UPLOAD = 0;", f"LARGEST_UPLOAD = {MAX_UPLOAD_BYTES};")
@@ -189,9 +186,8 @@ class Admission:
             return self._response(connection, error.code, f"burg_drake: {error}\n")
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        # Headers that decide; servers read a repeated one in different ways.
-        single_headers = ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade")
-        for name in single_headers:
+        # Servers read a repeated header in different ways.
+        for name in ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade"):
             if len(request.headers.get_all(name)) > 1:
                 raise RequestError(HTTPStatus.BAD_REQUEST, f"header {name} is given twice")
         path, _, query = request.path.partition("?")
@@ -207,7 +203,7 @@ class Admission:
         return self._page(connection, request, query)
 
     def _require_browser(self, connection: ServerConnection, request: Request) -> None:
-        """What opens a websocket is our page: browsers always say whose page asks."""
+        """Refuses websockets of other programs and of browsers without a cookie."""
         if "Origin" not in request.headers:
             raise RequestError(HTTPStatus.FORBIDDEN, "a websocket without Origin is refused")
         if not self._has_cookie(request):

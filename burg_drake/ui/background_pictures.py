@@ -84,7 +84,7 @@ class ObjectPictures:
                 if self._closed:
                     return
                 wanted = self._wanted[-1]
-            png = self._made(wanted)
+            png = self._picture(wanted)
             with self._condition:
                 self._known[wanted] = png
                 self._wanted.remove(wanted)
@@ -92,13 +92,13 @@ class ObjectPictures:
                     return
             self._on_ready(wanted)
 
-    def _made(self, wanted: Wanted) -> bytes | None:
+    def _picture(self, wanted: Wanted) -> bytes | None:
         name, stable_pose = wanted
         if self.missing:
             return None
         try:
             content = content_hash(self.library.content[name], str(stable_pose), list(PICTURE_SIZE))
-            arrays = cached("picture", content, lambda: {"png": self._rendered(wanted)})
+            arrays = cached("picture", content, lambda: {"png": self._render(wanted)})
             return bytes(np.asarray(arrays["png"], dtype=np.uint8))
         except MissingDependencyError as error:
             self.missing = f"no pictures: {error}"
@@ -106,9 +106,8 @@ class ObjectPictures:
             _log.debug("no picture of %s: %s", name, error)
         return None
 
-    def _rendered(self, wanted: Wanted) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        missing = missing_render_libraries()
-        if missing:
+    def _render(self, wanted: Wanted) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        if missing := missing_render_libraries():
             raise MissingDependencyError(describe_missing(missing))
         try:
             png = self._worker.submit(

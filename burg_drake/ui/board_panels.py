@@ -1,4 +1,4 @@
-"""Panels of the board and the display: board size, picture of the real board, colours, viewpoint."""
+"""Panels of the board and the display: size, picture of the real board, colours, viewpoint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import viser
 from burg_drake.compose import BOARD_SIZES, SessionView, SetBoard, board_size, board_size_name
 from burg_drake.core import BurgError, InvalidInputError
 from burg_drake.ui.board_view import BoardLayers, BoardOverlay
-from burg_drake.ui.buttons import plain_button, upload_button
+from burg_drake.ui.buttons import SidePanel, upload_button
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_html import count_with_noun, join_html, paragraph, secondary_text
 from burg_drake.ui.scene_view import Coloring
@@ -36,23 +36,18 @@ class BoardPanel:
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        max_side_mm = 100_000.0  # Millimetres.
         self._actions = actions
         self._own = False
         with gui.add_folder("Board"):
-            self._size = actions.chosen(
+            self._size = actions.on_choice(
                 gui.add_dropdown("Size", (*BOARD_SIZES, CUSTOM_SIZE)), self._choose
             )
-            self._orientation = actions.chosen(
+            self._orientation = actions.on_choice(
                 gui.add_dropdown("Lies", (LANDSCAPE, PORTRAIT)), self._turn
             )
-            self._extents = actions.typed(
+            self._extents = actions.typed_field(
                 gui.add_vector2(
-                    "Width, depth [mm]",
-                    (594.0, 420.0),
-                    min=(1.0, 1.0),
-                    max=(max_side_mm, max_side_mm),
-                    step=0.1,
+                    "Width, depth [mm]", (594.0, 420.0), min=(1.0, 1.0), max=(1e5, 1e5), step=0.1
                 ),
                 self._resize,
             )
@@ -97,7 +92,7 @@ class LivePicture:
     """Looks at a board in a thread of its own until it is closed.
 
     Args:
-        camera: as of `cameras.sources.open_source`.
+        camera: as of `cameras.open_source`.
         board: that it sees.
         show: gets each picture, or one line that says why there is none.
         after: another one that is closed, and may have the camera yet; it is waited for.
@@ -159,7 +154,7 @@ CAMERA_NUMBERS = ("0", "1", "2", "3")
 """Cameras of this machine that the page may open; it can name no other device."""
 
 
-class BackdropPanel:
+class BackdropPanel(SidePanel):
     """Lays a picture of the real board under the objects.
 
     Args:
@@ -169,7 +164,8 @@ class BackdropPanel:
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
-        self._actions, self._layers = actions, layers
+        super().__init__(gui, actions)
+        self._layers = layers
         self._sheet: BoardOverlay | None = None
         self._live: LivePicture | None = None
         icon = viser.Icon
@@ -178,21 +174,17 @@ class BackdropPanel:
             upload = upload_button(gui, "Photo of the board", icon=icon.PHOTO, mime_type="image/*")
             upload.on_upload(self._uploaded)
             self._camera = gui.add_dropdown("Camera", CAMERA_NUMBERS)
-            actions.clicked(
-                plain_button(gui, "Take a picture", icon=icon.CAMERA), self._take_picture
-            )
-            self._on = actions.chosen(
+            self._button("Take a picture", self._take_picture, icon=icon.CAMERA)
+            self._on = actions.on_choice(
                 gui.add_checkbox("Live", False, hint="Show what the camera sees, again and again"),
                 self._watch,
             )
-            self._opacity = actions.chosen(
+            self._opacity = actions.on_choice(
                 gui.add_slider("Opacity", 0.0, 1.0, 0.05, 0.8),
                 self._set_opacity,
                 key="backdrop",
             )
-            self._remove = actions.clicked(
-                plain_button(gui, "Remove the picture", icon=icon.X), self._clear
-            )
+            self._remove = self._button("Remove the picture", self._clear, icon=icon.X)
             self._show_sheet(None, "")
 
     def show(self, view: SessionView) -> None:
@@ -255,7 +247,8 @@ class BackdropPanel:
         self._show_picture(board_picture(image, self._actions.session.view.document.board), name)
 
     def _show_picture(self, found: BoardPicture, name: str) -> None:
-        words = f"{name}: {count_with_noun(len(found.ids), 'marker')}, off by {1e3 * found.error:.1f} mm"
+        markers = count_with_noun(len(found.ids), "marker")
+        words = f"{name}: {markers}, off by {1e3 * found.error:.1f} mm"
         sheet = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
         self._show_sheet(sheet, f"{words}. {found.note}" if found.note else words)
 
@@ -304,7 +297,7 @@ COLORINGS: dict[str, Coloring] = {
 """Ways to colour objects, by the text of the choice."""
 
 
-class DisplayPanel:
+class DisplayPanel(SidePanel):
     """Chooses how the scene is drawn.
 
     Args:
@@ -321,23 +314,28 @@ class DisplayPanel:
         views: PageViews,
         on_change: Callable[[], None],
     ) -> None:
+        super().__init__(gui, actions)
         self._views = views
         self._on_change = on_change
-        icon = viser.Icon
+        down, front = viser.Icon.ARROW_BAR_DOWN, viser.Icon.PERSPECTIVE
         with gui.add_folder("Display"):
             self._colors: Any = gui.add_dropdown("Objects", tuple(COLORINGS))
             self._markers = gui.add_checkbox("Markers", True)
             for field in (self._colors, self._markers):
-                actions.chosen(field, lambda value: on_change())
-            actions.clicked_by(
-                plain_button(gui, "From above", width=6, icon=icon.ARROW_BAR_DOWN, hint="View (T)"),
+                actions.on_choice(field, lambda value: on_change())
+            self._page_button(
+                "From above",
                 self.look_from_above,
+                width=6,
+                icon=down,
+                hint="View (T)",
             )
-            actions.clicked_by(
-                plain_button(
-                    gui, "From the front", width=6, icon=icon.PERSPECTIVE, hint="View (F)"
-                ),
+            self._page_button(
+                "From the front",
                 self.look_from_front,
+                width=6,
+                icon=front,
+                hint="View (F)",
             )
 
     @property
@@ -359,9 +357,9 @@ class DisplayPanel:
     def look_from_above(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera above the board."""
         if client is not None:
-            self._views.look(client, above=True)
+            self._views.set_view(client, above=True)
 
     def look_from_front(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera in front of the board."""
         if client is not None:
-            self._views.look(client, above=False)
+            self._views.set_view(client, above=False)

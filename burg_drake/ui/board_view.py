@@ -20,13 +20,9 @@ def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
 
     A board that its markers do not fit on is white.
     """
-    long_side_pixels = 1600  # Pixels along the longer side of the board.
-    paper = 252  # Grey value of the paper.
-    ink = 40  # Grey value of the markers.
-    rim = 200  # Grey value of the edge.
-    scale = long_side_pixels / max(board.size)
+    scale = 1600 / max(board.size)  # Pixels per metre.
     width, height = (max(2, round(scale * side)) for side in board.size)
-    gray = np.full((height, width), paper, dtype=np.uint8)
+    gray = np.full((height, width), 252, dtype=np.uint8)
     if markers:
         try:
             x, y, black = marker_grid(board)
@@ -35,9 +31,9 @@ def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
         else:
             columns = np.clip(np.searchsorted(x, (np.arange(width) + 0.5) / scale) - 1, 0, None)
             rows = np.clip(np.searchsorted(y, (np.arange(height) + 0.5) / scale) - 1, 0, None)
-            gray[black[columns][:, rows].T[::-1]] = ink
-    gray[[0, 1, -1, -2]] = rim
-    gray[:, [0, 1, -1, -2]] = rim
+            gray[black[columns][:, rows].T[::-1]] = 40
+    gray[[0, 1, -1, -2]] = 200
+    gray[:, [0, 1, -1, -2]] = 200
     return np.repeat(gray[..., None], 3, axis=2)
 
 
@@ -57,7 +53,6 @@ class BoardView:
 
     def show(self, board: Board, *, markers: bool = True) -> None:
         """Brings the browser to a board."""
-        board_depth = 3e-4  # Metres below the plane on which objects stand.
         if self._shown == (board, markers):
             return
         self._shown = board, markers
@@ -68,19 +63,17 @@ class BoardView:
             width,
             height,
             format="png",
-            position=(width / 2.0, height / 2.0, -board_depth),
+            position=(width / 2.0, height / 2.0, -3e-4),  # below the objects
             wxyz=(0.0, 1.0, 0.0, 0.0),  # viser's pictures hang with y down
             cast_shadow=False,
         )
 
     def _show_station(self, station: Station) -> None:
-        table_depth = 2e-3  # Metres below the plane on which objects stand.
-        table_color = (222, 216, 206)  # sRGB.
         X_SW = inverse(station.document.X_WS.matrix())
         table = station.document.table
         X_WT = np.eye(4)
-        X_WT[:3, 3] = *table.center, -table.size[2] / 2.0 - table_depth
-        self._box("/station/table", X_SW @ X_WT, table.size, table_color)
+        X_WT[:3, 3] = *table.center, -table.size[2] / 2.0 - 2e-3  # below the objects
+        self._box("/station/table", X_SW @ X_WT, table.size, (222, 216, 206))
         for name, obstacle in station.document.background.items():
             self._box(f"/station/{name}", X_SW @ obstacle.X_WB.matrix(), obstacle.size, FIXED_COLOR)
 
@@ -131,7 +124,7 @@ class BoardLayers:
         self._shown: dict[str, tuple[BoardOverlay, Any]] = {}
 
     def show(self, name: str, sheet: BoardOverlay | None) -> None:
-        """Brings one of `LAYER_HEIGHTS` to a picture, or to none."""
+        """Brings the layer `backdrop` or `reach` to a picture, or to none."""
         # Metres from the plane on which objects stand; the board is below all layers.
         layer_heights = {"backdrop": -2e-4, "reach": -1e-4}
         shown = self._shown.get(name)

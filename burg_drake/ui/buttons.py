@@ -1,4 +1,4 @@
-"""Buttons of panels, and the dialog that asks for confirmation."""
+"""The base class of panels, their buttons, and the dialog that asks for confirmation."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import viser
 
+from burg_drake.compose import Command
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_html import join_html, paragraph, picture_html
 
@@ -27,16 +28,16 @@ def plain_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: A
     return _mark_button(gui.add_button(label, **options), icon, width, "bd-quiet-button")
 
 
-def upload_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: Any) -> Any:
-    """A button that asks for a file; see `plain_button`."""
-    icon = options.pop("icon", None)
-    return _mark_button(gui.add_upload_button(label, **options), icon, width, "bd-quiet-button")
-
-
 def primary_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: Any) -> Any:
     """A button that stands out; see `plain_button`."""
     icon = options.pop("icon", None)
     return _mark_button(gui.add_button(label, **options), icon, width, "bd-strong-button")
+
+
+def upload_button(gui: viser.GuiApi, label: str, icon: str, mime_type: str) -> Any:
+    """A button as wide as the panel that asks for a file."""
+    button = gui.add_upload_button(label, mime_type=mime_type)
+    return _mark_button(button, icon, 12, "bd-quiet-button")
 
 
 def picture_button(
@@ -59,9 +60,8 @@ def set_button_picture(
         width: as it was made with.
         chosen: it gets a frame.
     """
-    html = picture_html(png, f"bd-mark bd-picture bd-{width}" + (" bd-chosen" if chosen else ""))
-    if button._icon_html != html:
-        button._icon_html = html
+    frame = " bd-chosen" if chosen else ""
+    button._icon_html = picture_html(png, f"bd-mark bd-picture bd-{width}{frame}")
 
 
 def _mark_button(button: Any, icon: str | None, width: int, look: str) -> Any:
@@ -77,13 +77,8 @@ def icon_svg(name: str) -> str:
     Args:
         name: one of `viser.Icon`.
     """
-    with _open_icon_archive().open(f"{name}.svg") as file:
-        return file.read().decode()
-
-
-@cache
-def _open_icon_archive() -> zipfile.ZipFile:
-    return zipfile.ZipFile(str(files("viser") / "_icons" / "tabler-icons.zip"))
+    with zipfile.ZipFile(str(files("viser") / "_icons" / "tabler-icons.zip")) as archive:
+        return archive.read(f"{name}.svg").decode()
 
 
 def ask_for_confirmation(
@@ -115,5 +110,47 @@ def ask_for_confirmation(
         modal.close()
         action()
 
-    actions.clicked(yes, go_on)
-    actions.clicked(no, modal.close)
+    actions.on_click(yes, go_on)
+    actions.on_click(no, modal.close)
+
+
+class SidePanel:
+    """A panel beside the scene.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._gui, self._actions = gui, actions
+
+    def _button(self, label: str, action: Callable[[], Any], **options: Any) -> Any:
+        """Adds a button; `options` as of `_page_button`."""
+        return self._page_button(label, lambda client: action(), **options)
+
+    def _selection_button(
+        self, label: str, command: Callable[[tuple[str, ...]], Command], **options: Any
+    ) -> Any:
+        """Adds a button whose command gets the names of the selected instances."""
+        session = self._actions.session
+        return self._button(label, lambda: session.do(command(session.view.selection)), **options)
+
+    def _page_button(
+        self,
+        label: str,
+        action: Callable[[viser.ClientHandle | None], Any],
+        *,
+        primary: bool = False,
+        **options: Any,
+    ) -> Any:
+        """Adds a button whose action gets the page that it was clicked on.
+
+        Args:
+            label: on the button.
+            action: what it does.
+            primary: it stands out.
+            options: see `plain_button`.
+        """
+        make = primary_button if primary else plain_button
+        return self._actions.on_page_click(make(self._gui, label, **options), action)

@@ -20,7 +20,7 @@ from burg_drake.core import TaskCancelled, list_names as names_of
 from burg_drake.scene import Board
 from burg_drake.ui.background_pictures import ReachTask
 from burg_drake.ui.board_view import BoardLayers, BoardOverlay
-from burg_drake.ui.buttons import plain_button, primary_button
+from burg_drake.ui.buttons import SidePanel
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_html import (
     color_dot,
@@ -52,9 +52,7 @@ class CheckPanel:
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
-        text = join_html(paragraph(*issues_html(view)))
-        if self._text.content != text:
-            self._text.content = text
+        self._text.content = join_html(paragraph(*issues_html(view)))
 
 
 def issues_html(view: SessionView) -> list[Child]:
@@ -79,34 +77,26 @@ def issues_html(view: SessionView) -> list[Child]:
     return [html_list(rows), secondary_text(f"and {more} more" if more > 0 else None)]
 
 
-class SettlePanel:
-    """Settles the scene.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class SettlePanel(SidePanel):
+    """Settles the scene."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        super().__init__(gui, actions)
         session, icon = actions.session, viser.Icon
         with gui.add_folder("Simulate"):
             self._text = gui.add_html("")
-            self._settle = actions.clicked(
-                primary_button(
-                    gui, "Settle in physics", icon=icon.PLAYER_PLAY, hint="Settle (Shift+S)"
-                ),
+            self._settle = self._button(
+                "Settle in physics",
                 session.settle,
+                primary=True,
+                icon=icon.PLAYER_PLAY,
+                hint="Settle (Shift+S)",
             )
-            self._accept = actions.clicked(
-                primary_button(gui, "Accept", width=6, icon=icon.CHECK, color="green"),
-                session.accept,
+            self._accept = self._button(
+                "Accept", session.accept, primary=True, width=6, icon=icon.CHECK, color="green"
             )
-            self._revert = actions.clicked(
-                plain_button(gui, "Revert", width=6, icon=icon.X), session.revert
-            )
-            self._cancel = actions.clicked(
-                plain_button(gui, "Cancel", icon=icon.PLAYER_STOP), session.revert
-            )
+            self._revert = self._button("Revert", session.revert, width=6, icon=icon.X)
+            self._cancel = self._button("Cancel", session.revert, icon=icon.PLAYER_STOP)
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
@@ -114,9 +104,7 @@ class SettlePanel:
         self._settle.disabled = not view.instances
         self._accept.visible = self._revert.visible = view.proposal is not None
         self._cancel.visible = view.working is not None
-        text = join_html(paragraph(*_status_lines(view)))
-        if self._text.content != text:
-            self._text.content = text
+        self._text.content = join_html(paragraph(*_status_lines(view)))
 
 
 def _status_lines(view: SessionView) -> list[Child]:
@@ -160,7 +148,7 @@ class GraspPanel:
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         self._session = actions.session
         with gui.add_folder("Grasps"):
-            self._on = actions.chosen(
+            self._on = actions.on_choice(
                 gui.add_checkbox(
                     "Count grasps",
                     False,
@@ -181,27 +169,18 @@ class GraspPanel:
                     secondary_text("Counting ...") if late else None,
                 )
             )
-        if self._text.content != text:
-            self._text.content = text
+        self._text.content = text
 
 
 def _grasp_count_table(grasps: Mapping[str, GraspCount]) -> str | None:
     if not grasps:
         return None
-    rows = [
-        (name, _blockers_text(count.in_the_way), count.clear, _reachable_text(count))
-        for name, count in grasps.items()
-    ]
+    rows = []
+    for name, count in grasps.items():
+        blockers = [f"{blocker} {number}" for blocker, number in count.in_the_way.items()]
+        reachable = "–" if count.reachable is None else str(count.reachable)
+        rows.append((name, ", ".join(blockers[:2]), count.clear, reachable))
     return html_table(("Object", "In the way", "Clear", "Reached"), rows, numbers=2)
-
-
-def _reachable_text(count: GraspCount) -> str:
-    return "–" if count.reachable is None else str(count.reachable)
-
-
-def _blockers_text(blockers: Mapping[str, int]) -> str:
-    max_blockers = 2  # Obstacles that are named.
-    return ", ".join(f"{name} {number}" for name, number in list(blockers.items())[:max_blockers])
 
 
 class ReachPanel:
@@ -231,8 +210,8 @@ class ReachPanel:
                 hint="Of the middle between the fingers above the board",
             )
             self._text = gui.add_html("")
-            actions.chosen(self._on, lambda on: self.show(actions.session.view))
-            actions.typed(self._height, lambda height: self.show(actions.session.view))
+            actions.on_choice(self._on, lambda on: self.show(actions.session.view))
+            actions.typed_field(self._height, lambda height: self.show(actions.session.view))
 
     def close(self) -> None:
         """Ends the worker process."""
@@ -270,8 +249,6 @@ class ReachPanel:
             self._actions.submit(lambda: self._finish(job), wait_for_typing=True)
 
     def _finish(self, job: BackgroundJob[ReachLayer]) -> None:
-        opacity = 0.55  # Opacity of the layer, 0 to 1.
-        cell_pixels = 8  # Pixels along a cell of the picture, so that cells keep sharp edges.
         if job is not self._job:
             return
         if job.error is not None:
@@ -282,12 +259,10 @@ class ReachPanel:
 
         layer = job.wait()
         width, depth = self._actions.session.view.document.board.size
-        pixels = reach_image(layer, pixels=cell_pixels)
-        self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), opacity))
+        pixels = reach_image(layer, pixels=8)  # of each cell, so that cells keep sharp edges
+        self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), opacity=0.55))
         share = f"Some orientation of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = join_html(paragraph(reachability_key(), secondary_text(share)))
 
     def _show_line(self, line: str) -> None:
-        content = join_html(paragraph(secondary_text(line))) if line else ""
-        if self._text.content != content:
-            self._text.content = content
+        self._text.content = join_html(paragraph(secondary_text(line))) if line else ""

@@ -41,7 +41,7 @@ class PageCamera:
     aspect: float
 
     @classmethod
-    def of(cls, camera: Any) -> PageCamera:
+    def from_viser(cls, camera: Any) -> PageCamera:
         """That of a viser client's `camera`."""
         X_SC = make_pose(rotation_from_quaternion(camera.wxyz), camera.position)
         return cls(X_SC, float(camera.fov), float(camera.aspect))
@@ -265,7 +265,7 @@ class Gizmo:
                     part.node.visible = False
                 continue
             if part.node is None:
-                part.node = self._made(part)
+                part.node = self._add_node(part)
             axes = (True, True, True)
             if view.planar:
                 axes = (False, False, True) if part is self._arrows else (True, True, False)
@@ -282,23 +282,22 @@ class Gizmo:
         self.show(self._actions.session.view)
 
     def handle_under(self, camera: PageCamera, p_SQ: Array) -> Handle | None:
-        """The handle that is drawn at a pointer, if any is; see `handles.handle_under`."""
+        """The handle that is drawn at a pointer, if any is; see the function `handle_under`."""
+        axes = (2,) if self._planar else (0, 1, 2)
         parts: list[Handle] = []
         if (X_SG := self._arrows.X_SG) is not None:
-            axes = (2,) if self._planar else (0, 1, 2)
             parts += [Handle("arrow", X_SG, axis) for axis in axes]
             if not self._planar:
                 parts += [Handle("square", X_SG, axis) for axis in axes]
         if (X_SG := self._rings.X_SG) is not None:
-            axes = (2,) if self._planar else (0, 1, 2)
             parts += [Handle("ring", X_SG, axis) for axis in axes]
         return handle_under(parts, camera, p_SQ)
 
-    def drop(self, client_id: int) -> None:
+    def forget_page(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
         self._actions.submit(lambda: self._end(client_id))
 
-    def put_back(self, client_id: int) -> bool:
+    def cancel_drag(self, client_id: int) -> bool:
         """Puts back what a page drags; False if it drags nothing."""
         if self._who != client_id or self._drag is None or self._drag.is_over:
             return False
@@ -306,12 +305,11 @@ class Gizmo:
         return True
 
     def _arrows_pose(self, view: SessionView, names: tuple[str, ...]) -> Array:
-        # Metres from the selection to the vertical arrow, which else hides it from above.
-        arrow_offset = 0.02
         middle = mean_center(view, names)
         if view.planar:
             right = max(float(instance_bounds(view.state, name)[1, 0]) for name in names)
-            return make_pose(p_AB=(right + arrow_offset, middle[1], middle[2]))
+            # beside the selection, which the vertical arrow else hides from above
+            return make_pose(p_AB=(right + 0.02, middle[1], middle[2]))
         R_SO = view.X_SO(names[0])[:3, :3]
         alone = len(names) == 1
         return make_pose(R_SO if alone and self._along_object else np.eye(3), middle)
@@ -321,7 +319,7 @@ class Gizmo:
         R_SG = view.X_SO(names[0])[:3, :3] if own else np.eye(3)
         return make_pose(R_SG, mean_center(view, names))
 
-    def _made(self, part: _GizmoPart) -> viser.TransformControlsHandle:
+    def _add_node(self, part: _GizmoPart) -> viser.TransformControlsHandle:
         node = self._scene.add_transform_controls(
             part.name,
             scale=GIZMO_SIZE,

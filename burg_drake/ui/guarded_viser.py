@@ -48,7 +48,8 @@ ACCEPTED_TYPES = frozenset(
     }
 )
 """Accepted types of messages: no forms, rendered pictures or sharing by a public tunnel."""
-_MESSAGE_LOG = logging.getLogger(__name__)
+_log = logging.getLogger(__name__)
+_log.addHandler(logging.NullHandler())  # what clients do wrong is not worth a line in the terminal
 
 
 class _Message(msgspec.Struct):
@@ -83,12 +84,12 @@ class BoundedConnection(ServerConnection):
         """The next message that is let through."""
         while True:
             raw = await super().recv(decode)
-            await self._pace()
+            await self._limit_rate()
             if isinstance(raw, str):
                 await self.close(1003)
                 continue  # which raises that the connection is closed
             try:
-                if self._is_let_through(_MESSAGE_DECODER.decode(raw)):
+                if self._accepts(_MESSAGE_DECODER.decode(raw)):
                     return raw
             except (msgspec.MsgspecError, UnicodeError, RecursionError):
                 await self.close(1007)
@@ -100,14 +101,14 @@ class BoundedConnection(ServerConnection):
         self._uploads.forget(self)
         super().connection_lost(exc)
 
-    def _is_let_through(self, message: _Message) -> bool:
+    def _accepts(self, message: _Message) -> bool:
         """Whether viser gets a message.
 
         Raises:
             RefusedError: no page sends that.
         """
         if message.type not in ACCEPTED_TYPES:
-            _MESSAGE_LOG.debug("dropped a %.60s from a browser", message.type)
+            _log.debug("dropped a %.60s from a browser", message.type)
             return False
         self._connected |= message.type == FIRST_MESSAGE_TYPE
         if message.type == "GuiUpdateMessage" and message.updates.keys() != {"value"}:
@@ -123,10 +124,10 @@ class BoundedConnection(ServerConnection):
                 parts=message.part_count,
             )
         if message.type == "FileTransferPart":
-            return self._uploads.take(self, message.transfer_uuid, len(message.content))
+            return self._uploads.receive_part(self, message.transfer_uuid, len(message.content))
         return True
 
-    async def _pace(self) -> None:
+    async def _limit_rate(self) -> None:
         """Waits if messages come too fast; what else is sent waits with the sender meanwhile."""
         now = time.monotonic()
         self._credit = min(MESSAGE_BURST, self._credit + MESSAGE_RATE * (now - self._paced)) - 1.0
@@ -136,10 +137,6 @@ class BoundedConnection(ServerConnection):
 
 
 _PATCH_LOCK = threading.Lock()  # Held while viser's output is suppressed.
-_SERVER_LOG = logging.getLogger(__name__)
-_SERVER_LOG.addHandler(
-    logging.NullHandler()
-)  # what clients do wrong is not worth a line in the terminal
 
 
 def guarded_server(listener: socket.socket, admission: Admission) -> viser.ViserServer:
@@ -190,7 +187,7 @@ def _patch_viser_serve(listener: socket.socket, admission: Admission) -> Iterato
             compression=None,
             max_size=MAX_MESSAGE_BYTES,
             create_connection=partial(BoundedConnection, uploads=Uploads()),  # type: ignore[arg-type]
-            logger=_SERVER_LOG,
+            logger=_log,
             server_header=None,
         )
 
@@ -206,7 +203,7 @@ def _handle_error(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> N
     error = context.get("exception")
     places = [] if error is None else [*traceback.walk_tb(error.__traceback__)]
     if places and places[-1][0].f_globals.get("__name__", "").startswith("viser."):
-        _SERVER_LOG.debug("a message could not be handled", exc_info=error)
+        _log.debug("a message could not be handled", exc_info=error)
     else:
         loop.default_exception_handler(context)
 

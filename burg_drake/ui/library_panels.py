@@ -18,9 +18,9 @@ from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import LAYOUTS
 from burg_drake.ui.background_pictures import ObjectPictures
 from burg_drake.ui.buttons import (
+    SidePanel,
     ask_for_confirmation,
     picture_button,
-    plain_button,
     set_button_picture,
 )
 from burg_drake.ui.page_actions import PageActions
@@ -34,26 +34,20 @@ from burg_drake.ui.panel_html import (
 from burg_drake.visualization import element
 
 
-class LibraryPanel:
-    """Shows a library's objects; a click puts one on the board.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class LibraryPanel(SidePanel):
+    """Shows a library's objects; a click puts one on the board."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        self._gui = gui
-        self._actions = actions
+        super().__init__(gui, actions)
         self._library: ObjectLibrary | None = None
         self._pictures: ObjectPictures | None = None
         self._buttons: dict[str, Any] = {}
         self._title = gui.add_html("")
-        self._search = actions.chosen(
+        self._search = actions.on_choice(
             gui.add_text(
                 "Search", "", hint="Shows objects whose name or description has all words"
             ),
-            lambda words: self._filter(words),
+            self._filter,
             key="search",
         )
         self._objects = gui.add_folder(None)
@@ -68,11 +62,14 @@ class LibraryPanel:
         if pictures is not self._pictures:
             self._library, self._pictures = view.library, pictures
             self._fill(view.library)
-        self._draw()
+        self.draw()
 
     def draw(self) -> None:
         """Shows the pictures that are there by now."""
-        self._draw()
+        assert self._pictures is not None
+        for name, button in self._buttons.items():
+            set_button_picture(button, self._pictures.get(name))
+        self._show_count()
 
     def _fill(self, library: ObjectLibrary) -> None:
         for button in self._buttons.values():
@@ -83,7 +80,7 @@ class LibraryPanel:
                 hint = entry.description or name
                 weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
                 button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
-                self._actions.clicked(button, partial(self._actions.session.do, AddObject(name)))
+                self._actions.on_click(button, partial(self._actions.session.do, AddObject(name)))
                 self._buttons[name] = button
         self._filter(self._search.value)
 
@@ -91,51 +88,37 @@ class LibraryPanel:
         if self._library is None:
             return
         wanted = words.lower().split()
-        found = 0
         for name, button in self._buttons.items():
             text = f"{name} {self._library.entry(name).description}".lower()
             button.visible = all(word in text for word in wanted)
-            found += button.visible
-        self._show_count(found)
+        self._show_count()
 
-    def _show_count(self, found: int) -> None:
+    def _show_count(self) -> None:
         library = self._library
         assert library is not None
+        found = sum(button.visible for button in self._buttons.values())
         total = len(library.objects)
-        count = f"{found} of {count_with_noun(total, 'object')}"
-        if found == total:
-            count = count_with_noun(total, "object")
+        count = count_with_noun(total, "object")
+        if found < total:
+            count = f"{found} of {count}"
         why = self._pictures.missing if self._pictures else ""
-        content = join_html(
+        self._title.content = join_html(
             paragraph(
                 title_html(library.name),
                 element("span", f" {count}; click one to add it", class_="bd-quiet"),
                 secondary_text(why) if why else None,
             )
         )
-        if self._title.content != content:
-            self._title.content = content
-
-    def _draw(self) -> None:
-        assert self._pictures is not None
-        for name, button in self._buttons.items():
-            set_button_picture(button, self._pictures.get(name))
-        self._show_count(sum(button.visible for button in self._buttons.values()))
 
 
 MAX_SEED = 2**31 - 1  # Largest seed of a random configuration.
 
 
-class FillPanel:
-    """Puts objects on the board at random, or takes all away.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class FillPanel(SidePanel):
+    """Puts objects on the board at random, or takes all away."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        self._actions = actions
+        super().__init__(gui, actions)
         icon = viser.Icon
         with gui.add_folder("Random configuration"):
             self._count = gui.add_number(
@@ -150,11 +133,9 @@ class FillPanel:
             self._seed: Any = gui.add_number(
                 "Seed", 1, min=0, max=MAX_SEED, step=1, hint="Of the next configuration"
             )
-            actions.clicked(
-                plain_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
-            )
-            self._clear = actions.clicked_by(
-                plain_button(gui, "Clear scene", width=6, icon=icon.TRASH), self._ask_to_clear
+            self._button("Shuffle", self._shuffle, width=6, icon=icon.ARROWS_SHUFFLE)
+            self._clear = self._page_button(
+                "Clear scene", self._ask_to_clear, width=6, icon=icon.TRASH
             )
 
     def show(self, view: SessionView) -> None:

@@ -81,12 +81,12 @@ class ObjectDrags:
             (np.abs(corners - start) < place_tolerance).any(axis=0).all()
         )
 
-    def drop(self, client_id: int) -> None:
+    def forget_page(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
         self._turned_from.pop(client_id, None)
         self._actions.submit(lambda: self._end(client_id))
 
-    def put_back(self, client_id: int) -> bool:
+    def cancel_drag(self, client_id: int) -> bool:
         """Puts back what a page drags; False if it drags nothing."""
         held = self._held.pop(client_id, None)
         if held is None or held.drag.is_over:
@@ -98,7 +98,7 @@ class ObjectDrags:
         """Takes what has happened on a page as an action; the event loop goes on at once."""
         client, client_id = event.client, event.client_id
         x = float(event.end_screen_pos[0])
-        camera = PageCamera.of(client.camera)
+        camera = PageCamera.from_viser(client.camera)
         if event.phase == "start":
             p_SG = np.array(event.start_position)
             if turns:
@@ -127,9 +127,6 @@ class ObjectDrags:
         self, client_id: int, camera: PageCamera, p_SQ: Array, x: float | None
     ) -> None:
         """Moves what is held, or turns it if `x` is given."""
-        up = np.array([0.0, 0.0, 1.0])  # Vertical in S.
-        # Radians that an object turns while the pointer crosses the whole page.
-        turn_per_width = 2.0 * np.pi
         held = self._held.get(client_id)
         if held is None:
             return
@@ -137,13 +134,14 @@ class ObjectDrags:
         if held.handle is not None:
             X = held.handle.motion(camera, held.p_SG, p_SQ)
         elif x is not None:
-            X = rotation_about_point(held.p_SM, rot_z(turn_per_width * (x - held.x)), np.zeros(3))
-        elif (p_SP := camera.on_plane(p_SQ, held.p_SG, up)) is not None:
+            turn = 2.0 * np.pi * (x - held.x)  # a full turn over the width of the page
+            X = rotation_about_point(held.p_SM, rot_z(turn), np.zeros(3))
+        elif (p_SP := camera.on_plane(p_SQ, held.p_SG, (0.0, 0.0, 1.0))) is not None:
             X = make_pose(p_AB=p_SP - held.p_SG)
         if X is not None:
-            self._carry(client_id, held, X)
+            self._move_held(client_id, held, X)
 
-    def _carry(self, client_id: int, held: _PageDrag, X: Array) -> None:
+    def _move_held(self, client_id: int, held: _PageDrag, X: Array) -> None:
         """Holds what is dragged where a motion (4, 4) in S brings it from the start."""
         try:
             held.drag.move(
@@ -203,14 +201,14 @@ class Picking:
         handle.on_click(modifier=ADD_MODIFIER)(add)
 
     async def _rectangle(self, event: Any) -> None:
-        camera = PageCamera.of(event.client.camera)
+        camera = PageCamera.from_viser(event.client.camera)
         lower, upper = np.array(event.screen_min), np.array(event.screen_max)
         if self._drags.is_end_of_turn(event.client_id, np.stack([lower, upper])):
             return
         more = ADD_MODIFIER in (event.modifier or "")
-        self._actions.submit(lambda: self._within(camera, lower, upper, more), event.client)
+        self._actions.submit(lambda: self._select_within(camera, lower, upper, more), event.client)
 
-    def _within(self, camera: PageCamera, lower: Any, upper: Any, more: bool) -> None:
+    def _select_within(self, camera: PageCamera, lower: Any, upper: Any, more: bool) -> None:
         view = self._actions.session.view
         names = [
             name for name in view.instances if _is_center_within(view, name, camera, lower, upper)

@@ -8,12 +8,12 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import viser
 
-from burg_drake.compose import Command, ComposeSession
+from burg_drake.compose import ComposeSession
 from burg_drake.core import BurgError
 
 Action = Callable[[], Any]
@@ -80,9 +80,9 @@ class ActionQueue:
         with self._condition:
             if self._closed:
                 return
-            last = self._last(wait_for_typing=wait_for_typing)
-            if key and last is not None and last.key == key:
-                self._waiting.remove(last)
+            waiting = [a for a in self._waiting if wait_for_typing or not a.wait_for_typing]
+            if key and waiting and waiting[-1].key == key:
+                self._waiting.remove(waiting[-1])
             self._waiting.append(asked)
             self._condition.notify_all()
 
@@ -108,12 +108,6 @@ class ActionQueue:
             except Exception as error:  # the page goes on, whatever one action stumbled over
                 _log.exception("an action of the setup page failed")
                 self._on_error(asked.who, f"that failed unexpectedly: {error!r}")
-
-    def _last(self, *, wait_for_typing: bool) -> _QueuedAction | None:
-        """The last action that waits; the last that is not patient for those that are not."""
-        return next(
-            (a for a in reversed(self._waiting) if wait_for_typing or not a.wait_for_typing), None
-        )
 
     def _next(self) -> _QueuedAction | None:
         """The next action, as soon as it may run; None at the end."""
@@ -146,25 +140,12 @@ CROSSING_TIME = 2.0
 """Seconds after a field was set in which typed values may have been sent before."""
 
 
-class AskForAction(Protocol):
-    """Has something done; see `ActionQueue.ask`."""
-
-    def __call__(
-        self,
-        action: Callable[[], Any],
-        client: viser.ClientHandle | None = None,
-        *,
-        key: str = "",
-        after: float = 0.0,
-    ) -> None: ...
-
-
 class TypedField:
     """A field that is typed in.
 
     Args:
         handle: of viser; it sends each key.
-        ask: has an action done; that of `PageActions`.
+        ask: has an action done; `PageActions.submit`.
         action: done with what was typed.
         after: the last key [s].
 
@@ -173,7 +154,7 @@ class TypedField:
     """
 
     def __init__(
-        self, handle: Any, ask: AskForAction, action: Callable[[Any], Any], after: float
+        self, handle: Any, ask: Callable[..., None], action: Callable[[Any], Any], after: float
     ) -> None:
         self.handle = handle
         self._action = action
@@ -200,9 +181,8 @@ class TypedField:
         if self._taken != self._typed:
             return
         if self.handle.value == value and self._crossed:
-            self.handle.value = _different_value(
-                value
-            )  # viser sends nothing if it believes that it is so
+            # viser sends nothing if it believes that it is so
+            self.handle.value = _different_value(value)
         if self.handle.value != value:
             self.handle.value = value
             self._set_at = time.monotonic()
@@ -236,10 +216,10 @@ class PageActions:
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
         self.session = session
-        self.queue = ActionQueue(self._refused)
+        self.queue = ActionQueue(self._show_error)
         self.on_refused: Callable[[], None] = lambda: None
         self._server = server
-        self._told: WeakKeyDictionary[viser.ClientHandle, list[Any]] = WeakKeyDictionary()
+        self._messages: WeakKeyDictionary[viser.ClientHandle, list[Any]] = WeakKeyDictionary()
 
     def submit(
         self,
@@ -253,19 +233,11 @@ class PageActions:
         """Has something done; see `ActionQueue.submit`."""
         self.queue.submit(action, client, key=key, after=after, wait_for_typing=wait_for_typing)
 
-    def do(self, command: Command, client: viser.ClientHandle | None = None) -> None:
-        """Has a step taken."""
-        self.submit(lambda: self.session.do(command), client)
-
-    def with_selection(self, command: Callable[[tuple[str, ...]], Command]) -> Callable[[], Any]:
-        """An action that takes a step with whatever is selected when it is done."""
-        return lambda: self.session.do(command(self.session.view.selection))
-
-    def clicked(self, button: Any, action: Callable[[], Any]) -> Any:
+    def on_click(self, button: Any, action: Callable[[], Any]) -> Any:
         """Has something done at each click of a button; gives the button."""
-        return self.clicked_by(button, lambda client: action())
+        return self.on_page_click(button, lambda client: action())
 
-    def clicked_by(self, button: Any, action: Callable[[viser.ClientHandle | None], Any]) -> Any:
+    def on_page_click(self, button: Any, action: Callable[[viser.ClientHandle | None], Any]) -> Any:
         """The same, of an action that needs to know whose page it was."""
 
         @button.on_click
@@ -274,7 +246,7 @@ class PageActions:
 
         return button
 
-    def chosen(self, field: Any, action: Callable[[Any], Any], *, key: str = "") -> Any:
+    def on_choice(self, field: Any, action: Callable[[Any], Any], *, key: str = "") -> Any:
         """Has something done with each value that a user gives a field; gives the field.
 
         Args:
@@ -292,7 +264,7 @@ class PageActions:
 
         return field
 
-    def typed(
+    def typed_field(
         self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING_DELAY
     ) -> TypedField:
         """The same of a field that is typed in: `after` the last key, or when typing ends."""
@@ -300,14 +272,13 @@ class PageActions:
 
     def show_message(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what was done; every page if `client` is None."""
-        message_duration = 5.0  # Seconds.
-        self._show(client, title or "Done", line, "green", message_duration)
+        self._show(client, title or "Done", line, "green", 5.0)
 
     def show_warning(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what it should know."""
         self._show(client, title or "Please note", line, "orange", WARNING_DURATION)
 
-    def _refused(self, client: viser.ClientHandle | None, line: str) -> None:
+    def _show_error(self, client: viser.ClientHandle | None, line: str) -> None:
         self._show(client, "That cannot be done", line, "red", WARNING_DURATION)
         self.on_refused()
 
@@ -317,7 +288,7 @@ class PageActions:
         max_messages = 3  # Messages on a page at a time; the oldest make room for a new one.
         clients = [client] if client is not None else self._server.get_clients().values()
         for each in clients:
-            shown = self._told.setdefault(each, [])
+            shown = self._messages.setdefault(each, [])
             for same in [note for note in shown if note.body == line]:
                 same.remove()
                 shown.remove(same)

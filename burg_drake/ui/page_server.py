@@ -89,7 +89,7 @@ def serve_page(
 
     Args:
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        port: to listen on; the first free one from 7200 on if None, any if 0.
         title: of the page.
 
     Raises:
@@ -124,9 +124,8 @@ def open_listener(host: str, port: int | None) -> socket.socket:
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
     """
-    first_port = 7200  # First port that is tried; the live camera view starts at 7100.
-    port_count = 50  # Ports that are tried.
-    ports = range(first_port, first_port + port_count) if port is None else range(port, port + 1)
+    # The live camera view starts at 7100.
+    ports = range(7200, 7250) if port is None else range(port, port + 1)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in ports:
         try:

@@ -26,7 +26,7 @@ class StatusStyle:
     @property
     def hex(self) -> str:
         """The colour as HTML has it."""
-        return hex_color(self.color)
+        return "#" + bytes(self.color).hex()
 
 
 STATUS_STYLES: dict[str, StatusStyle] = {
@@ -39,9 +39,8 @@ STATUS_STYLES: dict[str, StatusStyle] = {
 }
 """Style by status; green, red and pink as in Rudorfer et al. (2022), blue for warnings."""
 
-UNCHECKED_STYLE = StatusStyle(
-    (120, 120, 120), "not checked"
-)  # Style of an instance without a status.
+UNCHECKED_STYLE = StatusStyle((120, 120, 120), "not checked")
+"""Style of an instance without a status."""
 FIXED_COLOR: Rgb8 = (150, 155, 162)
 """sRGB of background objects and obstacles."""
 
@@ -49,11 +48,6 @@ FIXED_COLOR: Rgb8 = (150, 155, 162)
 def status_style(status: str) -> StatusStyle:
     """How a status is shown."""
     return STATUS_STYLES.get(status, UNCHECKED_STYLE)
-
-
-def hex_color(color: Rgb8) -> str:
-    """A colour as HTML has it."""
-    return "#" + "".join(f"{channel:02x}" for channel in color)
 
 
 def paragraph(*children: Child) -> Html:
@@ -101,16 +95,11 @@ def html_table(heads: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers
         numbers: how many columns, from the right, have numbers.
     """
     names = list(heads)
+    classes = [None] * (len(names) - numbers) + ["bd-number"] * numbers
 
     def row(cells: Iterable[Child], kind: str) -> Html:
-        first = len(names) - numbers
-        return element(
-            "tr",
-            *(
-                element(kind, cell, class_="bd-number" if i >= first else None)
-                for i, cell in enumerate(cells)
-            ),
-        )
+        pairs = zip(cells, classes, strict=True)
+        return element("tr", *(element(kind, cell, class_=name) for cell, name in pairs))
 
     return element("table", row(names, "th"), *(row(r, "td") for r in rows), class_="bd-table")
 

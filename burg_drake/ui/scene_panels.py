@@ -12,7 +12,7 @@ import viser
 
 from burg_drake.compose import FileChanged, SessionView, UnsavedChanges
 from burg_drake.printout import PAPERS, PrintSettings
-from burg_drake.ui.buttons import ask_for_confirmation, plain_button, primary_button
+from burg_drake.ui.buttons import SidePanel, ask_for_confirmation
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_html import (
     STATUS_STYLES,
@@ -27,7 +27,7 @@ from burg_drake.ui.shortcuts import KeysDialog
 from burg_drake.visualization import Html, element
 
 
-class SummaryPanel:
+class SummaryPanel(SidePanel):
     """Says how the scene is, and takes steps back.
 
     Args:
@@ -37,36 +37,26 @@ class SummaryPanel:
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, keys: KeysDialog) -> None:
+        super().__init__(gui, actions)
         icon, session = viser.Icon, actions.session
         self._text = gui.add_html("")
-        self._dismiss = actions.clicked(plain_button(gui, "I have read this"), self._read)
-        self._undo = actions.clicked(
-            plain_button(gui, "Undo", width=4, icon=icon.ARROW_BACK_UP), session.undo
+        self._dismiss = self._button("I have read this", self._dismiss_notices)
+        self._undo = self._button("Undo", session.undo, width=4, icon=icon.ARROW_BACK_UP)
+        self._redo = self._button("Redo", session.redo, width=4, icon=icon.ARROW_FORWARD_UP)
+        self._page_button(
+            "Keys", keys.toggle, width=4, icon=icon.KEYBOARD, hint="Mouse and keys (H)"
         )
-        self._redo = actions.clicked(
-            plain_button(gui, "Redo", width=4, icon=icon.ARROW_FORWARD_UP), session.redo
-        )
-        actions.clicked_by(
-            plain_button(gui, "Keys", width=4, icon=icon.KEYBOARD, hint="Mouse and keys (H)"),
-            keys.toggle,
-        )
-        self._session = session
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
-        text = join_html(paragraph(*_summary_html(view)))
-        if self._text.content != text:
-            self._text.content = text
+        self._text.content = join_html(paragraph(*_summary_html(view)))
         self._dismiss.visible = bool(view.notices)
-        for button, label, verb in (
-            (self._undo, view.undo_label, "Undo"),
-            (self._redo, view.redo_label, "Redo"),
-        ):
-            _set_enabled(button, label, verb)
+        _set_enabled(self._undo, view.undo_label, "Undo")
+        _set_enabled(self._redo, view.redo_label, "Redo")
 
-    def _read(self) -> None:
-        for line in self._session.view.notices:
-            self._session.dismiss(line)
+    def _dismiss_notices(self) -> None:
+        for line in self._actions.session.view.notices:
+            self._actions.session.dismiss(line)
 
 
 def _set_enabled(button: Any, label: str | None, verb: str) -> None:
@@ -117,48 +107,34 @@ NO_SCENES = "(none in the folder)"  # Choice while the folder has no scenes.
 Client = viser.ClientHandle | None
 
 
-class FilePanel:
-    """Saves, loads and prints scenes.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class FilePanel(SidePanel):
+    """Saves, loads and prints scenes."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        self._actions = actions
+        super().__init__(gui, actions)
         self._shown_name = self._shown_library = ""
         icon = viser.Icon
         with gui.add_folder("Save"):
             self._name: Any = gui.add_text("Name", "", hint="Of the file")
-            actions.clicked_by(
-                primary_button(gui, "Save scene", icon=icon.DEVICE_FLOPPY), self.save
-            )
+            self._page_button("Save scene", self.save, primary=True, icon=icon.DEVICE_FLOPPY)
         with gui.add_folder("Load"):
             self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
-            actions.clicked_by(plain_button(gui, "Load scene", icon=icon.FOLDER_OPEN), self._load)
+            self._page_button("Load scene", self._load, icon=icon.FOLDER_OPEN)
             self._library: Any = gui.add_dropdown("Library", actions.session.libraries())
-            actions.clicked_by(
-                plain_button(
-                    gui, "New scene", width=6, icon=icon.FILE_PLUS, hint="With this library"
-                ),
-                self._begin,
+            self._page_button(
+                "New scene", self._begin, width=6, icon=icon.FILE_PLUS, hint="With this library"
             )
-            actions.clicked(
-                plain_button(
-                    gui,
-                    "Use library",
-                    width=6,
-                    icon=icon.PACKAGE,
-                    hint="Take the objects of this scene, and new ones, from this library",
-                ),
+            self._button(
+                "Use library",
                 lambda: actions.session.use_library(self._library.value),
+                width=6,
+                icon=icon.PACKAGE,
+                hint="Take the objects of this scene, and new ones, from this library",
             )
         with gui.add_folder("Print"):
             self._page = gui.add_dropdown("Page size", tuple(PAPERS), initial_value="A4")
-            actions.clicked_by(
-                plain_button(gui, "Save printout", icon=icon.PRINTER, hint="Download it as PDF"),
-                self.print_out,
+            self._page_button(
+                "Save printout", self.print_out, icon=icon.PRINTER, hint="Download it as PDF"
             )
 
     def show(self, view: SessionView) -> None:
@@ -182,9 +158,10 @@ class FilePanel:
         """Writes the scene to the file of the name that stands in the field."""
         session, name = self._actions.session, self._name.value.strip()
         view = session.view
-        own = view.path is not None and name in ("", view.path.stem)
+        own = view.path is not None and name == view.path.stem
+        other_name = None if own else name or None
         try:
-            view = session.save(None if own else name or None)
+            view = session.save(other_name)
         except FileChanged as error:
             if client is None:
                 raise
@@ -194,7 +171,7 @@ class FilePanel:
                 "Overwrite the file?",
                 str(error),
                 "Overwrite",
-                lambda: session.save(None if own else name or None, overwrite=True),
+                lambda: session.save(other_name, overwrite=True),
             )
             return
         assert view.path is not None

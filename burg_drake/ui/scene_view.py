@@ -1,4 +1,4 @@
-"""Objects in the browser: their meshes, outlines, settling proposal and height above the support."""
+"""Objects in the browser: meshes, outlines, settling proposal, and height above the support."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 import trimesh
 import viser
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.compose import (
     SessionView,
@@ -30,6 +29,7 @@ from burg_drake.core import (
 )
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import convex_polygon
 from burg_drake.ui.panel_html import FIXED_COLOR, Rgb8, status_style
 from burg_drake.visualization import linear_light
 
@@ -101,14 +101,13 @@ def _read_mesh(library: ObjectLibrary, name: str) -> ObjectMesh:
 
 def _make_matte(part: trimesh.Trimesh) -> None:
     """Gives a part a surface that does not shine like metal, which glTF takes for the default."""
-    roughness = 0.75  # Roughness of paper, paint and plastic.
     max_texture = 1024  # Pixels along each side; larger textures are reduced.
     material = getattr(part.visual, "material", None)
     if material is None:
         return
     if hasattr(material, "to_pbr"):
         material = material.to_pbr()
-    material.metallicFactor, material.roughnessFactor = 0.0, roughness
+    material.metallicFactor, material.roughnessFactor = 0.0, 0.75  # paper, paint and plastic
     if material.baseColorFactor is not None:  # of colours as files have them; glTF has light
         r, g, b, a = np.asarray(material.baseColorFactor, dtype=float) / 255.0
         material.baseColorFactor = [*(float(linear_light(c)) for c in (r, g, b)), a]
@@ -127,7 +126,7 @@ def _geometry_only(part: trimesh.Trimesh) -> trimesh.Trimesh:
 Coloring = Literal["objects", "random", "status"]
 
 OBJECTS_NODE = "/objects"  # Path of the objects in viser's scene.
-OUTLINE_LINE_WIDTH = 2.0  # Pixels.
+OUTLINE_LINE_WIDTH = 2.0  # Pixels; outlines of selected objects are wider.
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +136,7 @@ class ShownInstance:
     Attributes:
         object: its name in the library.
         X_SO: (4, 4) pose.
-        status: see `status_colors`.
+        status: see `STATUS_STYLES`.
         selected: whether it is.
         fixed: whether it is background.
     """
@@ -185,7 +184,7 @@ class SceneView:
         self._coloring: Coloring = "objects"
         self._made = 0
 
-    def use(self, shapes: ObjectMeshes) -> None:
+    def use_library(self, shapes: ObjectMeshes) -> None:
         """Shows objects of another library from now on."""
         if shapes is not self._shapes:
             self.show({}, self._coloring)
@@ -208,15 +207,14 @@ class SceneView:
         nodes.frame.remove()
 
     def _add(self, name: str, shown: ShownInstance) -> _InstanceNodes:
-        missing_color = (200, 60, 200)  # sRGB of the ball that replaces an unreadable shape.
-        ball_radius = 0.03  # Metres.
+        ball_radius = 0.03  # Metres, of the ball that replaces an unreadable shape.
         frame = self._scene.add_frame(f"{OBJECTS_NODE}/{name}", show_axes=False)
         mesh: Any
         try:
             shape = self._shapes[shown.object]
         except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
             mesh = self._scene.add_icosphere(
-                f"{OBJECTS_NODE}/{name}/look", radius=ball_radius, color=missing_color
+                f"{OBJECTS_NODE}/{name}/look", radius=ball_radius, color=(200, 60, 200)
             )
             p_OV = ball_radius * np.vstack([np.eye(3), -np.eye(3)])
         else:
@@ -237,7 +235,6 @@ class SceneView:
 
     def _update(self, nodes: _InstanceNodes, name: str, shown: ShownInstance) -> None:
         outline_height = 4e-4  # Metres over the board; at its own height outlines would flicker.
-        selected_width = 6.0  # Pixels.
         nodes.frame.position = shown.X_SO[:3, 3]
         nodes.frame.wxyz = quaternion_from_rotation(shown.X_SO[:3, :3])
         self._paint(nodes, name, shown)
@@ -247,7 +244,7 @@ class SceneView:
             line = footprint(nodes.p_OV, shown.X_SO, outline_height)
             nodes.outline.points = line.astype(np.float32)
             nodes.outline.colors = np.array(_status_color(shown), dtype=np.uint8)
-            nodes.outline.thickness = selected_width if shown.selected else OUTLINE_LINE_WIDTH
+            nodes.outline.thickness = 6.0 if shown.selected else OUTLINE_LINE_WIDTH
 
     def _paint(self, nodes: _InstanceNodes, name: str, shown: ShownInstance) -> None:
         if self._coloring == "objects":
@@ -257,14 +254,14 @@ class SceneView:
             return
         color = nodes.color if self._coloring == "random" else _status_color(shown)
         if nodes.tint is None:
-            nodes.tint = self._tinted(name, shown.object, color)
-        elif nodes.tint is not None:
+            nodes.tint = self._add_tinted_mesh(name, shown.object, color)
+        else:
             nodes.tint.color = color
         if nodes.tint is not None:
             nodes.tint.visible = True
             nodes.mesh.visible = False
 
-    def _tinted(self, name: str, object: str, color: Rgb8) -> viser.MeshHandle | None:
+    def _add_tinted_mesh(self, name: str, object: str, color: Rgb8) -> viser.MeshHandle | None:
         try:
             shape = self._shapes[object]
         except BurgError:
@@ -296,18 +293,9 @@ def footprint(p_OV: Array, X_SO: Array, height: float, margin: float = 0.004) ->
     p_SV = transform_points(X_SO, p_OV)[:, :2]
     around = np.linspace(0.0, 2.0 * np.pi, 4 * corner_points, endpoint=False)
     disc = margin * np.stack([np.cos(around), np.sin(around)], axis=-1)
-    points = (_convex_hull(p_SV)[:, None] + disc).reshape(-1, 2)
-    line = _convex_hull(points)
+    line = convex_polygon((p_SV[:, None] + disc).reshape(-1, 2))
     line = np.column_stack([line, np.full(len(line), height)])
     return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
-
-
-def _convex_hull(points: Array) -> Array:
-    """(M, 2) corners of a planar hull, counter-clockwise; all points where it is flat."""
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:
-        return points
 
 
 class ProposalView:
@@ -329,8 +317,6 @@ class ProposalView:
             proposal: of the view.
             shapes: of the library's objects.
         """
-        min_motion = 2e-3  # Metres; the shade of an object that moves less would flicker within it.
-        min_turn_deg = 2.0  # Degrees, for the same reason.
         if proposal is self._shown:
             return
         self._shown = proposal
@@ -339,7 +325,8 @@ class ProposalView:
         self._handles = []
         if proposal is None:
             return
-        moved = names_of_moved_instances(proposal, min_motion, min_turn_deg)
+        # The shade of an object that moves less would flicker within it.
+        moved = names_of_moved_instances(proposal, distance=2e-3, angle_deg=2.0)
         for instance in proposal.document.instances:
             if instance_name(instance) in moved:
                 self._add(instance_name(instance), instance.object, instance.X_SO.matrix(), shapes)
@@ -391,20 +378,16 @@ class HeightView:
             lower, upper = instance_bounds(view.state, name)
             x, y = (lower[:2] + upper[:2]) / 2.0
             ends = np.array([[x, y, lower[2]], [x, y, lower[2] - gap]])
-            shown = self._shown.get(name) or self._made(name, ends)
+            shown = self._shown.get(name) or self._add_line(name, ends)
             self._shown[name] = shown
             shown.line.points = ends[None].astype(np.float32)
             shown.label.position = ends.mean(axis=0)
             shown.label.text = f"{1e3 * gap:.1f} mm"
 
-    def _made(self, name: str, ends: Array) -> _GapLine:
-        gap_color = (64, 140, 230)  # sRGB, as the status of what hovers.
+    def _add_line(self, name: str, ends: Array) -> _GapLine:
+        color = status_style("hovering").color
         line = self._scene.add_line_segments(
-            f"/heights/{name}",
-            ends[None],
-            gap_color,
-            thickness=2.0,
-            thickness_units="screen",
+            f"/heights/{name}", ends[None], color, thickness=2.0, thickness_units="screen"
         )
         label = self._scene.add_label(f"/heights/{name}/label", "", anchor="center-left")
         return _GapLine(line, label)

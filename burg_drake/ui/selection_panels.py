@@ -11,10 +11,12 @@ import viser
 
 from burg_drake.compose import (
     Align,
+    Axis,
     Delete,
     Direction,
     Distribute,
     Duplicate,
+    Edge,
     MoveObjects,
     PutDown,
     Rename,
@@ -29,7 +31,7 @@ from burg_drake.compose import (
 from burg_drake.core import Array, rot_z, rotation_angle, rotation_from_rpy, rpy_from_rotation
 from burg_drake.objects import ObjectEntry
 from burg_drake.ui.background_pictures import ObjectPictures
-from burg_drake.ui.buttons import picture_button, plain_button, set_button_picture
+from burg_drake.ui.buttons import SidePanel, picture_button, set_button_picture
 from burg_drake.ui.page_actions import NAME_TYPING_DELAY, PageActions
 from burg_drake.ui.panel_html import (
     color_dot,
@@ -42,7 +44,7 @@ from burg_drake.ui.panel_html import (
 )
 
 
-class ObjectPanel:
+class ObjectPanel(SidePanel):
     """Shows the selection and edits it.
 
     Args:
@@ -54,42 +56,39 @@ class ObjectPanel:
     def __init__(
         self, gui: viser.GuiApi, actions: PageActions, switch_axes: Callable[[], None]
     ) -> None:
-        self._actions = actions
+        super().__init__(gui, actions)
         self._text = gui.add_html("")
         self._one = gui.add_folder(None)
         with self._one:
-            self._name = actions.typed(
+            self._name = actions.typed_field(
                 gui.add_text("Name", ""), self._rename, after=NAME_TYPING_DELAY
             )
-            self._fixed = actions.chosen(
+            self._fixed = actions.on_choice(
                 gui.add_checkbox(
                     "Background", False, hint="It stays where it is when the scene is simulated"
                 ),
                 self._fix,
             )
             self._numbers = _PoseFields(gui, actions)
-        self._restrict = actions.chosen(
+        self._restrict = actions.on_choice(
             gui.add_checkbox(
                 "Keep upright",
                 True,
                 hint="Objects keep their tilt while they are moved, and their height unless they"
                 " are raised; without it they have handles for all six directions",
             ),
-            lambda planar: actions.session.restrict_movement(planar),
+            actions.session.restrict_movement,
         )
-        self._axes = actions.clicked(
-            plain_button(
-                gui,
-                "Arrows: board or object",
-                icon=viser.Icon.AXIS_X,
-                hint="Arrows lie along the axes of the board, or of the object (X); rings always"
-                " lie about those of the object",
-            ),
+        self._axes = self._button(
+            "Arrows: board or object",
             switch_axes,
+            icon=viser.Icon.AXIS_X,
+            hint="Arrows lie along the axes of the board, or of the object (X); rings always"
+            " lie about those of the object",
         )
         self._some = gui.add_folder(None)
         with self._some:
-            self._buttons(gui, actions)
+            self._add_buttons()
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
@@ -112,24 +111,12 @@ class ObjectPanel:
     def _fix(self, fixed: bool) -> None:
         self._actions.session.do(SetFixed(self._actions.session.view.selection, fixed))
 
-    def _buttons(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        icon, selected = viser.Icon, actions.with_selection
-        actions.clicked(
-            plain_button(gui, "−90°", width=2, hint="Turn clockwise"),
-            selected(lambda names: Turn(names, -90.0)),
-        )
-        actions.clicked(
-            plain_button(gui, "+90°", width=2, hint="Turn counter-clockwise"),
-            selected(lambda names: Turn(names, 90.0)),
-        )
-        actions.clicked(
-            plain_button(gui, "Copy", width=4, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
-            selected(Duplicate),
-        )
-        actions.clicked(
-            plain_button(gui, "Delete", width=4, icon=icon.TRASH, hint="Delete (Del)"),
-            selected(Delete),
-        )
+    def _add_buttons(self) -> None:
+        icon, add = viser.Icon, self._selection_button
+        add("−90°", lambda names: Turn(names, -90.0), width=2, hint="Turn clockwise")
+        add("+90°", lambda names: Turn(names, 90.0), width=2, hint="Turn counter-clockwise")
+        add("Copy", Duplicate, width=4, icon=icon.COPY, hint="Duplicate (Ctrl+D)")
+        add("Delete", Delete, width=4, icon=icon.TRASH, hint="Delete (Del)")
 
 
 class _PoseFields:
@@ -139,14 +126,14 @@ class _PoseFields:
         max_value = 100_000.0  # Millimetres or degrees.
         self._actions = actions
         zeros = (0.0, 0.0, 0.0)
-        self._position = actions.typed(
+        self._position = actions.typed_field(
             gui.add_vector3("x, y, z [mm]", zeros, step=0.01), self._place
         )
-        self._yaw = actions.typed(
+        self._yaw = actions.typed_field(
             gui.add_number("yaw [°]", 0.0, step=0.01, min=-max_value, max=max_value),
             self._turn,
         )
-        self._angles = actions.typed(
+        self._angles = actions.typed_field(
             gui.add_vector3("roll, pitch, yaw [°]", zeros, step=0.01), self._turn_freely
         )
 
@@ -232,16 +219,11 @@ def _selection_html(view: SessionView) -> str:
     )
 
 
-class PosePanel:
-    """Offers the stable poses that the objects selected have in common.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class PosePanel(SidePanel):
+    """Offers the stable poses that the objects selected have in common."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        self._gui, self._actions = gui, actions
+        super().__init__(gui, actions)
         self._folder = gui.add_folder("Stable poses")
         with self._folder:
             self._text = gui.add_html("")
@@ -294,7 +276,7 @@ class PosePanel:
                     hint=f"Pose {k}: {100.0 * pose.probability:.1f} % of drops end so; {tested}"
                     + ("; it can roll on" if pose.rolls else ""),
                 )
-                self._actions.clicked(button, partial(self._set, k))
+                self._actions.on_click(button, partial(self._set, k))
                 self._buttons.append(button)
 
 
@@ -315,49 +297,31 @@ def _current_stable_pose(view: SessionView) -> int | None:
     return k if float(rotation_angle(R_k.T @ R_SO)) < max_tilt else None
 
 
-class ArrangePanel:
-    """Buttons that move what is selected.
-
-    Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-    """
+class ArrangePanel(SidePanel):
+    """Buttons that move what is selected."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        grid_mm = 10.0  # Millimetres between the points of the grid.
-        min_grid_mm = 0.1  # Millimetres.
-        max_grid_mm = 1000.0  # Millimetres.
-        self._gui, self._actions = gui, actions
+        super().__init__(gui, actions)
         self._folder = gui.add_folder("Arrange")
         with self._folder:
-            self._contact()
-            self._grid = gui.add_number(
-                "Grid [mm]", grid_mm, min=min_grid_mm, max=max_grid_mm, step=0.1
-            )
-            actions.clicked(
-                plain_button(gui, "Snap to grid", icon=viser.Icon.GRID_DOTS, hint="Snap (G)"),
-                self.snap,
-            )
+            self._add_contact_buttons()
+            self._grid = gui.add_number("Grid [mm]", 10.0, min=0.1, max=1000.0, step=0.1)
+            self._button("Snap to grid", self.snap, icon=viser.Icon.GRID_DOTS, hint="Snap (G)")
             self._several = gui.add_folder(None)
             with self._several:
-                self._alignment()
-
-    @property
-    def spacing(self) -> float:
-        """Of the grid [m]."""
-        return 1e-3 * float(self._grid.value)
+                self._add_alignment_buttons()
 
     def snap(self) -> None:
         """Brings what is selected onto the grid."""
         session = self._actions.session
-        session.do(SnapToGrid(session.view.selection, self.spacing))
+        session.do(SnapToGrid(session.view.selection, 1e-3 * float(self._grid.value)))
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
         self._folder.visible = bool(view.selection)
         self._several.visible = len(view.selection) > 1
 
-    def _contact(self) -> None:
+    def _add_contact_buttons(self) -> None:
         self._gui.add_html(join_html(paragraph(small_heading("Move until it touches"))))
         directions: tuple[tuple[str, Direction, str], ...] = (
             ("←", "-x", "to the left"),
@@ -366,33 +330,29 @@ class ArrangePanel:
             ("↑", "y", "to the back"),
         )
         for label, direction, where in directions:
-            self._button(
+            self._selection_button(
                 label,
-                2,
-                f"Move {where} until it touches something",
-                partial(_snap_command, direction),
+                partial(SnapToContact, direction=direction),
+                width=2,
+                hint=f"Move {where} until it touches something",
             )
-        self._button("Put down", 4, "Lower it until it stands (B)", PutDown)
+        self._selection_button("Put down", PutDown, width=4, hint="Lower it until it stands (B)")
 
-    def _alignment(self) -> None:
+    def _add_alignment_buttons(self) -> None:
         self._gui.add_html(join_html(paragraph(small_heading("Align"))))
         icon = viser.Icon
-        for edge, drawn, what in (
+        edges: tuple[tuple[Edge, Any, str], ...] = (
             ("left", icon.LAYOUT_ALIGN_LEFT, "left edges"),
             ("center_x", icon.LAYOUT_ALIGN_CENTER, "middles, in a column"),
             ("right", icon.LAYOUT_ALIGN_RIGHT, "right edges"),
             ("top", icon.LAYOUT_ALIGN_TOP, "far edges"),
             ("center_y", icon.LAYOUT_ALIGN_MIDDLE, "middles, in a row"),
             ("bottom", icon.LAYOUT_ALIGN_BOTTOM, "near edges"),
-        ):
-            self._button("", 2, f"Align {what}", lambda names, e=edge: Align(names, e), icon=drawn)
-        self._button("Even gaps ↔", 6, "Distribute along x", lambda names: Distribute(names, "x"))
-        self._button("Even gaps ↕", 6, "Distribute along y", lambda names: Distribute(names, "y"))
-
-    def _button(self, label: str, width: int, hint: str, command: Any, **options: Any) -> None:
-        button = plain_button(self._gui, label, width=width, hint=hint, **options)
-        self._actions.clicked(button, self._actions.with_selection(command))
-
-
-def _snap_command(direction: Direction, names: tuple[str, ...]) -> SnapToContact:
-    return SnapToContact(names, direction)
+        )
+        for edge, drawn, what in edges:
+            align = partial(Align, edge=edge)
+            self._selection_button("", align, width=2, hint=f"Align {what}", icon=drawn)
+        axes: tuple[tuple[str, Axis], ...] = (("Even gaps ↔", "x"), ("Even gaps ↕", "y"))
+        for label, axis in axes:
+            distribute = partial(Distribute, axis=axis)
+            self._selection_button(label, distribute, width=6, hint=f"Distribute along {axis}")

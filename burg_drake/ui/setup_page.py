@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 
@@ -30,17 +30,11 @@ from burg_drake.ui.shortcuts import ActionCall, KeysDialog, register_shortcuts, 
 from burg_drake.ui.viewpoints import PageViews
 
 
-class _Panel(Protocol):
-    """Shows a view of the session."""
-
-    def show(self, view: SessionView) -> None: ...
-
-
 class SetupPage:
     """A page on a session.
 
     Args:
-        server: viser's, with nothing on it yet; see `door.serve`.
+        server: viser's, with nothing on it yet; see `serve_page`.
         session: the scene.
 
     Attributes:
@@ -53,7 +47,7 @@ class SetupPage:
         view = session.view
         self._pictures = self._pictures_of(view.library)
         self._shapes = ObjectMeshes(view.library)
-        self._set_stage()
+        self._configure_scene()
         self._board = BoardView(server.scene, session.station)
         self._layers = BoardLayers(server.scene)
         self._gizmo = Gizmo(server.scene, self.actions)
@@ -64,7 +58,9 @@ class SetupPage:
         self._heights = HeightView(server.scene)
         self._build()
         self.actions.on_refused = self._refresh
-        self._unsubscribe = session.on_change(lambda view: self._changed())
+        self._unsubscribe = session.on_change(
+            lambda view: self.actions.submit(self._refresh, key="refresh", wait_for_typing=True)
+        )
         server.on_client_disconnect(self._on_disconnect)
         self._refresh()
 
@@ -76,7 +72,7 @@ class SetupPage:
         self._backdrop.close()
         self._pictures.close()
 
-    def _set_stage(self) -> None:
+    def _configure_scene(self) -> None:
         scene, gui = self._server.scene, self._server.gui
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -117,7 +113,7 @@ class SetupPage:
             self._backdrop = BackdropPanel(gui, actions, self._layers)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(330)
-        self._panels: tuple[_Panel, ...] = (
+        self._panels: tuple[Any, ...] = (
             self._summary,
             self._object,
             self._arrange,
@@ -130,9 +126,9 @@ class SetupPage:
             self._reach,
             self._backdrop,
         )
-        register_shortcuts(gui, actions, self._calls())
+        register_shortcuts(gui, actions, self._shortcut_calls())
 
-    def _calls(self) -> dict[str, ActionCall]:
+    def _shortcut_calls(self) -> dict[str, ActionCall]:
         """What keys do; see `shortcuts`."""
 
         def anywhere(action: Callable[[], Any]) -> ActionCall:
@@ -155,7 +151,7 @@ class SetupPage:
         if client is not None and self._keys.close(client):
             return
         who = None if client is None else client.client_id
-        if who is None or not (self._drags.put_back(who) or self._gizmo.put_back(who)):
+        if who is None or not (self._drags.cancel_drag(who) or self._gizmo.cancel_drag(who)):
             self._session.select(())
 
     def _attach(self, handle: Any, name: str) -> None:
@@ -175,9 +171,6 @@ class SetupPage:
             self._library.draw()
             self._poses.draw()
 
-    def _changed(self) -> None:
-        self.actions.submit(self._refresh, key="refresh", wait_for_typing=True)
-
     def _refresh(self) -> None:
         """Brings everything to the session's view of now."""
         view = self._session.view
@@ -185,7 +178,7 @@ class SetupPage:
             self._pictures.close()
             self._pictures = self._pictures_of(view.library)
             self._shapes = ObjectMeshes(view.library)
-            self._scene.use(self._shapes)
+            self._scene.use_library(self._shapes)
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
             self._scene.show(_shown_instances(view), self._display.coloring)
@@ -200,9 +193,9 @@ class SetupPage:
         self._server.flush()
 
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
-        self._drags.drop(client.client_id)
-        self._gizmo.drop(client.client_id)
-        self._views.drop(client.client_id)
+        self._drags.forget_page(client.client_id)
+        self._gizmo.forget_page(client.client_id)
+        self._views.forget_page(client.client_id)
 
 
 def _shown_instances(view: SessionView) -> dict[str, ShownInstance]:

@@ -29,10 +29,7 @@ from burg_drake.visualization import element
 
 
 def selection_actions(session: ComposeSession) -> dict[str, Callable[[], Any]]:
-    """Actions by the names of `shortcuts.SHORTCUTS`, of those that are about the selection."""
-
-    move_step = 5e-3  # Metres that an arrow key moves the selection.
-    fine_move_step = 1e-3  # Metres, with the key for fine steps.
+    """Actions by the names of `SHORTCUTS`, of those that are about the selection."""
     # Unit vectors in S by the name of the key's action.
     directions = {
         "left": (-1.0, 0.0, 0.0),
@@ -58,9 +55,8 @@ def selection_actions(session: ComposeSession) -> dict[str, Callable[[], Any]]:
         "next_pose": lambda: set_next_stable_pose(session),
     }
     for name, direction in directions.items():
-        for kind, step in ((name, move_step), (f"{name}_finely", fine_move_step)):
-            offset = step * np.array(direction)
-            calls[kind] = partial(shift_selection, session, offset)
+        for kind, step in ((name, 5e-3), (f"{name}_finely", 1e-3)):
+            calls[kind] = partial(shift_selection, session, step * np.array(direction))
     return calls
 
 
@@ -229,7 +225,7 @@ class KeysDialog:
         with modal:
             button = plain_button(client.gui, "Close", hint="Close (H or Esc)")
             client.gui.add_html(shortcut_list_html())
-        self._actions.clicked(button, lambda: self.close(client))
+        self._actions.on_click(button, lambda: self.close(client))
 
     def close(self, client: viser.ClientHandle) -> bool:
         """Closes the list on a page; False if it shows none."""

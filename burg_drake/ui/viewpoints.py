@@ -42,19 +42,16 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     """
     margin_factor = 1.22  # Extent in view relative to that of the board.
     object_height = 0.25  # Metres; objects at the far edge of the board are in view up to this.
-    phone_aspect = 0.6  # Pages with a smaller width by height are those of phones.
-    phone_height = 0.55  # Share of the page's height above a phone's panel.
     size = np.array(board.size)
     level = float(np.hypot(back[0], back[1]))
     ahead = -back[:2] / level
     width, depth = float(size @ np.abs(ahead[::-1])), float(size @ np.abs(ahead))
     tall = 0.0 if level <= TOP_VIEW_TILT else object_height * level
-    share = phone_height if aspect < phone_aspect else 1.0
+    share = 0.55 if aspect < 0.6 else 1.0  # of the height, above the panel on a phone
     half_height = margin_factor * (depth * back[2] + tall) / 2.0
     half = max(half_height / share, margin_factor * width / 2.0 / aspect)
-    middle = min(
-        0.5, share - half_height / half / 2.0
-    )  # from the page's upper edge, in its heights
+    # from the page's upper edge, in its heights
+    middle = min(0.5, share - half_height / half / 2.0)
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
     target = np.array([*size / 2.0, 0.0])
@@ -83,7 +80,7 @@ class _AssignedView:
     arrived: bool = False
     sendings_left: int = 20
 
-    def is_seen_by(self, camera: Any) -> bool:
+    def is_shown_by(self, camera: Any) -> bool:
         """Whether a camera of viser has this view."""
         return (
             _is_same_point(camera.position, self.position)
@@ -101,21 +98,22 @@ class PageViews:
     """
 
     def __init__(self, server: viser.ViserServer, board: Callable[[], Board]) -> None:
-        first_aspect = 0.9  # Width by height of the scene until a new page reports its own.
         self._server, self._board = server, board
         self._given: dict[int, _AssignedView] = {}
         self._shown = board().size
         camera = server.initial_camera
         camera.position, camera.look_at = viewpoint(
-            board(), direction_to_camera(above=False), FRONT_FOV, first_aspect
+            board(), direction_to_camera(above=False), FRONT_FOV, aspect=0.9
         )
         camera.fov = FRONT_FOV
         server.on_client_connect(self._on_connect)
 
-    def look(self, client: viser.ClientHandle, *, above: bool) -> None:
+    def set_view(self, client: viser.ClientHandle, *, above: bool) -> None:
         """Brings a page's camera above the board, or in front of it."""
         fov = TOP_FOV if above else FRONT_FOV
-        self._in_server_thread(lambda: self._give(client, direction_to_camera(above=above), fov))
+        self._in_server_thread(
+            lambda: self._assign_view(client, direction_to_camera(above=above), fov)
+        )
 
     def show(self) -> None:
         """Brings a board of another size into view on all pages, from where they look."""
@@ -123,7 +121,7 @@ class PageViews:
             self._shown = size
             self._in_server_thread(self._fit_all)
 
-    def drop(self, client_id: int) -> None:
+    def forget_page(self, client_id: int) -> None:
         """A page is gone."""
         self._given.pop(client_id, None)
 
@@ -138,7 +136,7 @@ class PageViews:
         client.camera.on_update(follow)
         # `follow` is called next, with the report that made the page connect, and sends this view.
         back = direction_to_camera(above=False)
-        self._given[client.client_id] = self._fitted(client.camera, back, FRONT_FOV)
+        self._given[client.client_id] = self._fit_view(client.camera, back, FRONT_FOV)
 
     def _follow(self, client: viser.ClientHandle) -> None:
         """A page has reported its camera: it was moved, or the room for the scene has changed."""
@@ -147,9 +145,9 @@ class PageViews:
             return
         camera = client.camera
         if abs(camera.aspect - given.aspect) > VIEW_TOLERANCE:
-            given = self._fitted(camera, given.back, given.fov)
+            given = self._fit_view(camera, given.back, given.fov)
             self._given[client.client_id] = given
-        if given.is_seen_by(camera):
+        if given.is_shown_by(camera):
             given.arrived = True
         elif given.sendings_left and (
             not given.arrived
@@ -162,21 +160,21 @@ class PageViews:
     def _fit_all(self) -> None:
         for client in self._server.get_clients().values():
             if (given := self._given.get(client.client_id)) is not None:
-                self._give(client, given.back, given.fov)
+                self._assign_view(client, given.back, given.fov)
                 continue
             back = client.camera.position - client.camera.look_at
             back = back / np.linalg.norm(back)
             if np.hypot(back[0], back[1]) < TOP_VIEW_TILT / 2.0:
                 back = direction_to_camera(above=True)
-            self._give(client, back, float(client.camera.fov))
+            self._assign_view(client, back, float(client.camera.fov))
 
-    def _give(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
+    def _assign_view(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
         if client.client_id not in self._server.get_clients():
             return
         before = self._given.get(client.client_id)
-        given = self._given[client.client_id] = self._fitted(client.camera, back, fov)
+        given = self._given[client.client_id] = self._fit_view(client.camera, back, fov)
         is_reported = before is None or before.arrived
-        given.arrived = is_reported and given.is_seen_by(client.camera)
+        given.arrived = is_reported and given.is_shown_by(client.camera)
         self._send(client, given)
 
     def _send(self, client: viser.ClientHandle, given: _AssignedView) -> None:
@@ -188,7 +186,7 @@ class PageViews:
             camera.position = given.position
             camera.look_at = given.target
 
-    def _fitted(self, camera: Any, back: Array, fov: float) -> _AssignedView:
+    def _fit_view(self, camera: Any, back: Array, fov: float) -> _AssignedView:
         position, target = viewpoint(self._board(), back, fov, camera.aspect)
         return _AssignedView(back, fov, camera.aspect, position, target)
 

@@ -1,6 +1,7 @@
 """Meshcat views and pictures: scenes, grasps coloured by outcome, replays.
 
-Read `scenes` first; `style` has colours and markup, `meshcat` what all views share.
+Read `scene_view` and `grasp_view` first. `colors` and `html_page` are shared by all views and pages,
+`meshcat_drawing` by those in Meshcat.
 """
 
 import lazy_loader

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,28 +11,25 @@ from burg_drake.cameras import (
     BOUND_SIGMAS,
     COVERAGE_GRID,
     Calibration,
+    camera_error,
     corner_coverage,
     image_grid,
-    pixel_uncertainty,
 )
 from burg_drake.core import Array, atomic_write
-from burg_drake.visualization.html_page import Html, element, html_document, join
+from burg_drake.visualization.html_page import Child, Html, element, html_document, join
 
 FIGURE_WIDTH = 460.0
 """Width of a drawing of the image, in CSS pixels."""
 
 
-class CalibrationColors:
-    """Calibration colors."""
-
-    ink = "#1f2630"  # Text and points.
-    frame = "#c4cad4"  # The border of the image.
-    accent = "#b3261e"  # Residuals, uncertainty and advice.
-    shade = "#2f6db5"  # Bars, coverage and distortion.
-
-
+INK = "#1f2630"
+"""Colour of text and points."""
+ACCENT = "#b3261e"
+"""Colour of residuals, uncertainty and advice."""
+SHADE = "#2f6db5"
+"""Colour of bars, coverage and distortion."""
 CALIBRATION_STYLE = f"""
-body {{ font: 15px/1.5 system-ui, sans-serif; color: {CalibrationColors.ink}; max-width: 62rem; margin: 2rem auto;
+body {{ font: 15px/1.5 system-ui, sans-serif; color: {INK}; max-width: 62rem; margin: 2rem auto;
   padding: 0 1rem; }}
 h1 {{ font-size: 1.4rem; }} h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; }}
 table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
@@ -39,7 +37,7 @@ td, th {{ padding: .15rem .9rem .15rem 0; text-align: right; border-bottom: 1px 
 td:first-child, th:first-child {{ text-align: left; }}
 figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }}
 figcaption {{ font-size: .85rem; max-width: {FIGURE_WIDTH:.0f}px; }}
-.advice {{ color: {CalibrationColors.accent}; }}
+.advice {{ color: {ACCENT}; }}
 svg {{ max-width: 100%; height: auto; }}
 @media (max-width: 30rem) {{ td, th {{ padding-right: .5rem; font-size: .85rem; }}
   td > svg {{ display: none; }} }}
@@ -71,10 +69,10 @@ def write_calibration_report(calibration: Calibration, advice: list[str], path: 
         element("h2", "Camera"),
         _parameter_table(calibration),
         element("h2", "Over the image"),
-        _figure_element(_residual_figure(calibration)),
-        _figure_element(_coverage_figure(calibration)),
-        _figure_element(_uncertainty_figure(calibration)),
-        _figure_element(_distortion_figure(calibration)),
+        _residual_figure(calibration),
+        _coverage_figure(calibration),
+        _uncertainty_figure(calibration),
+        _distortion_figure(calibration),
         element("h2", "Views"),
         _view_table(calibration),
         _rejected_views(calibration),
@@ -85,36 +83,35 @@ def write_calibration_report(calibration: Calibration, advice: list[str], path: 
 
 def _parameter_table(calibration: Calibration) -> Html:
     rows = [
-        element("tr", *(element("td", text) for text in (name, f"{value:.6g}", f"{deviation:.2g}")))
+        (name, f"{value:.6g}", f"{deviation:.2g}")
         for name, (value, deviation) in calibration.parameters.items()
     ]
-    heads = ("parameter", "value", "standard deviation")
-    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+    return _table(("parameter", "value", "standard deviation"), rows)
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[Child]]) -> Html:
+    lines = [element("tr", *(element("td", cell) for cell in row)) for row in rows]
+    return element("table", element("tr", *(element("th", head) for head in heads)), *lines)
 
 
 def _view_table(calibration: Calibration) -> Html:
     largest = max(used.rms for used in calibration.views)
-    rows = []
+    rows: list[Sequence[Child]] = []
     for used in calibration.views:
-        bar = element(
-            "rect",
-            x=0,
-            y=4,
-            width=f"{120.0 * used.rms / largest:.1f}",
-            height=9,
-            fill=CalibrationColors.shade,
+        length = f"{120.0 * used.rms / largest:.1f}"
+        bar = element("rect", x=0, y=4, width=length, height=9, fill=SHADE)
+        rows.append(
+            (
+                used.view.name,
+                len(used.view.ids),
+                f"{math.degrees(used.tilt):.0f}",
+                f"{used.view.blur:.2f}",
+                f"{used.rms:.3f}",
+                element("svg", bar, width=122, height=16),
+            )
         )
-        texts = (
-            used.view.name,
-            str(len(used.view.ids)),
-            f"{math.degrees(used.tilt):.0f}",
-            f"{used.view.blur:.2f}",
-            f"{used.rms:.3f}",
-        )
-        drawn = element("svg", bar, width=122, height=16)
-        rows.append(element("tr", *(element("td", text) for text in texts), element("td", drawn)))
     heads = ("image", "corners", "tilt (degrees)", "blur (pixels)", "residual (pixels)", "")
-    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+    return _table(heads, rows)
 
 
 def _rejected_views(calibration: Calibration) -> Html:
@@ -124,25 +121,21 @@ def _rejected_views(calibration: Calibration) -> Html:
     return join(element("h2", "Left out"), element("ul", *lines))
 
 
-def _figure_element(drawn: tuple[Html, str]) -> Html:
-    return element("figure", drawn[0], element("figcaption", drawn[1]))
+def _figure(drawing: Html, caption: str) -> Html:
+    return element("figure", drawing, element("figcaption", caption))
 
 
 def _image_svg(calibration: Calibration, *shapes: Html) -> Html:
     """An SVG in pixels of the image, with its frame."""
     k = calibration.intrinsics
+    size = {"width": k.width, "height": k.height}
+    line = _line_width(calibration)
     frame = element(
-        "rect", x=-0.5, y=-0.5, width=k.width, height=k.height, fill="none", stroke=CalibrationColors.frame,
-        stroke_width=_line_width(calibration),
-    )  # fmt: skip
-    return element(
-        "svg",
-        *shapes,
-        frame,
-        width=FIGURE_WIDTH,
-        height=FIGURE_WIDTH * k.height / k.width,
-        viewBox=f"-0.5 -0.5 {k.width} {k.height}",
+        "rect", x=-0.5, y=-0.5, **size, fill="none", stroke="#c4cad4", stroke_width=line
     )
+    height = FIGURE_WIDTH * k.height / k.width
+    view = f"-0.5 -0.5 {k.width} {k.height}"
+    return element("svg", *shapes, frame, width=FIGURE_WIDTH, height=height, viewBox=view)
 
 
 def _line_width(calibration: Calibration) -> float:
@@ -155,25 +148,19 @@ def _draw_arrows(calibration: Calibration, start: Array, vectors: Array, color: 
     path = "".join(f"M{a:g} {b:g}L{c:g} {d:g}" for a, b, c, d in ends.tolist())
     width = _line_width(calibration)
     dots = "".join(f"M{a:g} {b:g}h0" for a, b, _, _ in ends.tolist())
+    dot: dict[str, str | float] = {"stroke_width": 2 * width, "stroke_linecap": "round"}
     return [
         element("path", d=path, stroke=color, stroke_width=width, fill="none"),
-        element(
-            "path",
-            d=dots,
-            stroke=CalibrationColors.ink,
-            stroke_width=2 * width,
-            stroke_linecap="round",
-            fill="none",
-        ),
+        element("path", d=dots, stroke=INK, **dot, fill="none"),
     ]
 
 
-def _residual_figure(calibration: Calibration) -> tuple[Html, str]:
+def _residual_figure(calibration: Calibration) -> Html:
     corners = np.concatenate([used.view.corners for used in calibration.views])
     residuals = np.concatenate([used.residuals for used in calibration.views])
     scale = _floor_to_one_digit(0.03 * calibration.intrinsics.width / max(calibration.rms, 1e-6))
-    arrows = _draw_arrows(calibration, corners, scale * residuals, CalibrationColors.accent)
-    return (
+    arrows = _draw_arrows(calibration, corners, scale * residuals, ACCENT)
+    return _figure(
         _image_svg(calibration, *arrows),
         f"Residuals of all corners, {scale:g} times as long. Where neighbours agree, the lens model"
         " is too simple or the target is bent.",
@@ -194,50 +181,45 @@ def _draw_cells(calibration: Calibration, shades: Array, words: list[str], color
             element("rect", x=x, y=y, width=width, height=height, fill=color, fill_opacity=opacity)
         )
         place = {"x": x + width / 2, "y": y + 0.6 * height, "text_anchor": "middle"}
-        ink = "#ffffff" if opacity > 0.5 else CalibrationColors.ink
+        ink = "#ffffff" if opacity > 0.5 else INK
         shapes.append(element("text", word, **place, font_size=0.026 * k.width, fill=ink))
     return _image_svg(calibration, *shapes)
 
 
-def _coverage_figure(calibration: Calibration) -> tuple[Html, str]:
+def _coverage_figure(calibration: Calibration) -> Html:
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     counts = corner_coverage([used.view for used in calibration.views], size)
     shades = np.sqrt(counts / max(1, counts.max()))
-    drawn = _draw_cells(
-        calibration, shades, [str(n) for n in counts.ravel().tolist()], CalibrationColors.shade
-    )
-    return (
-        drawn,
+    words = [str(n) for n in counts.ravel().tolist()]
+    return _figure(
+        _draw_cells(calibration, shades, words, SHADE),
         "Corners seen in each part of the image. Where there are none, the lens is a guess.",
     )
 
 
-def _uncertainty_figure(calibration: Calibration) -> tuple[Html, str]:
+def _uncertainty_figure(calibration: Calibration) -> Html:
     max_error = 10.0  # Pixels. Larger errors have the same shade.
     rows, columns = COVERAGE_GRID
     k = calibration.intrinsics
     u = (np.arange(columns) + 0.5) * k.width / columns - 0.5
     v = (np.arange(rows) + 0.5) * k.height / rows - 0.5
     places = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    bounds = np.nan_to_num(
-        BOUND_SIGMAS * pixel_uncertainty(calibration, places), posinf=1e9, nan=1e9
+    bounds = BOUND_SIGMAS * camera_error(
+        calibration.intrinsics, calibration.hypotheses, calibration.corners, places
     )
-    shades = np.clip(bounds / max(1.0, min(bounds.max(), max_error)), 0.0, 1.0).reshape(
-        COVERAGE_GRID
-    )
-    words = [
-        f"{value:.2f}" if value < max_error else f">{max_error:g}" for value in bounds.tolist()
-    ]
-    drawn = _draw_cells(calibration, shades, words, CalibrationColors.accent)
-    return drawn, (
+    bounds = np.nan_to_num(bounds, posinf=1e9, nan=1e9)
+    shades = np.clip(bounds / max(1.0, min(bounds.max(), max_error)), 0.0, 1.0)
+    words = [f"{b:.2f}" if b < max_error else f">{max_error:g}" for b in bounds.tolist()]
+    return _figure(
+        _draw_cells(calibration, shades.reshape(COVERAGE_GRID), words, ACCENT),
         "How far the camera model may be off in the middle of each part, in 19 of 20 cases"
         " [pixels]; towards the corners of the image it is more. It counts the scatter of the"
         " residuals, how far the views disagree, and how far lens models differ that fit as well."
-        " Where it is large, show more of the target."
+        " Where it is large, show more of the target.",
     )
 
 
-def _distortion_figure(calibration: Calibration) -> tuple[Html, str]:
+def _distortion_figure(calibration: Calibration) -> Html:
     k = calibration.intrinsics
     seen = image_grid(k, 17, 13)
     moved, straight = seen - k.undistort(seen), "a straight image"
@@ -248,8 +230,8 @@ def _distortion_figure(calibration: Calibration) -> tuple[Html, str]:
         moved, straight = seen - (even * k.focal + k.center), "an image of even angles"
     longest = float(np.linalg.norm(moved, axis=1).max())
     scale = _floor_to_one_digit(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
-    arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, CalibrationColors.shade)
-    return (
+    arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, SHADE)
+    return _figure(
         _image_svg(calibration, *arrows),
         f"Where the lens moves points of {straight} to (dots: from), {scale:g} times as long;"
         f" {longest:.1f} pixels at most.",

@@ -1,4 +1,4 @@
-"""Colours of outcomes, names and numbers, for all readers and in grey print; scales of colour bars."""
+"""Colours of outcomes, names and numbers, also for grey print; scales of colour bars."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def map_colors(share: ArrayLike) -> Array:
     Returns:
         (..., 3) red, green, blue in [0, 1] (sRGB).
     """
-    points = np.array([_rgb_from_hex(color) for color in VIRIDIS])
+    points = np.array([rgb_from_hex(color) for color in VIRIDIS])
     place = np.clip(np.asarray(share, dtype=float), 0.0, 1.0) * (len(points) - 1)
     return np.stack(
         [np.interp(place, np.arange(len(points)), points[:, k]) for k in range(3)], axis=-1
@@ -46,13 +46,14 @@ def linear_light(color: ArrayLike) -> Array:
 def contrast_ratio(one: str, other: str) -> float:
     """Contrast of two colours as HTML has them, 1 to 21 (WCAG 2: text needs 4.5)."""
     dark, light = sorted(
-        float(linear_light(_rgb_from_hex(color)) @ (0.2126, 0.7152, 0.0722))
+        float(linear_light(rgb_from_hex(color)) @ (0.2126, 0.7152, 0.0722))
         for color in (one, other)
     )
     return (light + 0.05) / (dark + 0.05)
 
 
-def _rgb_from_hex(color: str) -> tuple[float, float, float]:
+def rgb_from_hex(color: str) -> tuple[float, float, float]:
+    """Red, green and blue in [0, 1] of a colour as HTML has it."""
     r, g, b = (int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return r, g, b
 
@@ -63,10 +64,10 @@ COLOR_BINS = 32
 
 @dataclass(frozen=True)
 class ColorScale:
-    """Which colours numbers get.
+    """A range of numbers, divided into bins of one colour each.
 
     Attributes:
-        lower, upper: what the first and the last colour begin and end with.
+        lower, upper: lower end of the first bin and upper end of the last one.
     """
 
     lower: float
@@ -75,7 +76,7 @@ class ColorScale:
     def bins(self, values: ArrayLike) -> NDArray[np.int64]:
         """The bin (N,), 0 to `COLOR_BINS` - 1, of values (N,); -1 of NaN.
 
-        What is beyond the range, infinite numbers included, is in the outermost bins.
+        Values outside the range, infinite ones included, are in the outermost bins.
         """
         numbers = np.asarray(values, dtype=float)
         known = ~np.isnan(numbers)
@@ -85,7 +86,7 @@ class ColorScale:
         )
         return np.where(known, index, -1)
 
-    def beyond(self, values: ArrayLike) -> tuple[int, int]:
+    def count_outside(self, values: ArrayLike) -> tuple[int, int]:
         """How many values (N,) are below and above the range."""
         numbers = np.asarray(values, dtype=float)
         return int((numbers < self.lower).sum()), int((numbers > self.upper).sum())
@@ -126,9 +127,8 @@ def color_scale(values: ArrayLike, limits: tuple[float, float] | None = None) ->
     if not len(numbers):
         return ColorScale(0.0, 1.0)
     lower, upper = range_without_outliers(numbers)
-    if not upper - lower > max(
-        min_span, 1e-9 * max(abs(lower), abs(upper))
-    ):  # one value: it is in the middle
+    # of a single value, the middle of the scale
+    if not upper - lower > max(min_span, 1e-9 * max(abs(lower), abs(upper))):
         half = 0.5 * abs(lower) or 0.5
         return ColorScale(lower - half, upper + half)
     step = _round_step(upper - lower)
@@ -153,8 +153,8 @@ def range_without_outliers(numbers: Array) -> tuple[float, float]:
 
 
 def _round_step(span: float) -> float:
-    """The smallest of 1, 2, 5, 10, 20 ... that divides a span in at most `TICKS` parts."""
-    max_intervals = 6  # Most intervals between round numbers on a bar.
+    """The smallest of 1, 2, 5, 10, 20 ... that divides a span in few parts."""
+    max_intervals = 6
     power = 10.0 ** np.floor(np.log10(span / max_intervals))
     return float(
         next(m * power for m in (1.0, 2.0, 5.0, 10.0) if span <= max_intervals * m * power * 1.001)
@@ -178,7 +178,7 @@ class OutcomeGroup:
     @property
     def hex(self) -> str:
         """The colour as HTML has it, without its opacity."""
-        return "#" + "".join(f"{round(255 * c):02x}" for c in self.rgba[:3])
+        return hex_color(self.rgba[:3])
 
 
 OUTCOME_GROUPS = (
@@ -229,10 +229,8 @@ OUTCOME_GROUPS = (
 )
 """All groups, best outcome first. Every outcome is in exactly one."""
 
-UNJUDGED_GROUP = OutcomeGroup(
-    "not judged", (0.34, 0.71, 0.91, 1.0), ()
-)  # Grasps that have no outcome.
-
+UNJUDGED_GROUP = OutcomeGroup("not judged", (0.34, 0.71, 0.91, 1.0), ())
+"""Grasps that have no outcome."""
 OTHERS_COLOR: Rgba = (0.35, 0.35, 0.35, 0.6)
 """Colour of all names beyond the `CATEGORY_COLORS`."""
 UNKNOWN_COLOR: Rgba = (0.62, 0.62, 0.62, 0.6)

@@ -55,7 +55,7 @@ def object_card(
     """The card of one object."""
     pose_size = (160, 120)  # Pixels.
     entry = library.entry(name)
-    count = len(entry.pieces)
+    pieces = _count_text(len(entry.pieces), "piece")
     poses = [
         _picture_figure(
             renderer.portrait(name, pose_size, stable_pose=k),
@@ -65,6 +65,7 @@ def object_card(
         )
         for k, pose in enumerate(entry.stable_poses)
     ]
+    description = element("p", entry.description) if entry.description else None
     notes = [element("li", text, class_="remark") for text in remarks]
     notes += [element("li", text) for text in surface_notes(library, name)]
     return element(
@@ -72,17 +73,10 @@ def object_card(
         element(
             "div",
             _picture_figure(renderer.portrait(name), f"{name} as it looks"),
-            _picture_figure(
-                renderer.pieces(name), f"convex pieces of {name}", _count_text(count, "piece")
-            ),
+            _picture_figure(renderer.pieces(name), f"convex pieces of {name}", pieces),
             class_="views",
         ),
-        element(
-            "div",
-            element("h2", name),
-            element("p", entry.description) if entry.description else None,
-            class_="text",
-        ),
+        element("div", element("h2", name), description, class_="text"),
         element("dl", *_object_figures(entry)),
         element("div", *poses, class_="poses") if poses else None,
         element("ul", *notes),
@@ -137,23 +131,24 @@ def _object_figures(entry: ObjectEntry) -> list[Html]:
     fit = entry.fit if pieces else entry.contact.fit
     about = "" if mass.source == "given" else "~"
     wall = mass.wall_thickness
-    rows: list[tuple[str, str, bool]] = [
-        ("Size [mm]", " × ".join(_length_text(s) for s in size), False),
-        ("Mass", about + mass_text(mass.mass), False),
-        ("Density", f"{_three_digits(mass.mass / mass.volume)} kg/m³", False),
-        ("Contact", contact_name(entry.contact), False),
-        ("Volume ratio", f"{fit.volume_ratio:.2f}" if fit else "not measured", False),
-        ("Hausdorff distance", f"{1e3 * fit.hausdorff:.1f} mm" if fit else "not measured", False),
-        ("Friction", f"{entry.friction:g}", False),
-        ("Volume", f"{_three_digits(1e6 * mass.volume)} cm³", False),
-        ("Body", "solid" if wall is None else f"hollow, wall {1e3 * wall:.1f} mm", False),
+    rows = [
+        ("Size [mm]", " × ".join(_length_text(s) for s in size)),
+        ("Mass", about + mass_text(mass.mass)),
+        ("Density", f"{_three_digits(mass.mass / mass.volume)} kg/m³"),
+        ("Contact", contact_name(entry.contact)),
+        ("Volume ratio", f"{fit.volume_ratio:.2f}" if fit else "not measured"),
+        ("Hausdorff distance", f"{1e3 * fit.hausdorff:.1f} mm" if fit else "not measured"),
+        ("Friction", f"{entry.friction:g}"),
+        ("Volume", f"{_three_digits(1e6 * mass.volume)} cm³"),
+        ("Body", "solid" if wall is None else f"hollow, wall {1e3 * wall:.1f} mm"),
     ]
     if mass.overridden:
         given = " and ".join(what.replace("_", " ") for what in mass.overridden)
-        rows.append(("Given by the user", given, True))
+        rows.append(("Given by the user", given))
+    wide = {"Given by the user": "wide"}
     return [
-        element("div", element("dt", name), element("dd", value), class_="wide" if wide else None)
-        for name, value, wide in rows
+        element("div", element("dt", name), element("dd", value), class_=wide.get(name))
+        for name, value in rows
     ]
 
 
@@ -186,11 +181,12 @@ def _picture_figure(picture: Thumbnail, alt: str, *caption: Child) -> Html:
 
 def _sheet_page(library: ObjectLibrary, names: Sequence[str], cards: Sequence[Html]) -> str:
     footnote = (
-        "Sizes are those of the box around the mesh, along its axes. A ~ marks a mass that follows from"
-        " a density. Volume ratio and Hausdorff distance say how well the shape that touches others"
-        " stands for the surface: its volume over that inside the surface, and the largest distance"
-        " between the two. The share below a pose is that of drops from random orientations that end in"
-        " it; the tilt, that at which it came to rest at most, having been dropped and pushed."
+        "Sizes are those of the box around the mesh, along its axes. A ~ marks a mass that"
+        " follows from a density. Volume ratio and Hausdorff distance say how well the shape"
+        " that touches others stands for the surface: its volume over that inside the surface,"
+        " and the largest distance between the two. The share below a pose is that of drops"
+        " from random orientations that end in it; the tilt, that at which it came to rest at"
+        " most, having been dropped and pushed."
     )
     sheet = page_style("burg_drake.visualization", "contact_sheet.css")
     poses = sum(len(library.entry(name).stable_poses) for name in names)

@@ -1,4 +1,4 @@
-"""Grasp frames of file formats in Meshcat: an open hand for each, with our frame G and theirs, F."""
+"""Grasp frames of file formats in Meshcat: an open hand for each, with our frame G and its F."""
 
 from __future__ import annotations
 
@@ -29,13 +29,10 @@ FORMAT_TRIAD = TriadStyle(length=0.044, radius=0.0026, head=0.013)
 """Style of a format's grasp frame F: thick and short, visible where it coincides with G."""
 
 
-class FrameCell:
-    """Frame cell."""
-
-    letter_height = 0.017  # Metres.
-    caption_height = 0.0155  # Metres from line to line.
-    caption_lines = 4  # Lines of a caption.
-    gap = 0.035  # Metres between neighbours.
+LETTER_HEIGHT = 0.017
+"""Height of an axis's letter, in metres."""
+CAPTION_HEIGHT = 0.0155
+"""Distance from line to line of a caption, in metres."""
 
 
 @dataclass(frozen=True)
@@ -93,31 +90,25 @@ def show_frames(
         name, (u, v) = group[0].name, sheet.place(k)
         X_WG = pose_in_picture_plane(u, v) @ downward_grasp_pose()
         for i, visual in enumerate(visuals):
-            path = f"{FRAMES_PATH}/hands/{name}/{i}"
+            path, X_WV = f"{FRAMES_PATH}/hands/{name}/{i}", hand.X_AH(X_WG) @ visual.X_HV
             meshcat.SetObject(path, visual.shape, visual.color)
-            X_WV = hand.X_AH(X_WG) @ visual.X_HV
             meshcat.SetTransform(path, RigidTransform(X_WV))
         _draw_object(meshcat, f"{FRAMES_PATH}/objects/{name}", hand, X_WG)
         X_WF = X_WG @ group[0].X_GF(gripper)
         draw_triad(meshcat, f"{FRAMES_PATH}/G/{name}", X_WG, OWN_TRIAD)
         draw_triad(meshcat, f"{FRAMES_PATH}/F/{name}", X_WF, FORMAT_TRIAD)
         _write_letters(meshcat, f"{FRAMES_PATH}/labels/{name}", X_WF)
-        _write_label_facing_camera(
-            meshcat,
-            f"{FRAMES_PATH}/labels/{name}/caption",
-            caption,
-            pose_in_picture_plane(u, v + sheet.foot),
-        )
+        foot = pose_in_picture_plane(u, v + sheet.foot)
+        _write_label_facing_camera(meshcat, f"{FRAMES_PATH}/labels/{name}/caption", caption, foot)
     _aim_at_bounds(meshcat, sheet.bounds())
-    return (
-        LegendEntry(
-            "F, the frame of the format: thick, with letters", "#1f52cc", (f"{FRAMES_PATH}/F",)
-        ),
-        LegendEntry("G, the frame of burg_drake: thin", "#8a99c0", (f"{FRAMES_PATH}/G",)),
-        LegendEntry("hand", "#c9ced4", (f"{FRAMES_PATH}/hands",)),
-        LegendEntry("object", "#edc26b", (f"{FRAMES_PATH}/objects",)),
-        LegendEntry("names", "#34393f", (f"{FRAMES_PATH}/labels",)),
+    entries = (
+        ("F, the frame of the format: thick, with letters", "#1f52cc", "F"),
+        ("G, the frame of burg_drake: thin", "#8a99c0", "G"),
+        ("hand", "#c9ced4", "hands"),
+        ("object", "#edc26b", "objects"),
+        ("names", "#34393f", "labels"),
     )
+    return tuple(LegendEntry(text, c, (f"{FRAMES_PATH}/{name}",)) for text, c, name in entries)
 
 
 def downward_grasp_pose() -> Array:
@@ -143,9 +134,11 @@ def _fit_grid(count: int, lower: Array, upper: Array, caption: float) -> FrameGr
         lower, upper: (2,) bounds of a hand in the picture, around G [m].
         caption: width of the widest [m].
     """
-    foot = float(lower[1]) - FrameCell.caption_lines * FrameCell.caption_height
-    width = max(float(upper[0] - lower[0]), caption) + FrameCell.gap
-    height = float(upper[1]) - foot + FrameCell.gap
+    gap = 0.035  # Metres between neighbours.
+    caption_lines = 4
+    foot = float(lower[1]) - caption_lines * CAPTION_HEIGHT
+    width = max(float(upper[0] - lower[0]), caption) + gap
+    height = float(upper[1]) - foot + gap
     grids = [(columns, -(-count // columns)) for columns in range(1, count + 1)]
     columns, rows = min(grids, key=lambda g: max(g[0] * width / VIEW_ASPECT, g[1] * height))
     return FrameGrid(columns, rows, width, height, foot, float(upper[1]))
@@ -155,10 +148,7 @@ def _hand_bounds(visuals: Sequence[HandVisual], hand: Hand) -> tuple[Array, Arra
     """Corners (2,) in the picture [m] of a hand with the longest axes, G in the middle."""
     X_WH = hand.X_AH(downward_grasp_pose())
     points = [transform_points(X_WH @ v.X_HV, v.corners) for v in visuals]
-    margin = max(
-        OWN_TRIAD.length + 0.5 * FrameCell.caption_height,
-        FORMAT_TRIAD.length + FrameCell.letter_height,
-    )
+    margin = max(OWN_TRIAD.length + 0.5 * CAPTION_HEIGHT, FORMAT_TRIAD.length + LETTER_HEIGHT)
     seen = np.vstack([*points, [[0.0, 0.0, -margin]]]) @ R_WC[:, :2] * (1.0, -1.0)
     lower, upper = seen.min(axis=0), seen.max(axis=0)
     half = max(-lower[0], upper[0])
@@ -171,15 +161,14 @@ def _format_caption(formats: Sequence[GraspFormat], gripper: Gripper) -> tuple[M
         ", ".join(format.name for format in formats),
         f"approach {found.approach}, closing {found.closing}",
         f"origin: {found.origin}",
-        f"poses in the {found.frame} frame",
+        f"poses in the {formats[0].frame} frame",
     )
-    return label_mesh(lines, FrameCell.caption_height)
+    return label_mesh(lines, CAPTION_HEIGHT)
 
 
 def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
     object_color = Rgba(0.93, 0.70, 0.25, 0.5)  # To be seen through, too.
-    size_shares = (0.34, 0.24, 0.40)  # Of the hand's opening.
-    x, y, z = hand.opening[1] * np.array(size_shares)
+    x, y, z = hand.opening[1] * np.array([0.34, 0.24, 0.40])
     meshcat.SetObject(path, Box(x, y, z), object_color)
     X_GO = make_pose(p_AB=(0.0, 0.0, 0.25 * z))
     meshcat.SetTransform(path, RigidTransform(X_WG @ X_GO))
@@ -188,11 +177,10 @@ def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
 def _write_letters(meshcat: Meshcat, path: str, X_WF: Array) -> None:
     """x, y, z beyond the tips of a frame's axes."""
     for k, letter in enumerate("xyz"):
-        middle = X_WF[:3, 3] + (FORMAT_TRIAD.length + 0.5 * FrameCell.letter_height) * X_WF[:3, k]
-        foot = make_pose(p_AB=middle + 0.4 * FrameCell.letter_height * R_WC[:, 1])
-        _write_label_facing_camera(
-            meshcat, f"{path}/{letter}", label_mesh((letter,), FrameCell.letter_height), foot
-        )
+        middle = X_WF[:3, 3] + (FORMAT_TRIAD.length + 0.5 * LETTER_HEIGHT) * X_WF[:3, k]
+        foot = make_pose(p_AB=middle + 0.4 * LETTER_HEIGHT * R_WC[:, 1])
+        label = label_mesh((letter,), LETTER_HEIGHT)
+        _write_label_facing_camera(meshcat, f"{path}/{letter}", label, foot)
 
 
 def _write_label_facing_camera(

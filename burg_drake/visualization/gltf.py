@@ -1,4 +1,4 @@
-"""Meshes, labels and pictures as glTF in memory. Meshcat stores each once, however often it is shown."""
+"""Meshes, labels and pictures as glTF in memory. Meshcat stores each of them once."""
 
 from __future__ import annotations
 
@@ -53,10 +53,8 @@ def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
         surface = material.setdefault("pbrMetallicRoughness", {})
         surface |= {"metallicFactor": 0.0, "roughnessFactor": roughness}
         r, g, b, a = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-        surface["baseColorFactor"] = [
-            *(albedo * _linear_channel(c) for c in (r, g, b)),
-            opacity * a,
-        ]
+        linear = (float(linear_light(c)) for c in (r, g, b))
+        surface["baseColorFactor"] = [*(albedo * c for c in linear), opacity * a]
         material["doubleSided"] = opacity == 1.0  # else backs would shine through
         if opacity < 1.0:
             material["alphaMode"] = "BLEND"
@@ -173,13 +171,8 @@ def _data_uri(kind: str, data: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
 
 
-def _linear_channel(value: float) -> float:
-    """Linear light of an sRGB value in [0, 1], as glTF has its colour factors."""
-    return float(linear_light(value))
-
-
 def _text_image(lines: tuple[str, ...]) -> Image.Image:
-    text_color = (52, 57, 64)  # Colour of labels, as sRGB bytes.
+    grey = 58  # Of labels, as an sRGB byte.
     font = ImageFont.load_default(0.76 * LABEL_LINE_PIXELS)
     width = max(2, *(int(np.ceil(font.getlength(line))) + 4 for line in lines))
     ink = Image.new("L", (width, LABEL_LINE_PIXELS * len(lines)))
@@ -189,6 +182,6 @@ def _text_image(lines: tuple[str, ...]) -> Image.Image:
         draw.text(
             (2, LABEL_LINE_PIXELS * (row + 0.8)), line, 255, font, anchor="ls", stroke_width=bold
         )
-    image = Image.new("LA", ink.size, round(float(np.mean(text_color))))
+    image = Image.new("LA", ink.size, grey)
     image.putalpha(ink)
     return image

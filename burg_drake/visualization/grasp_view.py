@@ -1,4 +1,4 @@
-"""Grasps in Meshcat and in drawings: groups of one colour, gripper glyphs as one mesh, and their legend."""
+"""Grasps in Meshcat and in drawings: groups of one colour, glyphs as one mesh, and their legend."""
 
 from __future__ import annotations
 
@@ -60,15 +60,15 @@ class NumberGroups:
     """Grasps by a number.
 
     Attributes:
-        scale: which colours the numbers have.
+        scale: colours of the numbers.
         bins: (N,) bin of each grasp; -1 where the number is not known.
-        beyond: how many numbers are below and above the scale.
-        groups: of the bins that are not empty, lowest first, then of what is not known.
+        outside: how many numbers are below and above the scale.
+        groups: of the bins that are not empty, lowest first, then of missing numbers.
     """
 
     scale: ColorScale
     bins: NDArray[np.int64]
-    beyond: tuple[int, int]
+    outside: tuple[int, int]
     groups: tuple[GraspGroup, ...]
 
     @property
@@ -97,7 +97,7 @@ def group_by_number(values: ArrayLike, limits: tuple[float, float] | None = None
     ]
     if (bins < 0).any():
         groups.append(GraspGroup("unknown", "not known", UNKNOWN_COLOR, np.flatnonzero(bins < 0)))
-    return NumberGroups(scale, bins, scale.beyond(numbers), tuple(groups))
+    return NumberGroups(scale, bins, scale.count_outside(numbers), tuple(groups))
 
 
 def bin_key(bin: int) -> str:
@@ -211,22 +211,11 @@ def grasp_triangles(
     Returns:
         Vertices (3, V) in the world [m] and triangles (3, F).
     """
-    start, end = _glyph_segments(width)
+    corners = _glyph_corners(width)
+    start, end = corners[:, [0, 3, 1, 4]], corners[:, [1, 2, 2, 5]]
     vertices, faces = _bar_triangles(start.reshape(-1, 3), end.reshape(-1, 3), radius)
     p_WV = transform_points(X_WG, vertices.reshape(len(X_WG), -1, 3))
     return np.asfortranarray(p_WV.reshape(-1, 3).T), np.asfortranarray(faces.T)
-
-
-def _glyph_segments(width: Array) -> tuple[Array, Array]:
-    """Starts and ends (N, 4, 3) in G of the glyph's strokes: two fingers, palm, stem."""
-    half = width[:, None] / 2
-    x = np.concatenate([half, -half, half, 0 * half], axis=1)
-    x_end = np.concatenate([half, -half, -half, 0 * half], axis=1)
-    palm = -FINGER_LENGTH
-    z = np.broadcast_to([0.0, 0.0, palm, palm], x.shape)
-    z_end = np.broadcast_to([palm, palm, palm, palm - STEM_LENGTH], x.shape)
-    y = np.zeros_like(x)
-    return np.stack([x, y, z], axis=-1), np.stack([x_end, y, z_end], axis=-1)
 
 
 def _bar_triangles(start: Array, end: Array, radius: float) -> tuple[Array, NDArray[np.int32]]:
@@ -317,20 +306,20 @@ def number_legend(title: str, grouped: NumberGroups) -> list[ColorBar | LegendEn
         title: what the number is.
         grouped: the grasps by it.
     """
-    below, above = grouped.beyond
+    below, above = grouped.outside
     notes = [f"{count} {side} the range" for count, side in ((below, "below"), (above, "above"))]
     bar = ColorBar(
         title=title,
         colors=tuple(hex_color(color) for color in grouped.scale.colors()),
         counts=tuple(int(count) for count in grouped.counts),
-        ticks=_bar_ticks(grouped.scale, grouped.beyond),
+        ticks=_bar_ticks(grouped.scale, grouped.outside),
         paths=tuple(grasp_path(bin_key(k)) for k in range(COLOR_BINS)),
-        note=", ".join(n for n, count in zip(notes, grouped.beyond, strict=True) if count),
+        note=", ".join(n for n, count in zip(notes, grouped.outside, strict=True) if count),
     )
     return [bar, *grasp_group_entries(g for g in grouped.groups if g.key == "unknown")]
 
 
-def _bar_ticks(scale: ColorScale, beyond: tuple[int, int]) -> tuple[tuple[float, str], ...]:
+def _bar_ticks(scale: ColorScale, outside: tuple[int, int]) -> tuple[tuple[float, str], ...]:
     """Both ends of a bar, and the round numbers between them."""
     min_distance = 0.08  # From the bar's ends, as a share of it.
     span = scale.upper - scale.lower
@@ -341,9 +330,9 @@ def _bar_ticks(scale: ColorScale, beyond: tuple[int, int]) -> tuple[tuple[float,
         if min_distance < place < 1 - min_distance
     ]
     ends = [_tick_text(scale.lower, span), _tick_text(scale.upper, span)]
-    if beyond[0]:
+    if outside[0]:
         ends[0] = f"≤ {ends[0]}"
-    if beyond[1]:
+    if outside[1]:
         ends[1] = f"≥ {ends[1]}"
     return ((0.0, ends[0]), *ticks, (1.0, ends[1]))
 
@@ -364,17 +353,21 @@ def grasp_corners(X_WG: Array, width: Array) -> Array:
         X_WG: (N, 4, 4) grasps.
         width: (N,) distance between the fingers [m].
     """
+    return transform_points(np.asarray(X_WG).reshape(-1, 4, 4), _glyph_corners(width))
+
+
+def _glyph_corners(width: Array) -> Array:
+    """The corners of `grasp_corners` in the grasp frame G."""
     half = np.asarray(width, dtype=float)[:, None] / 2.0
     x = half * np.array([1.0, 1.0, -1.0, -1.0, 0.0, 0.0])
     palm, stem = -FINGER_LENGTH, -FINGER_LENGTH - STEM_LENGTH
     z = np.broadcast_to([0.0, palm, palm, 0.0, palm, stem], x.shape)
-    p_GQ = np.stack([x, np.zeros_like(x), z], axis=-1)
-    return transform_points(np.asarray(X_WG).reshape(-1, 4, 4), p_GQ)
+    return np.stack([x, np.zeros_like(x), z], axis=-1)
 
 
 def grasp_strokes(corners: Array, view: FlatView) -> list[str]:
     """The `d` of one path a grasp, from `grasp_corners` (N, 6, 3)."""
     return [
         path_data(fork, closed=False) + path_data(stem, closed=False)
-        for fork, stem in ((places[:4], places[4:]) for places in view.places(corners))
+        for fork, stem in ((places[:4], places[4:]) for places in view.project(corners))
     ]

@@ -37,7 +37,7 @@ class HandVisual:
         model: the shape as the hand's model has it, for renderers.
         color: of shapes that have none of their own.
         X_HV: (4, 4) where it is on the open hand.
-        slide: (3,) how far it moves in H for each metre by which the hand closes.
+        slide: (3,) displacement in H for each metre by which the hand closes.
         corners: (N, 3) that its bounds follow from, in its own frame V [m].
     """
 
@@ -63,7 +63,7 @@ def hand_visuals(
     Raises:
         InvalidInputError: the model cannot be loaded.
     """
-    default_color = (0.8, 0.8, 0.8, 1.0)
+    default_color = Rgba(0.8, 0.8, 0.8, 1.0)
     builder = RobotDiagramBuilder()
     plant = builder.plant()
     added = add_hand(builder, hand, model, packages)
@@ -88,7 +88,7 @@ def hand_visuals(
         for geometry in plant.GetVisualGeometriesForBody(body):
             shape = inspector.GetShape(geometry)
             given = inspector.GetIllustrationProperties(geometry).GetPropertyOrDefault(
-                "phong", "diffuse", Rgba(*default_color)
+                "phong", "diffuse", default_color
             )
             color = Rgba(given.r(), given.g(), given.b(), opacity * given.a())
             X_HV = X_HB @ inspector.GetPoseInFrame(geometry).GetAsMatrix4()
@@ -137,8 +137,8 @@ class GripperView:
 
     Attributes:
         hand: the document.
-        slides: by Meshcat path, how far (3,) that part moves in H for each metre by which the hand
-            closes.
+        slides: displacement (3,) in H of the parts, by Meshcat path, for each metre by which the
+            hand closes.
         shown: whether it is in the view.
 
     Raises:
@@ -164,16 +164,16 @@ class GripperView:
         self._meshcat.SetProperty(GRIPPER_PATH, "visible", False)
         self.shown = False
 
-    def put(self, X_WG: Array, width: float) -> None:
+    def place(self, X_WG: Array, width: float) -> None:
         """Shows it at a grasp (4, 4) with so much between its pads [m], as far as it can."""
         self._meshcat.SetTransform(GRIPPER_PATH, RigidTransform(self.hand.X_AH(X_WG)))
         for path, slide in self.slides.items():
-            shift = self.closed_by(width) * slide
+            shift = self.closing_distance(width) * slide
             self._meshcat.SetTransform(path, RigidTransform(make_pose(p_AB=shift)))
         self._meshcat.SetProperty(GRIPPER_PATH, "visible", True)
         self.shown = True
 
-    def closed_by(self, width: float) -> float:
+    def closing_distance(self, width: float) -> float:
         """How far the open hand closes to a width [m]."""
         low, high = self.hand.opening
         return high - float(np.clip(width, low, high))

@@ -37,13 +37,8 @@ def element(name: str, /, *children: Child, **attributes: str | float | None) ->
 
 def join(*children: Child) -> Html:
     """Children one after the other."""
-    return Html(
-        "".join(c if isinstance(c, Html) else escape(str(c)) for c in _present_children(children))
-    )
-
-
-def _present_children(children: tuple[Child, ...]) -> list[Html | str | int | float]:
-    return [child for child in children if child is not None]
+    given = (child for child in children if child is not None)
+    return Html("".join(c if isinstance(c, Html) else escape(str(c)) for c in given))
 
 
 def page_style(package: str, name: str) -> str:

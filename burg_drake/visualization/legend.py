@@ -31,14 +31,10 @@ class LegendEntry:
 
     def html(self) -> Html:
         """The line."""
+        checked = "" if self.shown else None
         return element(
             "label",
-            element(
-                "input",
-                type="checkbox",
-                checked="" if self.shown else None,
-                data_paths=" ".join(self.paths),
-            ),
+            element("input", type="checkbox", checked=checked, data_paths=" ".join(self.paths)),
             element("i", style=f"background:{self.color}"),
             self.label,
         )
@@ -100,26 +96,21 @@ class ColorBar:
             shapes.append(element("line", x1=at, x2=at, y1=foot, y2=foot + 4))
             anchor = {0.0: "text-anchor: start", 1.0: "text-anchor: end"}.get(place)
             shapes.append(element("text", text, x=at, y=foot + 15, style=anchor))
-        size = f"0 0 {BAR_WIDTH + 2 * BAR_MARGIN} {foot + 19}"
-        return element(
-            "svg",
-            *shapes,
-            viewBox=size,
-            width=BAR_WIDTH + 2 * BAR_MARGIN,
-            shape_rendering="crispEdges",
-        )
+        width, rendering = BAR_WIDTH + 2 * BAR_MARGIN, "crispEdges"
+        view = f"0 0 {width} {foot + 19}"
+        return element("svg", *shapes, viewBox=view, width=width, shape_rendering=rendering)
 
 
 def _ticks_with_room(ticks: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
-    """The ends of a bar, whose texts reach inwards, and what fits between them."""
+    """The ends of a bar, whose texts reach inwards, and the ticks that fit between them."""
     character_width = 7  # Pixels, of the widest character, and the least gap between two texts.
     first, *inner, last = ticks
     kept = [first]
     end = float(character_width * len(first[1]))
     for place, text in inner:
         middle, half = place * BAR_WIDTH, character_width * len(text) / 2
-        beyond = BAR_WIDTH - character_width * len(last[1])
-        if middle - half >= end + character_width and middle + half + character_width <= beyond:
+        limit = BAR_WIDTH - character_width * len(last[1])
+        if middle - half >= end + character_width and middle + half + character_width <= limit:
             kept.append((place, text))
             end = middle + half
     return [*kept, last]
@@ -131,14 +122,9 @@ def legend_html(legend: Sequence[LegendEntry | ColorBar]) -> Html:
 
 
 def _rectangle(x: float, y: float, width: float, height: float, color: str) -> Html:
-    return element(
-        "rect",
-        x=f"{x:.2f}",
-        y=f"{y:.2f}",
-        width=f"{width:.2f}",
-        height=f"{height:.2f}",
-        fill=color,
-    )
+    place = {"x": f"{x:.2f}", "y": f"{y:.2f}"}
+    size = {"width": f"{width:.2f}", "height": f"{height:.2f}"}
+    return element("rect", **place, **size, fill=color)
 
 
 LEGEND_STYLE = f"""

@@ -1,4 +1,4 @@
-"""An object library in Meshcat: visual mesh, convex pieces, contact geometry, stable poses, grasps."""
+"""An object library in Meshcat: visual meshes, convex pieces, contact geometry, poses, grasps."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from burg_drake.core import Array, GraspSet, InvalidInputError, distinct_colors, make_pose, rot_z
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects import ObjectEntry, ObjectLibrary
+from burg_drake.visualization.colors import hex_color
 from burg_drake.visualization.contact_sheet import mass_text, percent_text
 from burg_drake.visualization.gallery_layout import (
     GALLERY_ELEVATION,
@@ -42,17 +43,105 @@ GALLERY_COLUMNS = ("visual", "pieces", "contact")
 """Columns of the gallery, as they are called in Meshcat's tree."""
 
 
-class GalleryText:
-    """Gallery text."""
-
-    line_height = 0.22  # Apparent height of a line, as a share of the gallery's unit.
-    # Length of text on the floor over its apparent height.
-    stretch = 1.0 / float(np.sin(GALLERY_ELEVATION))
-    caption_scale = 0.85  # Size of captions relative to labels.
-
-
+LINE_HEIGHT = 0.22
+"""Apparent height of a line of text, as a share of the gallery's unit."""
+TEXT_STRETCH = 1.0 / float(np.sin(GALLERY_ELEVATION))
+"""Length of text on the floor over its apparent height."""
 SLAB_HEIGHT = 0.002
 """Thickness of floors and of the tiles on which objects stand, in metres."""
+
+
+GALLERY_FLOOR_COLOR = Rgba(0.90, 0.91, 0.92, 1.0)
+GALLERY_FIELD_OF_VIEW_DEG = 22.0
+"""Vertical angle of view: little perspective, so that rows at the back are not small."""
+
+
+def show_library(
+    library: ObjectLibrary, meshcat: Meshcat, names: Iterable[str] | None = None
+) -> tuple[LegendEntry, ...]:
+    """Shows a row for each object: its looks, its convex pieces, what contact sees, stable poses.
+
+    All is below `/drake/library`: `labels/NAME`, `visual/NAME`, `pieces/NAME/000`, `contact/NAME`
+    and `poses/NAME/0`.
+
+    Args:
+        library: what to show.
+        meshcat: where; what it showed below that path before is removed.
+        names: of objects, in this order; all if None.
+
+    Returns:
+        Switches for the columns, to be given to `save_html`.
+
+    Raises:
+        UnknownNameError: no such object, or one of its files is missing.
+        InvalidInputError: no objects, or Drake cannot load one.
+    """
+    chosen = list(library.objects if names is None else names)
+    if not chosen:
+        raise InvalidInputError(f"library {library.root} has no objects to show")
+    meshcat.Delete(GALLERY_PATH)
+    unit = _usual_size(map(library.entry, chosen))
+    contact = hydroelastic_meshes(library, chosen)
+    objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
+    line = TEXT_STRETCH * LINE_HEIGHT * unit
+    layout = layout_gallery([item.row for item in objects], unit, line)
+    for item, placed in zip(objects, layout.rows, strict=True):
+        draw_object(meshcat, item, placed, unit)
+    _show_floor(meshcat, layout)
+    return _gallery_legend(objects)
+
+
+def _usual_size(entries: Iterable[ObjectEntry]) -> float:
+    """Median of the objects' longest sides, the unit of a gallery [m]."""
+    return float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
+
+
+def _show_floor(meshcat: Meshcat, layout: GalleryLayout) -> None:
+    """Draws the floors of a gallery, and aims camera and lamp at it."""
+    for k, bank in enumerate(layout.banks):
+        draw_slab(meshcat, f"{GALLERY_PATH}/floor/{k}", bank, -SLAB_HEIGHT, GALLERY_FLOOR_COLOR)
+    aim_at_gallery(meshcat, layout)
+
+
+def aim_at_gallery(meshcat: Meshcat, layout: GalleryLayout) -> None:
+    """Aims camera and lamp at a gallery, whose middle is the origin."""
+    # Intensities. That of the lamp holds at 1 m.
+    lights = {
+        "AmbientLight": 0.55,
+        "FillLight": 0.0,
+        "PointLightNegativeX": 0.0,
+        "PointLightPositiveX": 0.0,
+        "SpotLight": 2.9,
+    }
+    lamp_offset = np.array([-1.1, -1.2, 2.4])  # Position of the lamp, in radii of the gallery.
+    # Half the lamp's cone, in radians: just covers the gallery, for sharp shadows.
+    cone_angle = 0.45
+    min_radius = 0.3  # Metres. The lamp's shadow starts at 0.5 m.
+    forward = camera_rotation(GALLERY_ELEVATION)[:, 2]
+    aim_at(meshcat, layout.corners(), forward, field_of_view_deg=GALLERY_FIELD_OF_VIEW_DEG)
+    radius = max(min_radius, float(np.linalg.norm(layout.corners()[:, :2], axis=1).max()))
+    p_WL = radius * lamp_offset
+    for light, intensity in lights.items():
+        power = intensity * float(p_WL @ p_WL) if light == "SpotLight" else intensity
+        meshcat.SetProperty(f"/Lights/{light}", "visible", intensity > 0.0)
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", power)
+    lamp = "/Lights/SpotLight/<object>"
+    meshcat.SetProperty(lamp, "position", p_WL.tolist())
+    meshcat.SetProperty(lamp, "angle", cone_angle)
+
+
+def _gallery_legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
+    compliant = any(mesh.compliant for e in objects for mesh in e.contact)
+    contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
+    contact_color = hex_color(HIGH_PRESSURE_COLOR) if compliant else "#9eadba"
+    entries = (
+        ("visual mesh", "#f2f2f2", "visual"),
+        ("convex pieces, moved apart", "#4a90c0", "pieces"),
+        (contact, contact_color, "contact"),
+        ("stable poses, with probability", "#d6dee3", "poses"),
+        ("names, sizes, masses (~ from density)", "#40454d", "labels"),
+    )
+    return tuple(LegendEntry(text, c, (f"{GALLERY_PATH}/{name}",)) for text, c, name in entries)
 
 
 @dataclass(frozen=True)
@@ -85,6 +174,7 @@ class GalleryObject:
 def prepare_object(
     library: ObjectLibrary, name: str, contact: tuple[HydroelasticMesh, ...], unit: float
 ) -> GalleryObject:
+    """An object, ready to be placed; `unit` is the size of a usual object [m]."""
     explosion = 0.25  # Share of each piece's distance from the middle by which it is moved outward.
     entry = library.entry(name)
     camera = camera_rotation(GALLERY_ELEVATION)
@@ -101,13 +191,9 @@ def prepare_object(
     touching = np.vstack([m.vertices for m in contact]) if contact else corners
     things = [corners @ R_WO.T, np.vstack(apart) @ R_WO.T, touching @ R_WO.T]
     things += [corners @ R.T for R in poses]
-    label, label_width = label_mesh(
-        _object_description(name, entry), GalleryText.line_height * unit, GalleryText.stretch
-    )
-    size = GalleryText.caption_scale * GalleryText.line_height * unit
-    captions = [
-        label_mesh((text,), size, GalleryText.stretch) for text in _object_captions(entry, contact)
-    ]
+    text = _object_description(name, entry)
+    label, label_width = label_mesh(text, LINE_HEIGHT * unit, TEXT_STRETCH)
+    captions = [_caption_mesh((text,), unit) for text in _object_captions(entry, contact)]
     items = [
         GalleryItem(points.min(axis=0), points.max(axis=0), width)
         for points, (_, width) in zip(things, captions, strict=True)
@@ -123,6 +209,11 @@ def prepare_object(
         captions=tuple(captions),
         row=GalleryRow(label_width, items[: len(GALLERY_COLUMNS)], items[len(GALLERY_COLUMNS) :]),
     )
+
+
+def _caption_mesh(lines: tuple[str, ...], unit: float) -> tuple[Mesh, float]:
+    """A caption, smaller than a label, and its width [m]."""
+    return label_mesh(lines, 0.85 * LINE_HEIGHT * unit, TEXT_STRETCH)
 
 
 def _object_description(name: str, entry: ObjectEntry) -> tuple[str, ...]:
@@ -154,21 +245,21 @@ def _contact_caption(entry: ObjectEntry) -> str:
 def draw_object(
     meshcat: Meshcat, shown: GalleryObject, placed: PlacedGalleryRow, unit: float
 ) -> None:
+    """Draws an object in its row: visual mesh, pieces, contact geometry, and stable poses."""
     tile_color = Rgba(0.70, 0.75, 0.79, 1.0)
     margin_share = 0.04  # Of the gallery's unit.
     name = shown.name
     write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", shown.label, placed.p_WL)
     poses = [f"poses/{name}/{k}" for k in range(len(shown.R_WO_poses))]
-    homes = [
-        f"{GALLERY_PATH}/{home}" for home in (*(f"{c}/{name}" for c in GALLERY_COLUMNS), *poses)
-    ]
-    for k, (home, p_WI) in enumerate(zip(homes, placed.p_WI, strict=True)):
+    places = [*(f"{column}/{name}" for column in GALLERY_COLUMNS), *poses]
+    for k, (place, p_WI) in enumerate(zip(places, placed.p_WI, strict=True)):
+        home = f"{GALLERY_PATH}/{place}"
         resting = k - len(GALLERY_COLUMNS)
         R_WO = shown.R_WO if resting < 0 else shown.R_WO_poses[resting]
         lift = np.zeros(3)
-        if home == f"{GALLERY_PATH}/pieces/{name}":
+        if place == f"pieces/{name}":
             _draw_pieces(meshcat, f"{home}/object", shown.pieces)
-        elif home == f"{GALLERY_PATH}/contact/{name}":
+        elif place == f"contact/{name}":
             _draw_contact(meshcat, f"{home}/object", shown.contact, R_WO)
         else:
             meshcat.SetObject(f"{home}/object", shown.visual)
@@ -180,9 +271,8 @@ def draw_object(
         X_WO = RigidTransform(RotationMatrix(R_WO), p_WI + lift)
         meshcat.SetTransform(f"{home}/object", X_WO)
         caption, width = shown.captions[k]
-        write_label(
-            meshcat, f"{home}/caption", caption, placed.captions[k] - (width / 2.0, 0.0, 0.0)
-        )
+        left = placed.captions[k] - (width / 2.0, 0.0, 0.0)
+        write_label(meshcat, f"{home}/caption", caption, left)
 
 
 def _draw_pieces(
@@ -230,12 +320,13 @@ def _join_meshes(
     meshes: Sequence[tuple[Array, NDArray[np.int64], Array]],
 ) -> tuple[Array, NDArray[np.int32], Array]:
     """Several meshes as one for Meshcat: vertices (3, V), faces (3, F), values (V,)."""
-    first = np.cumsum([0, *(len(vertices) for vertices, _, _ in meshes)])
-    faces = [f + start for (_, f, _), start in zip(meshes, first, strict=False)]
+    vertices, faces, values = zip(*meshes, strict=True)
+    first = np.cumsum([0, *map(len, vertices)])
+    shifted = [f + start for f, start in zip(faces, first, strict=False)]
     return (
-        np.asfortranarray(np.vstack([vertices for vertices, _, _ in meshes]).T),
-        np.asfortranarray(np.vstack(faces).T.astype(np.int32)),
-        np.concatenate([values for _, _, values in meshes]),
+        np.asfortranarray(np.vstack(vertices).T),
+        np.asfortranarray(np.vstack(shifted).T.astype(np.int32)),
+        np.concatenate(values),
     )
 
 
@@ -252,92 +343,6 @@ def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: 
     meshcat.SetObject(path, Box(x1 - x0, y1 - y0, SLAB_HEIGHT), color)
     middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, bottom + SLAB_HEIGHT / 2.0]
     meshcat.SetTransform(path, RigidTransform(middle))
-
-
-GALLERY_FLOOR_COLOR = Rgba(0.90, 0.91, 0.92, 1.0)
-GALLERY_FIELD_OF_VIEW_DEG = 22.0
-"""Vertical angle of view: little perspective, so that rows at the back are not small."""
-
-
-def show_library(
-    library: ObjectLibrary, meshcat: Meshcat, names: Iterable[str] | None = None
-) -> tuple[LegendEntry, ...]:
-    """Shows a row for each object: its looks, its convex pieces, what contact sees, stable poses.
-
-    All is below `/drake/library`: `labels/NAME`, `visual/NAME`, `pieces/NAME/000`, `contact/NAME`
-    and `poses/NAME/0`.
-
-    Args:
-        library: what to show.
-        meshcat: where; what it showed below that path before is removed.
-        names: of objects, in this order; all if None.
-
-    Returns:
-        Switches for the columns, to be given to `save_html`.
-
-    Raises:
-        UnknownNameError: no such object, or one of its files is missing.
-        InvalidInputError: no objects, or Drake cannot load one.
-    """
-    chosen = list(library.objects if names is None else names)
-    if not chosen:
-        raise InvalidInputError(f"library {library.root} has no objects to show")
-    meshcat.Delete(GALLERY_PATH)
-    entries = [library.entry(name) for name in chosen]
-    unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
-    contact = hydroelastic_meshes(library, chosen)
-    objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
-    layout = layout_gallery(
-        [e.row for e in objects], unit, GalleryText.stretch * GalleryText.line_height * unit
-    )
-    for item, placed in zip(objects, layout.rows, strict=True):
-        draw_object(meshcat, item, placed, unit)
-    for k, bank in enumerate(layout.banks):
-        draw_slab(meshcat, f"{GALLERY_PATH}/floor/{k}", bank, -SLAB_HEIGHT, GALLERY_FLOOR_COLOR)
-    aim_at_gallery(meshcat, layout)
-    return _gallery_legend(objects)
-
-
-def aim_at_gallery(meshcat: Meshcat, layout: GalleryLayout) -> None:
-    """Aims camera and lamp at a gallery, whose middle is the origin."""
-    # Intensities. That of the lamp holds at 1 m.
-    lights = {
-        "AmbientLight": 0.55,
-        "FillLight": 0.0,
-        "PointLightNegativeX": 0.0,
-        "PointLightPositiveX": 0.0,
-        "SpotLight": 2.9,
-    }
-    lamp_offset = np.array([-1.1, -1.2, 2.4])  # Position of the lamp, in radii of the gallery.
-    # Half the lamp's cone, in radians: just covers the gallery, for sharp shadows.
-    cone_angle = 0.45
-    min_radius = 0.3  # Metres. The lamp's shadow starts at 0.5 m.
-    forward = camera_rotation(GALLERY_ELEVATION)[:, 2]
-    aim_at(meshcat, layout.corners(), forward, field_of_view_deg=GALLERY_FIELD_OF_VIEW_DEG)
-    radius = max(min_radius, float(np.linalg.norm(layout.corners()[:, :2], axis=1).max()))
-    p_WL = radius * lamp_offset
-    for light, intensity in lights.items():
-        power = intensity * float(p_WL @ p_WL) if light == "SpotLight" else intensity
-        meshcat.SetProperty(f"/Lights/{light}", "visible", intensity > 0.0)
-        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", power)
-    lamp = "/Lights/SpotLight/<object>"
-    meshcat.SetProperty(lamp, "position", p_WL.tolist())
-    meshcat.SetProperty(lamp, "angle", cone_angle)
-
-
-def _gallery_legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
-    compliant = any(mesh.compliant for e in objects for mesh in e.contact)
-    contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
-    red = "#" + "".join(f"{round(255 * c):02x}" for c in HIGH_PRESSURE_COLOR)
-    return (
-        LegendEntry("visual mesh", "#f2f2f2", (f"{GALLERY_PATH}/visual",)),
-        LegendEntry("convex pieces, moved apart", "#4a90c0", (f"{GALLERY_PATH}/pieces",)),
-        LegendEntry(contact, red if compliant else "#9eadba", (f"{GALLERY_PATH}/contact",)),
-        LegendEntry("stable poses, with probability", "#d6dee3", (f"{GALLERY_PATH}/poses",)),
-        LegendEntry(
-            "names, sizes, masses (~ from density)", "#40454d", (f"{GALLERY_PATH}/labels",)
-        ),
-    )
 
 
 @dataclass(frozen=True)
@@ -376,8 +381,7 @@ def show_objects_for_grasps(
     """
     meshcat.Delete(GALLERY_PATH)
     counts = Counter(grasps.object.tolist())
-    entries = [library.entry(name) for name in counts]
-    unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
+    unit = _usual_size(map(library.entry, counts))
     stands = [_prepare_object_with_grasps(library, name, grasps, width, unit) for name in counts]
     layout, rows = _layout_rows(stands, unit)
     X_WO = {}
@@ -389,9 +393,7 @@ def show_objects_for_grasps(
             meshcat.SetTransform(path, RigidTransform(X_WO[stand.name]))
             left = p_WL - (label_width / 2.0, 0.0, 0.0)
             write_label(meshcat, f"{GALLERY_PATH}/labels/{stand.name}", label, left)
-    for k, bank in enumerate(layout.banks):
-        draw_slab(meshcat, f"{GALLERY_PATH}/floor/{k}", bank, -SLAB_HEIGHT, GALLERY_FLOOR_COLOR)
-    aim_at_gallery(meshcat, layout)
+    _show_floor(meshcat, layout)
     return np.stack([X_WO[name] for name in grasps.object.tolist()]) @ grasps.X_OG
 
 
@@ -406,33 +408,19 @@ def _prepare_object_with_grasps(
     points = np.vstack([corners, drawn.T]) @ R_WO.T
     count = int(own.sum())
     text = (name, f"{count} grasp{'' if count == 1 else 's'}")
-    caption = label_mesh(
-        text, GalleryText.caption_scale * GalleryText.line_height * unit, GalleryText.stretch
-    )
-    return ObjectWithGrasps(
-        name, R_WO, GalleryItem(points.min(axis=0), points.max(axis=0), caption[1]), caption
-    )
+    caption = _caption_mesh(text, unit)
+    item = GalleryItem(points.min(axis=0), points.max(axis=0), caption[1])
+    return ObjectWithGrasps(name, R_WO, item, caption)
 
 
 def _layout_rows(
     stands: list[ObjectWithGrasps], unit: float
 ) -> tuple[GalleryLayout, list[list[ObjectWithGrasps]]]:
     """As many rows, one behind the other, as let the camera come nearest."""
-    line_scale = 1.0  # Two lines of caption fit into the space of one label.
     layouts = []
     for count in range(1, len(stands) + 1):
         size = -(-len(stands) // count)
         rows = [stands[k : k + size] for k in range(0, len(stands), size)]
         items = [GalleryRow(0.0, (), [stand.item for stand in row]) for row in rows]
-        layouts.append(
-            (
-                layout_gallery(
-                    items,
-                    unit,
-                    line_scale * GalleryText.stretch * GalleryText.line_height * unit,
-                    1,
-                ),
-                rows,
-            )
-        )
+        layouts.append((layout_gallery(items, unit, TEXT_STRETCH * LINE_HEIGHT * unit, 1), rows))
     return min(layouts, key=lambda layout: layout[0].distance())

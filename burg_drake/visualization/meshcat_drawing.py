@@ -101,9 +101,14 @@ def text_triangles(text: str, height: float) -> tuple[Array, NDArray[np.int32]]:
     corners = np.stack([np.stack(c) for c in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=-1)
     vertices = np.zeros((3, corners.shape[1] * 4))
     vertices[:2] = corners.reshape(2, -1)
-    first = 4 * np.arange(corners.shape[1], dtype=np.int32)
+    return vertices, quadrangle_faces(corners.shape[1])
+
+
+def quadrangle_faces(count: int) -> NDArray[np.int32]:
+    """Triangles (3, 2 N) of quadrangles whose corners follow each other."""
+    first = 4 * np.arange(count, dtype=np.int32)
     faces = np.stack([[first, first + 1, first + 2], [first, first + 2, first + 3]], axis=-1)
-    return vertices, faces.reshape(3, -1)
+    return np.asfortranarray(faces.reshape(3, -1))
 
 
 def _render_text(text: str) -> NDArray[np.bool_]:

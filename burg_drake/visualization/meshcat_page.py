@@ -31,15 +31,15 @@ MATRIX_DECIMALS = 6
 
 @dataclass(frozen=True, eq=False)
 class GraspPicker:
-    """What a page needs to show the gripper at any of the drawn grasps.
+    """Control of a page that shows the gripper at any of the drawn grasps.
 
     Attributes:
         gripper: drawn in the same Meshcat.
         X_WG: (N, 4, 4) the grasps.
         width: (N,) between the pads [m].
-        holder: (N,) the object of each; grasps of one follow each other.
-        label: (N,) what the list says of each.
-        title: what that is.
+        holder: (N,) the object of each; grasps of one object follow each other.
+        label: (N,) text of each in the list.
+        title: heading of the list.
         groups: as they are drawn.
         selected: shown when the page is opened; none if None.
     """
@@ -55,29 +55,27 @@ class GraspPicker:
 
     def html(self) -> Html:
         """The list."""
+
+        def option(k: int | None) -> Html:
+            text, value = ("no gripper", -1) if k is None else (self.label[k], k)
+            selected = "selected" if k == self.selected else None
+            return element("option", text, value=value, selected=selected)
+
         options = [
-            element(
-                "optgroup",
-                *(
-                    element("option", self.label[k], value=k, **self._chosen(k))
-                    for k in list(members)
-                ),
-                label=name,
-            )
+            element("optgroup", *map(option, members), label=name)
             for name, members in groupby(range(len(self.label)), key=lambda k: self.holder[k])
         ]
-        none = element("option", "no gripper", value=-1, **self._chosen(None))
         return join(
             element("p", "click a grasp, here or in the view", class_="title"),
             element("p", self.title),
-            element("select", none, *options, id="grasps", size=12, aria_label="grasps"),
+            element("select", option(None), *options, id="grasps", size=12, aria_label="grasps"),
         )
 
-    def behaviour(self) -> str:
-        """What the list does: its look, its data, and the script; after that of the legend."""
+    def script_html(self) -> str:
+        """Style, data and script of the list; to be put after the script of the legend."""
         return (
             f"<style>{PICKER_STYLE}</style>"
-            f'<script type="application/json" id="picker">{self._data()}</script>'
+            f'<script type="application/json" id="picker">{self._script_data()}</script>'
             f"<script>{PICKER_SCRIPT}</script>"
         )
 
@@ -90,15 +88,12 @@ class GraspPicker:
         """Puts the gripper where the slider says."""
         k = round(meshcat.GetSliderValue("grasp")) - 1
         if k >= 0:
-            self.gripper.put(self.X_WG[k], float(self.width[k]))
+            self.gripper.place(self.X_WG[k], float(self.width[k]))
         elif self.gripper.shown:
             self.gripper.hide()
 
-    def _chosen(self, k: int | None) -> dict[str, str]:
-        return {"selected": "selected"} if k == self.selected else {}
-
-    def _data(self) -> str:
-        """What the script reads; `</` would end its element."""
+    def _script_data(self) -> str:
+        """Data for the script, as JSON; `</` would end its element."""
         groups = np.full(len(self.label), -1)
         for g, group in enumerate(self.groups):
             groups[group.members] = g
@@ -114,7 +109,7 @@ class GraspPicker:
                     "G": _column_major(self.X_WG[k]),
                     "H": _column_major(X_WH[k]),
                     "width": round(float(self.width[k]), MATRIX_DECIMALS),
-                    "closed": round(self.gripper.closed_by(self.width[k]), MATRIX_DECIMALS),
+                    "closed": round(self.gripper.closing_distance(self.width[k]), MATRIX_DECIMALS),
                     "group": int(groups[k]),
                 }
                 for k in range(len(self.label))
@@ -242,9 +237,9 @@ def page_panel(
     lines = "".join(f"<p>{escape(line)}</p>" for line in caption)
     more = "" if controls is None else controls.html()
     return (
-        f'<style>{_PAGE_STYLE}{LEGEND_STYLE}</style><details id="burg" open><summary>{escape(title)}</summary>'
-        f"{lines}{legend_html(legend)}{more}</details><script>{_PAGE_SCRIPT}{LEGEND_SCRIPT}</script>"
-        f"{'' if controls is None else controls.behaviour()}"
+        f'<style>{_PAGE_STYLE}{LEGEND_STYLE}</style><details id="burg" open>'
+        f"<summary>{escape(title)}</summary>{lines}{legend_html(legend)}{more}</details><script>{_PAGE_SCRIPT}{LEGEND_SCRIPT}</script>"
+        f"{'' if controls is None else controls.script_html()}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Pictures of objects: the view that shows most of them, parallel projection, shaded outlines, shadows."""
+"""Pictures of objects: the best view, parallel projection, shaded outlines, shadows."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class FlatView:
     corner: Array
     size: tuple[float, float]
 
-    def places(self, p_WQ: Array) -> Array:
+    def project(self, p_WQ: Array) -> Array:
         """Where points (..., 3) in the world [m] are in the picture (..., 2) [SVG units]."""
         return (np.asarray(p_WQ) @ self.R_WC[:, :2] - self.corner) * self.scale
 
@@ -188,7 +188,7 @@ _SURFACE_CACHE: dict[tuple[str, str, str], SolidMesh] = {}
 
 def footprint(solid: SolidMesh, view: FlatView) -> str:
     """The `d` of what a solid covers of the plane that it stands on."""
-    hull = cv2.convexHull(view.places(project_to_ground(solid)).astype(np.float32))
+    hull = cv2.convexHull(view.project(project_to_ground(solid)).astype(np.float32))
     return path_data(hull[:, 0, :])
 
 
@@ -210,7 +210,7 @@ def _tone_raster(solids: Sequence[SolidMesh], view: FlatView) -> NDArray[np.uint
     triangles = np.concatenate(corners)
     depth = view.depths(triangles).mean(axis=1)
     tones = _triangle_tones(triangles, view)
-    pixels = np.round(view.places(triangles) * PIXELS_PER_UNIT * 2**subpixel_bits).astype(np.int32)
+    pixels = np.round(view.project(triangles) * PIXELS_PER_UNIT * 2**subpixel_bits).astype(np.int32)
     for k in np.argsort(-depth, kind="stable").tolist():
         cv2.fillConvexPoly(image, pixels[k], int(tones[k]) + 1, shift=subpixel_bits)
     return image

@@ -30,7 +30,10 @@ def reachability_chart(
         outlines: corners (N, 2) around each object in the scene frame [m], by name.
     """
     outline_style = "fill:none;stroke:#fff;stroke-width:1.2"
-    name_style = "fill:#fff;font-size:10px;text-anchor:middle;paint-order:stroke;stroke:#0008;stroke-width:2.5px"
+    name_style = (
+        "fill:#fff;font-size:10px;text-anchor:middle;paint-order:stroke;stroke:#0008;"
+        "stroke-width:2.5px"
+    )
     dx, dy = reachability.cell
     depth = dy * len(reachability.y)
     scale = CHART_WIDTH / (dx * len(reachability.x))
@@ -51,11 +54,9 @@ def reachability_chart(
     for name, corners in outlines.items():
         u, v = scale * corners[:, 0], CHART_TITLE_HEIGHT + scale * (depth - corners[:, 1])
         d = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(u, v, strict=True)) + "Z"
-        middle = (u.min() + u.max()) / 2, (v.min() + v.max()) / 2 + 3.5
+        x, y = f"{(u.min() + u.max()) / 2:.1f}", f"{(v.min() + v.max()) / 2 + 3.5:.1f}"
         shapes.append(element("path", d=d, style=outline_style))
-        shapes.append(
-            element("text", name, x=f"{middle[0]:.1f}", y=f"{middle[1]:.1f}", style=name_style)
-        )
+        shapes.append(element("text", name, x=x, y=y, style=name_style))
     title = f"{100 * reachability.heights[height]:g} cm above the board"
     return element(
         "svg",
@@ -71,25 +72,12 @@ def reachability_chart(
 
 def reachability_key() -> Html:
     """What the colours stand for, from none to all orientations."""
-    steps = 10  # Of the key.
-    step_width = 16
-    key_height = 10
-    colors = map_colors((np.arange(steps) + 0.5) / steps)
+    colors = map_colors((np.arange(10) + 0.5) / 10)
     bars = [
-        element(
-            "rect",
-            x=k * step_width,
-            y=0,
-            width=step_width,
-            height=key_height,
-            fill=hex_color(color),
-        )
+        element("rect", x=16 * k, y=0, width=16, height=10, fill=hex_color(color))
         for k, color in enumerate(colors)
     ]
-    size = steps * step_width
-    picture = element(
-        "svg", *bars, viewBox=f"0 0 {size} {key_height}", width=size, height=key_height
-    )
+    picture = element("svg", *bars, viewBox="0 0 160 10", width=160, height=10)
     return element("p", join("none ", picture, " all orientations"), class_="legend")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import Box, Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -12,9 +13,9 @@ from burg_drake.core import Array, transform_points
 from burg_drake.motion import ArmSpan, ReachabilityMap
 from burg_drake.scene import Scene
 from burg_drake.station import Camera, Robot, Station, SurroundingsProperties, frustum
-from burg_drake.visualization.colors import hex_color, map_colors
+from burg_drake.visualization.colors import hex_color, map_colors, rgb_from_hex
 from burg_drake.visualization.legend import ColorBar, LegendEntry
-from burg_drake.visualization.meshcat_drawing import text_triangles
+from burg_drake.visualization.meshcat_drawing import quadrangle_faces, text_triangles
 from burg_drake.visualization.scene_view import aim_camera, robot_points, show_scene
 
 CAMERAS_PATH = "/drake/cameras"
@@ -113,7 +114,7 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[Legen
         path = f"{CAMERAS_PATH}/{name}"
         p_WC = np.array(camera.X_WC.translation)
         corners = frustum(camera, image_depth)
-        color = _rgba_from_hex(camera_color)
+        color = Rgba(*rgb_from_hex(camera_color))
         outline = np.vstack([corners, corners[:1]]).T
         meshcat.SetLine(f"{path}/image", np.asfortranarray(outline), 2.0, color)
         meshcat.SetLine(f"{path}/up", np.asfortranarray(corners[:2].T), 6.0, color)
@@ -133,9 +134,8 @@ def draw_span(span: ArmSpan, meshcat: Meshcat) -> LegendEntry:
     """Draws where the ball that the grasp frame never leaves cuts the table top."""
     span_path = "/drake/span"
     span_color = "#3b6ea5"
-    meshcat.SetLine(
-        span_path, np.asfortranarray(span_circle(span).T), 3.0, _rgba_from_hex(span_color)
-    )
+    circle = np.asfortranarray(span_circle(span).T)
+    meshcat.SetLine(span_path, circle, 3.0, Rgba(*rgb_from_hex(span_color)))
     text = f"longest reach on the table, {_span_radius(span):.2f} m"
     return LegendEntry(text, span_color, (span_path,))
 
@@ -178,7 +178,7 @@ def draw_reachability(
             middle = np.stack([reachability.x[columns], reachability.y[rows]], axis=1)
             size = tile_shares[min(k, 1)] * np.array(reachability.cell)
             vertices, faces = tile_triangles(middle, size, z)
-            path = _bin_path(b) + f"/{k}"
+            path = f"{MAP_PATH}/{b}/{k}"
             meshcat.SetTriangleMesh(path, vertices, faces, Rgba(*colors[b], tile_opacity))
             meshcat.SetTransform(path, X_WS)
     bar = ColorBar(
@@ -187,12 +187,12 @@ def draw_reachability(
         colors=tuple(hex_color(color) for color in colors),
         counts=tuple(np.bincount(place.ravel(), minlength=REACHABILITY_BINS).tolist()),
         ticks=tuple((share, f"{share:g}") for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)),
-        paths=tuple(_bin_path(b) for b in range(REACHABILITY_BINS)),
+        paths=tuple(f"{MAP_PATH}/{b}" for b in range(REACHABILITY_BINS)),
     )
     return [bar, *_height_entries(reachability)]
 
 
-def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, Array]:
+def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, NDArray[np.int32]]:
     """Equal rectangles at one height, to be seen from above.
 
     Args:
@@ -206,9 +206,7 @@ def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, Array]:
     corner = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size
     p = np.full((len(middle), 4, 3), z)
     p[..., :2] = middle[:, None] + corner
-    first = 4 * np.arange(len(middle), dtype=np.int32)
-    faces = np.stack([[first, first + 1, first + 2], [first, first + 2, first + 3]], axis=-1)
-    return np.asfortranarray(p.reshape(-1, 3).T), np.asfortranarray(faces.reshape(3, -1))
+    return np.asfortranarray(p.reshape(-1, 3).T), quadrangle_faces(len(middle))
 
 
 def look_through(camera: Camera, meshcat: Meshcat) -> None:
@@ -228,15 +226,6 @@ def _height_entries(reachability: ReachabilityMap) -> Sequence[LegendEntry]:
         where = "tiles on the board" if k == 0 else "small tiles"
         share = 100.0 * reachability.covered[k]
         label = f"{where}: {100 * height:g} cm above it, {share:.0f} % reached"
-        paths = tuple(f"{_bin_path(b)}/{k}" for b in range(REACHABILITY_BINS))
+        paths = tuple(f"{MAP_PATH}/{b}/{k}" for b in range(REACHABILITY_BINS))
         entries.append(LegendEntry(label, key_color, paths))
     return entries
-
-
-def _bin_path(index: int) -> str:
-    return f"{MAP_PATH}/{index}"
-
-
-def _rgba_from_hex(color: str) -> Rgba:
-    r, g, b = (int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    return Rgba(r, g, b)

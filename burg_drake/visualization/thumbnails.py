@@ -80,11 +80,11 @@ class Thumbnail:
 
     Attributes:
         pixels: (H, W, 3) colours as bytes.
-        cover: (H, W) share of each pixel that is the object and not background, in [0, 1].
+        coverage: (H, W) share of each pixel that is the object and not background, in [0, 1].
     """
 
     pixels: NDArray[np.uint8]
-    cover: Array
+    coverage: Array
 
     def png(self) -> bytes:
         """The picture as a PNG file with few colours."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
@@ -19,8 +22,6 @@ CAMERA_DISTANCE = 0.80
 """Horizontal distance of the camera from the grasp, in metres. Farther objects do not hide it."""
 SIGHT_CLEARANCE = 0.10
 """Preferred distance of other objects from the line of sight, in metres."""
-
-
 REPLAY_MARGINS = display_order(
     (
         *("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "others_turned"),
@@ -75,15 +76,22 @@ def record_trial(
     steps = [path.length * path.direction_W for path in trial.lift_paths(X_WG, lift)]
     on_way = [hand + p_W for p_W in np.cumsum(steps, axis=0)]
     aim_at(meshcat, np.vstack([scene_points(scene, station), hand, *on_way]), -offset)
-    meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
-    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
-    meshcat.StopRecording()
+    with _recording(meshcat):
+        result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
     if result.margins.end_time > 0.0:
-        publish_loop(meshcat)
+        _publish_loop(meshcat)
     return result
 
 
-def publish_loop(meshcat: Meshcat) -> None:
+@contextlib.contextmanager
+def _recording(meshcat: Meshcat) -> Iterator[None]:
+    """Records what the block shows."""
+    meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
+    yield
+    meshcat.StopRecording()
+
+
+def _publish_loop(meshcat: Meshcat) -> None:
     """Publishes what was recorded."""
     recording = meshcat.get_mutable_recording()
     recording.set_autoplay(True)
@@ -112,7 +120,7 @@ def camera_offset(X_WG: Array, p_WB: Array) -> Array:
 
 
 def _count_view_blockers(p_WG: Array, heading: Array, p_WB: Array) -> int:
-    """How many points (M, 3) are less than `SIGHT_CLEARANCE` beside the horizontal line of sight."""
+    """Number of points (M, 3) within `SIGHT_CLEARANCE` of the horizontal line of sight."""
     offset = (p_WB - p_WG) * (1.0, 1.0, 0.0)
     along = offset @ heading
     beside = np.linalg.norm(offset - along[:, None] * heading, axis=1)
@@ -191,10 +199,9 @@ def record_arm_trial(
     forward = _side_view_direction(arm.X_WA.matrix()[:3, 3], trial.X_WG(instance, X_OG)[:3, 3])
     points = [scene_points(scene, station), _motion_points(trial, plan)]
     aim_at(meshcat, np.vstack(points), forward)
-    meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
-    result = trial.run(instance, X_OG, plan, friction=friction, mass=mass)
-    meshcat.StopRecording()
-    publish_loop(meshcat)
+    with _recording(meshcat):
+        result = trial.run(instance, X_OG, plan, friction=friction, mass=mass)
+    _publish_loop(meshcat)
     return result
 
 

@@ -214,7 +214,7 @@ def test_a_request_has_to_be_whole_in_time(
     kept.request("GET", "/states")
     assert kept.getresponse().read()
     used = kept.sock
-    monkeypatch.setattr("burg_drake.apps.page_server.ConnectionTimeouts.request", 0.3)
+    monkeypatch.setattr("burg_drake.apps.page_server.REQUEST_TIMEOUT", 0.3)
     rest = b"X-Slow: " if sent == HEAD else b""
     with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as slow:
         slow.sendall(sent + rest)

@@ -14,7 +14,7 @@ import pytest
 
 from burg_drake.apps import main
 from burg_drake.core import GraspSet, MissingDependencyError
-from burg_drake.evaluation import EvaluationSettings, Request, Run, load_run
+from burg_drake.evaluation import EvaluationSettings, Run, RunRequest, load_run
 from burg_drake.station import load_station
 
 pytest.importorskip("mujoco")
@@ -86,7 +86,7 @@ def test_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     settings = EvaluationSettings(engine="mujoco", mode="hand")
     with pytest.raises(MissingDependencyError, match=r"pip install 'burg-drake\[mujoco\]'"):
-        Request.of(load_station("panda_tabletop"), settings)
+        RunRequest.of(load_station("panda_tabletop"), settings)
 
 
 def test_mujoco_is_loaded_only_where_it_is_asked_for() -> None:

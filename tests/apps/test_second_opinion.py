@@ -16,7 +16,7 @@ from burg_drake.evaluation import (
     judge_again,
     load_campaign,
     load_run,
-    outcome_counts,
+    results_table,
     settle_verdict,
 )
 
@@ -107,7 +107,7 @@ def test_all_scenes_of_a_run_are_settled(
     command: list[str], many: Campaign, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 1.1)
-    monkeypatch.setattr(outcome_counts, "CONTESTED_CONFIDENCE", 1.1)
+    monkeypatch.setattr(results_table, "CONTESTED_CONFIDENCE", 1.1)
     names = ("outcome", "judged_again", "engine", "run")
     before = many.columns(names)
     executed = before["outcome"] != "collision_target"
@@ -139,7 +139,7 @@ def test_a_scene_that_was_left_half_way_is_finished(
 ) -> None:
     """As after an interruption: the journal has the new verdict, the table has not."""
     monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 0.0)
-    monkeypatch.setattr(outcome_counts, "CONTESTED_CONFIDENCE", 0.0)
+    monkeypatch.setattr(results_table, "CONTESTED_CONFIDENCE", 0.0)
     run = many.runs[0]
     id = run.candidates.id[0]
     with Journal(run.path / "journal.jsonl") as journal:

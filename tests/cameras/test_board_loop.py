@@ -284,13 +284,13 @@ def test_ports_of_the_station_are_there(loop: BoardLoop) -> None:
 
 
 def test_bad_input(scene: Scene, station: Station, loop: BoardLoop, context: Context) -> None:
-    with pytest.raises(UnknownNameError, match="'mgu' is not a free instance; did you mean 'mug'"):
+    with pytest.raises(UnknownNameError, match=r"'mgu'.*'mug'"):
         loop.place_object(context, "mgu", np.eye(4))
     with pytest.raises(UnknownNameError, match="has no camera 'bord'; did you mean 'board'"):
         build_board_loop(scene, station, "bord")
     with pytest.raises(InvalidInputError, match="samples of a camera is 0; it must be 1 to 8"):
         build_board_loop(scene, station, LoopCamera(samples=0))
-    with pytest.raises(InvalidInputError, match="the period of a camera is 0 s; give more than 0"):
+    with pytest.raises(InvalidInputError, match=r"period.*0 s"):
         LoopCamera(period=0.0)
     tiny = replace(scene, document=replace(scene.document, board=Board(size=(0.03, 0.03))))
     with pytest.raises(InvalidInputError, match="do not fit on a board of 30 x 30 mm"):

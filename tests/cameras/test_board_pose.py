@@ -310,9 +310,7 @@ def test_one_small_marker_has_two_poses() -> None:
 
 
 def test_pictures_that_are_none_of_this_camera(poses: BoardPose) -> None:
-    with pytest.raises(
-        InvalidInputError, match="the image has 320 x 240 pixels, but the intrinsics"
-    ):
+    with pytest.raises(InvalidInputError, match="the image has 320 x 240"):
         poses.estimate(np.zeros((240, 320, 3), np.uint8))
     with pytest.raises(InvalidInputError, match="2 channels; expected 3 or 4"):
         poses.estimate(np.zeros((480, 640, 2), np.uint8))

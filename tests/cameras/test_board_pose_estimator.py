@@ -104,9 +104,7 @@ def test_an_image_of_another_size_is_refused() -> None:
     context = system.CreateDefaultContext()
     image = drake_image(np.zeros((480, 640, 3)))
     system.GetInputPort("color_image").FixValue(context, AbstractValue.Make(image))
-    with pytest.raises(
-        InvalidInputError, match="has 640 x 480 pixels, but the intrinsics are for 320"
-    ):
+    with pytest.raises(InvalidInputError, match=r"640 x 480.*320"):
         system.GetOutputPort("valid").Eval(context)
 
 

@@ -296,8 +296,8 @@ def test_live_views_are_asked_for_until_there_are_enough(monkeypatch: pytest.Mon
     def offer(view: CharucoView) -> tuple[bool, str]:
         name = "burg_drake.cameras.calibration.view_guidance.find_target"
         monkeypatch.setattr(name, lambda image, target, name: view)
-        assert collector.offer(blank) == (False, "hold still")
-        return collector.offer(blank)
+        assert collector.add_frame(blank) == (False, "hold still")
+        return collector.add_frame(blank)
 
     tilt = "tilt the target by 20 to 45 degrees, so that it faces left"
     assert offer(views[before]) == (True, tilt)
@@ -375,7 +375,7 @@ def test_live_views_are_still_and_different() -> None:
     collector = ViewCollector(TARGET)
 
     def offer(picture: np.ndarray) -> tuple[bool, str]:
-        return collector.offer(Frame(picture, None, 0.0, "camera 0"))
+        return collector.add_frame(Frame(picture, None, 0.0, "camera 0"))
 
     assert offer(np.zeros_like(image)) == (False, "the image does not show the target")
     assert offer(image) == (False, "hold still")  # nothing to compare it with yet

@@ -302,15 +302,13 @@ def test_documents_come_back_and_refuse_what_makes_no_sense(tmp_path: Path) -> N
     (tmp_path / "bad.yaml").write_text("version: 1\nbaseline: 0.05\nflying: 1.5\n")
     with pytest.raises(DocumentError, match=r"bad.yaml:3: flying is 1.5; it must be 0 to 1"):
         depth_noise(tmp_path / "bad.yaml")
-    with pytest.raises(UnknownNameError, match="depth noise 'd436' does not exist; did you mean"):
+    with pytest.raises(UnknownNameError, match=r"'d436'.*did you mean"):
         depth_noise("d436")
-    with pytest.raises(
-        FieldError, match="disparity_sigma needs the baseline of the sensor, but baseline is 0"
-    ):
+    with pytest.raises(FieldError, match=r"disparity_sigma.*baseline is 0"):
         DepthNoise(disparity_sigma=0.1)
-    with pytest.raises(FieldError, match="grazing_to_deg is 70; it must be at least grazing_from"):
+    with pytest.raises(FieldError, match="grazing_to_deg is 70"):
         DepthNoise(grazing_from_deg=80.0, grazing_to_deg=70.0)
-    with pytest.raises(FieldError, match=r"hole_size is 0.5 pixels; it must be 0, or from 1 to 20"):
+    with pytest.raises(FieldError, match=r"hole_size is 0.5"):
         DepthNoise(hole_size=0.5)
 
 
@@ -325,9 +323,7 @@ def test_images_that_do_not_fit_are_refused() -> None:
         measured(np.ones(SHAPE, np.uint16), noise)  # type: ignore[arg-type]
     broken = wall()
     broken[7, 9] = np.nan
-    with pytest.raises(
-        InvalidInputError, match=r"1 pixels that are .* such as nan in row 7, column 9"
-    ):
+    with pytest.raises(InvalidInputError, match=r"nan in row 7, column 9"):
         measured(broken, noise)
     with pytest.raises(InvalidInputError, match=r"normals has shape .* and type float32"):
         measured(wall(), noise, normals=np.zeros((4, 4, 3), np.float32))

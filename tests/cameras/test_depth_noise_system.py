@@ -108,10 +108,10 @@ def test_colours_and_normals_are_used() -> None:
 def test_bad_input_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="seed of depth noise is -1; give 0 to"):
         DepthNoiseSystem(AXIAL, CAMERA, seed=-1)
-    with pytest.raises(InvalidInputError, match="period of depth noise is 0 s; give more than 0"):
+    with pytest.raises(InvalidInputError, match=r"period.*0 s"):
         DepthNoiseSystem(AXIAL, CAMERA, period=0.0)
     system = DepthNoiseSystem(NOISE_PRESETS["d435"], CAMERA)
-    with pytest.raises(InvalidInputError, match="depth_noise: input port depth_image has no value"):
+    with pytest.raises(InvalidInputError, match=r"depth_noise: .*depth_image"):
         depth(system, system.CreateDefaultContext())
     with pytest.raises(InvalidInputError, match="the depth image has 32 x 48 pixels"):
         depth(system, context_of(system, width=32))

@@ -118,7 +118,5 @@ def test_what_is_beside_or_behind_is_not_seen() -> None:
 
 
 def test_views_of_data_sets_are_no_fisheyes() -> None:
-    with pytest.raises(
-        InvalidInputError, match="camera board of a view is a fisheye, which cannot be rendered"
-    ):
+    with pytest.raises(InvalidInputError, match=r"camera board.*fisheye"):
         View(camera="board", intrinsics=FISHEYE, X_SC=np.eye(4))

@@ -89,7 +89,9 @@ def test_a_fisheye_puts_nothing_into_its_image_that_it_does_not_see() -> None:
     """Points beside and behind, of a lens whose polynomial has its highest value on the way."""
     lens = replace(FISHEYE, distortion=(-0.1, -0.03, 0.0, 0.0))
     # Its derivative is 1 - 0.3 a^2 - 0.15 a^4.
-    assert fisheye_lens(lens.distortion).turn ** 2 == pytest.approx((np.sqrt(0.69) - 0.3) / 0.3)
+    assert fisheye_lens(lens.distortion).max_angle ** 2 == pytest.approx(
+        (np.sqrt(0.69) - 0.3) / 0.3
+    )
     angle = np.radians(np.linspace(0.0, 180.0, 181))
     rays = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
     u = lens.project(rays)[:, 0]
@@ -123,9 +125,7 @@ def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
 
 def test_images_of_another_size_are_refused() -> None:
     PINHOLE.require_size(640, 480, "photo.png")
-    with pytest.raises(
-        InvalidInputError, match=r"photo\.png has 1280 x 960 pixels, but the intrinsics"
-    ):
+    with pytest.raises(InvalidInputError, match=r"photo\.png has 1280 x 960"):
         PINHOLE.require_size(1280, 960, "photo.png")
 
 

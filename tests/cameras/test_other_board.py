@@ -126,9 +126,9 @@ def test_frames_are_looked_at_where_the_ring_is() -> None:
     X_SC[:3, 3] -= BOARD.layout.p_SQ[5].mean(axis=0) - one.layout.p_SQ[0].mean(axis=0)
     grey = board_image(BOARD, SMALL, VIEW)[:, :, 1]
     light = srgb_to_linear(grey)
-    said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, light, X_SC)
+    said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).describe_foreign_markers(grey, light, X_SC)
     assert "ids 0, 1, 2 ..." in said
-    assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, light, VIEW)
+    assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).describe_foreign_markers(grey, light, VIEW)
 
 
 @pytest.mark.parametrize("covered", [False, True], ids=["whole", "each marker once"])

@@ -173,7 +173,7 @@ def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
 
 
 def test_a_handle_before_its_mug_is_an_inner_line(scene: Scene, shape: SceneMesh) -> None:
-    mug = shape.of(("mug",))
+    mug = shape.select(("mug",))
     yaw = np.deg2rad(140.0)  # where the handle points
     middle = mug.boxes[0].mean(axis=0)
     eye = middle + 0.35 * np.array([np.cos(yaw), np.sin(yaw), 0.5])

@@ -35,7 +35,7 @@ def test_what_is_not_depth_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"text\.png cannot be read as"):
         read_depth(tmp_path / "text.png")
     cv2.imwrite(str(tmp_path / "color.png"), np.zeros((4, 4, 3), np.uint8))
-    with pytest.raises(InvalidInputError, match=r"color.png has shape \(4, 4, 3\) and type uint8"):
+    with pytest.raises(InvalidInputError, match=r"color.png.*\(4, 4, 3\)"):
         read_depth(tmp_path / "color.png")
 
 

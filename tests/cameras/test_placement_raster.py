@@ -5,27 +5,27 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras import PinholeView, Window, target_shape, window_around
+from burg_drake.cameras import ImageWindow, PinholeView, target_shape, window_around
 from burg_drake.core import make_pose, rot_z
 
 K = np.array([[500.0, 0.0, 31.5], [0.0, 480.0, 23.5], [0.0, 0.0, 1.0]])
-ALL = Window(0, 0, 64, 48)
+ALL = ImageWindow(0, 0, 64, 48)
 
 
-def buffer(p_CV: np.ndarray, faces: np.ndarray, window: Window) -> np.ndarray:
+def buffer(p_CV: np.ndarray, faces: np.ndarray, window: ImageWindow) -> np.ndarray:
     """Depth by the code, of a mesh given in the camera frame, for a camera anywhere."""
     X_SC = make_pose(rot_z(0.4), (0.2, -0.1, 0.3))
     shape = target_shape(p_CV, faces, X_SC)
     return PinholeView(K, (64, 48), X_SC).buffer(shape, np.zeros(3), window)
 
 
-def rays(window: Window) -> np.ndarray:
+def rays(window: ImageWindow) -> np.ndarray:
     v, u = np.mgrid[: window.shape[0], : window.shape[1]].astype(float)
     at = window.image(np.stack([u, v], axis=-1))
     return np.dstack([(at - K[:2, 2]) / K[[0, 1], [0, 1]], np.ones(window.shape)])
 
 
-def brute_force(p_CV: np.ndarray, faces: np.ndarray, window: Window) -> np.ndarray:
+def brute_force(p_CV: np.ndarray, faces: np.ndarray, window: ImageWindow) -> np.ndarray:
     """Moeller and Trumbore's intersection of every ray with every triangle."""
     nearest = np.full(window.shape, np.inf)
     d = rays(window)
@@ -46,7 +46,7 @@ def test_overlapping_triangles_are_as_ray_casting_has_them() -> None:
     rng = np.random.default_rng(1)
     p_CV = np.column_stack([rng.uniform(-0.08, 0.08, (60, 2)), rng.uniform(0.8, 1.2, 60)])
     faces = np.arange(60).reshape(20, 3)
-    for window in (ALL, Window(10, 5, 30, 30, 2.0), Window(8, 8, 40, 32, 0.5)):
+    for window in (ALL, ImageWindow(10, 5, 30, 30, 2.0), ImageWindow(8, 8, 40, 32, 0.5)):
         found = buffer(p_CV, faces, window)
         true = brute_force(p_CV, faces, window)
         assert found.shape == window.shape
@@ -78,7 +78,7 @@ def test_what_lies_behind_or_outside_is_not_drawn() -> None:
 
 
 def test_windows_convert_there_and_back() -> None:
-    window = Window(7, 3, 20, 10, 3.0)
+    window = ImageWindow(7, 3, 20, 10, 3.0)
     at = np.array([[7.0, 3.0], [9.25, 4.5]])
     np.testing.assert_allclose(window.image(window.raster(at)), at)
     # the first pixel is three raster pixels wide, and its middle is that of the second of them

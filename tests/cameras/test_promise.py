@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,20 +22,13 @@ FISHEYE = replace(CAMERA, focal=(100.0, 100.0), model="fisheye", distortion=(0.0
 CORNERS = [name for name in IMAGE_PARTS if "corner" in name]
 
 
-@dataclass
-class Known:
-    """A camera whose parameters have some variance, as far as a promise asks for it."""
+SEEN = np.random.default_rng(0).uniform([250, 180], [390, 300], (50, 2))
 
-    intrinsics: Intrinsics
-    variance: float
-    corners: np.ndarray = field(
-        default_factory=lambda: np.random.default_rng(0).uniform([250, 180], [390, 300], (50, 2))
-    )
 
-    @property
-    def hypotheses(self) -> tuple[LensHypothesis, ...]:
-        count = 4 + len(self.intrinsics.distortion)
-        return (LensHypothesis(1.0, self.intrinsics, self.variance * np.eye(count)),)
+def known(camera: Intrinsics, variance: float, corners: np.ndarray = SEEN) -> Promise:
+    """What is promised of a camera whose parameters have some variance."""
+    covariance = variance * np.eye(4 + len(camera.distortion))
+    return calibration_promise(camera, (LensHypothesis(1.0, camera, covariance),), corners)
 
 
 def promise(middle: float = 0.2, **others: float) -> Promise:
@@ -86,15 +79,15 @@ def test_a_document_says_as_much(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_bounds_that_are_no_numbers_are_not_promised() -> None:
-    found = calibration_promise(Known(CAMERA, np.nan))
+    found = known(CAMERA, np.nan)
     assert set(found.parts.values()) == {np.inf} and found.unknown == 1.0
     assert found.known_to == np.inf and str(found) == "known no better than to 10 pixels"
-    assert calibration_promise(Known(CAMERA, 1e-8)).known_to < 0.1
+    assert known(CAMERA, 1e-8).known_to < 0.1
 
 
 def test_parts_that_look_too_far_aside_are_not_promised() -> None:
     """100 pixels a radian: 85 degrees are 148 pixels from the middle, the image's corners 400."""
-    found = calibration_promise(Known(FISHEYE, 1e-8))
+    found = known(FISHEYE, 1e-8)
     assert found.parts.keys() == {"middle"}
     assert set(CORNERS) < set(found.except_at)
     assert "upper left corner (beyond 85 degrees)" in str(found)
@@ -102,7 +95,7 @@ def test_parts_that_look_too_far_aside_are_not_promised() -> None:
 
 def test_an_axis_far_outside_of_the_image_leaves_no_middle() -> None:
     seen = np.random.default_rng(0).uniform(0.0, 40.0, (50, 2))
-    found = calibration_promise(Known(replace(FISHEYE, center=(-60.0, -60.0)), 1e-10, seen))
+    found = known(replace(FISHEYE, center=(-60.0, -60.0)), 1e-10, seen)
     assert found.parts.keys() == {"upper left corner"}
     assert "middle" in found.except_at and found.known_to < 0.1
     assert str(found).startswith("known in the upper left corner only")

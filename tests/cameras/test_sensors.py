@@ -69,13 +69,11 @@ def test_a_scaled_image_shows_the_same_at_its_edges() -> None:
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match=r"sensor 'd453' does not exist; did you mean 'd4"):
+    with pytest.raises(UnknownNameError, match=r"'d453'.*did you mean"):
         sensor("d453")
-    with pytest.raises(InvalidInputError, match="d435 has no depth images of 500 x 500 pixels; gi"):
+    with pytest.raises(InvalidInputError, match=r"d435.*500 x 500"):
         sensor("d435").depth_camera((500, 500))
-    with pytest.raises(
-        InvalidInputError, match="640 x 480, which has another aspect ratio; 640 x 576 wo"
-    ):
+    with pytest.raises(InvalidInputError, match=r"640 x 480.*640 x 576"):
         scaled(sensor("azure_kinect").depth_camera(), 640, 480)
     with pytest.raises(InvalidInputError, match="no colour images of 0 x 0"):
         sensor("d455").color_camera((0, 0))

@@ -124,7 +124,7 @@ def test_a_drag_is_one_step_and_tells_of_collisions_on_its_way(session: ComposeS
 
 def test_what_is_refused_changes_nothing(session: ComposeSession) -> None:
     before = session.do(AddObject("mug"))
-    with pytest.raises(InvalidInputError, match=r"the pose of 'mug' has NaN or infinite numbers"):
+    with pytest.raises(InvalidInputError, match="'mug' has NaN"):
         session.do(MoveObjects({"mug": make_pose(p_AB=(np.nan, 0.0, 0.0))}))
     assert session.view is before
 

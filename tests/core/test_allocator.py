@@ -103,31 +103,6 @@ def test_the_package_has_its_library_where_it_is_looked_for() -> None:
 # --- what is refused ------------------------------------------------------------------------------
 
 
-def altered(library: Path, folder: Path, place: int, value: int) -> Path:
-    """A copy with another byte."""
-    data = bytearray(library.read_bytes())
-    data[place] = value
-    path = folder / "libaltered.so"
-    path.write_bytes(data)
-    return path
-
-
-@linux
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [(0, 0), (4, 1), (5, 2), (16, 1), (18, 0xF3)],
-    ids=["no ELF", "32 bit", "big endian", "object file", "RISC-V"],
-)
-def test_a_file_of_another_kind_is_not_even_tried(
-    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: int, value: int
-) -> None:
-    def fail(*_: object) -> bool:
-        raise AssertionError("tried")
-
-    monkeypatch.setattr(worker_processes, "_replaces_malloc", fail)
-    assert of(altered(library, tmp_path, place, value)) == {}
-
-
 @linux
 def test_what_cannot_be_used_is_told_once_and_nothing_is_preloaded(
     library: Path,

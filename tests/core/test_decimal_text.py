@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core import DecimalGrid, format_rows, round_to_grid
+from burg_drake.core import format_rows, round_to_grid
 
 
 def values() -> np.ndarray:
@@ -32,10 +32,8 @@ def test_numbers_on_the_grid_are_as_short_as_python_has_them() -> None:
 
 def test_the_grid_is_the_nearest_decimal() -> None:
     given = values()[np.abs(values()).max(axis=1) < 9000.0]
-    expected = [[float(f"{x:.{DecimalGrid.decimals}f}") for x in row] for row in given.tolist()]
-    np.testing.assert_allclose(
-        round_to_grid(given), expected, rtol=5e-16, atol=1.01 * 10.0**-DecimalGrid.decimals
-    )
+    expected = [[float(f"{x:.12f}") for x in row] for row in given.tolist()]
+    np.testing.assert_allclose(round_to_grid(given), expected, rtol=5e-16, atol=1.01e-12)
 
 
 def test_no_rows_and_no_numbers() -> None:

@@ -33,7 +33,7 @@ def test_a_python_without_bpy(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')
     bare.chmod(0o755)
     monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, str(bare))
-    with pytest.raises(MissingDependencyError, match=r"has no Blender \(No module named 'bpy'\)"):
+    with pytest.raises(MissingDependencyError, match="No module named 'bpy'"):
         Blender(blender_command())
 
 
@@ -55,13 +55,9 @@ def test_labels_need_no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_such_renderer() -> None:
-    with pytest.raises(
-        UnknownNameError, match=r"renderer 'blendr' does not exist; did you mean 'blender'\?"
-    ):
+    with pytest.raises(UnknownNameError, match=r"'blendr'.*'blender'"):
         burg.render("tabletop_six", "panda_tabletop", renderer="blendr")  # type: ignore[arg-type]
-    with pytest.raises(
-        FieldError, match=r"renderer 'blendr' does not exist; did you mean 'blender'\?"
-    ):
+    with pytest.raises(FieldError, match=r"'blendr'.*'blender'"):
         burg.dataset.DatasetRecipe(renderer="blendr")  # type: ignore[arg-type]
 
 

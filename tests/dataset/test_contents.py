@@ -61,7 +61,7 @@ def test_a_library_of_other_content_is_named(made: Path) -> None:
     dataset = burg.load_dataset(made / "data")
     with pytest.raises(InvalidInputError, match=r"images cannot be rendered again"):
         sample_again(dataset, dataset.keys[0])
-    with pytest.raises(InvalidInputError, match=r"the content of the library of distractors is"):
+    with pytest.raises(InvalidInputError, match="library of distractors"):
         burg.generate_dataset(
             ["tabletop_six"],
             "panda_tabletop",

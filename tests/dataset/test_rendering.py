@@ -134,7 +134,7 @@ def test_balls_by_formula() -> None:
     ]
     expected = np.where(masks[0], 1, np.where(masks[1], 2, 0))
     assert np.count_nonzero(expected != images.labels) <= 0.01 * np.count_nonzero(expected)
-    silhouette = rays.silhouette(2, view).within(200, 160)
+    silhouette = rays.silhouette(2, view).mask_in_image(200, 160)
     assert np.count_nonzero(silhouette != masks[1]) <= 0.01 * np.count_nonzero(masks[1])
     at = tuple(np.argwhere(images.labels == 1).mean(axis=0).astype(int))
     assert images.depth[at] == pytest.approx(0.6 - 0.13, abs=5e-4)
@@ -163,7 +163,7 @@ def test_a_silhouette_goes_on_beyond_the_image() -> None:
     assert silhouette.left == pytest.approx(left - 150, abs=1)
     assert silhouette.top == pytest.approx(top - 150, abs=1)
     assert silhouette.mask.shape == pytest.approx((height, width), abs=2)
-    assert np.array_equal(silhouette.within(200, 160), inside)
+    assert np.array_equal(silhouette.mask_in_image(200, 160), inside)
     behind = View(camera="up", intrinsics=view.intrinsics, X_SC=make_pose(p_AB=(0, 0, 0.5)))
     assert rays.silhouette(1, behind).mask.size == 0
 

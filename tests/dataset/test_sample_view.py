@@ -113,7 +113,7 @@ def test_a_data_set_without_a_station(tmp_path: Path) -> None:
     assert (
         load_dataset(with_station(tmp_path / "one", "panda_tabletop")).station.name == STATION.name
     )
-    with pytest.raises(InvalidInputError, match="has no station: its document does not name one"):
+    with pytest.raises(InvalidInputError, match="has no station"):
         _ = load_dataset(with_station(tmp_path / "two", "")).station
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from burg_drake.core import InvalidInputError, Outcome, Stage
 from burg_drake.evaluation import Candidate, Decide, Decision, Screen
+from tests.evaluation.scenes_here import ScenesHere
 
 TOPPLED = 0.0185
 """What is moved by more than this lies afterwards [m]."""
@@ -281,6 +282,6 @@ def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause:
     for module in ("cascade", "scene_tasks"):
         setattr(f"burg_drake.evaluation.{module}.require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this
-    setattr("burg_drake.evaluation.scene_tasks.preparer_count", lambda workers: 0)
+    setattr("burg_drake.evaluation.many_scenes.SceneProcesses", ScenesHere)
     # the chart of the arm's reach takes longer than all else
     setattr("burg_drake.evaluation.report.pages.reachability_section", lambda *_: None)

@@ -121,9 +121,7 @@ def test_given_grasps_must_fit_the_scene(scene: Scene) -> None:
     grasps = GraspSet.create(np.eye(4), object="cube")
     with pytest.raises(UnknownNameError, match=r"'righ', which is not a free .* mean 'right'"):
         given_candidates(scene, {"righ": grasps})
-    with pytest.raises(
-        InvalidInputError, match=r"given for 'bar' are of object 'cube', but 'bar' is object"
-    ):
+    with pytest.raises(InvalidInputError, match="'bar' are of object 'cube'"):
         given_candidates(scene, {"bar": grasps})
     with pytest.raises(InvalidInputError, match="grasps per object is 0"):
         sample_candidates(scene, None, 0, 0, BLIND)  # type: ignore[arg-type]

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,9 @@ from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, expected, 
 
 import burg_drake
 from burg_drake.core import ClusterError, InvalidInputError, Outcome, start_worker
-from burg_drake.evaluation import Candidate, Job, JobFailed, StationJudgeFactory, WorkerLimits
+from burg_drake.evaluation import Candidate, Job, JobFailed, WorkerLimits
 from burg_drake.scene import Scene
-from burg_drake.simulation import TrialSettings
-from burg_drake.station import ENGINES, Station
+from burg_drake.station import Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -30,12 +30,12 @@ from burg_drake.evaluation import (  # noqa: E402
     ClusterWorkers,
     DaskExecutor,
     LocalNodes,
-    SentJob,
     code_hash,
     connect_cluster,
     deciding_versions,
-    deliver_bundle,
+    make_bundle,
     require_same_versions,
+    send_bundle,
     threads_by_address,
 )
 from tests.hang_guard import HANG_GUARD, until  # noqa: E402
@@ -140,8 +140,7 @@ def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
 def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
     cluster: Cluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("dispatch", "sent_job"):
-        monkeypatch.setattr(f"burg_drake.evaluation.cluster.{name}.LOSSES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.members.ChunkSettings.max_losses", 2)
     (guilty,) = executed(1)
     judge = CrashingJudge(how=((guilty, "parent"),), pause=0.01)
     answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(60))]))
@@ -282,12 +281,8 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
 ) -> None:
     nodes = cluster.nodes
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
-    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", TrialSettings())
     answers = []
-    lost = (
-        "^the scheduler at tcp://127\S+ does not answer any more; the results so far are"
-        " kept: start a scheduler"
-    )
+    lost = r"^the scheduler at tcp://127\S+ does not answer any more"
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
         with pytest.raises(ClusterError, match=lost):
             for answer in executor.judge([job]):
@@ -296,7 +291,8 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
                 nodes.scheduler.wait()
         other.client.rpc.timeout = 0.2
         with pytest.raises(ClusterError, match=lost):
-            deliver_bundle(other.client, SentJob(Job("job", factory, ())), ["tcp://127.0.0.1:9"])
+            bundle = make_bundle(scene, station)
+            send_bundle(other.client, bundle, "the scene", Counter(), ["tcp://127.0.0.1:9"])
     assert answers
 
 
@@ -317,10 +313,7 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 
     monkeypatch.setattr(ClusterWorkers, "update", look_and_kill)
     try:
-        lost = (
-            "^the scheduler at tcp://127\S+ does not answer any more; the results so far are"
-            " kept: start a scheduler"
-        )
+        lost = r"^the scheduler at tcp://127\S+ does not answer any more"
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
             list(executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:

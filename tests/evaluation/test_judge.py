@@ -63,7 +63,7 @@ def test_the_first_outcome_decides_and_later_stages_are_not_asked() -> None:
     clear, planned = Decision(margins={"overlap": 0.0}), Decision(margins={"duration": 5.0})
     judge = Scripted([clear, reached, planned, Decision(Outcome.DROPPED)])
     asked: list[Stage] = []
-    verdict = judge_grasp(judge, GRASP, asked.append)
+    verdict = judge_grasp(judge, GRASP, announce=asked.append)
     assert (verdict.outcome, verdict.stage) == (Outcome.DROPPED, Stage.EXECUTED)
     assert verdict.q_grasp == (1.0, 2.0) and verdict.q_pregrasp == (3.0,)
     assert verdict.margins == {"overlap": 0.0, "duration": 5.0}
@@ -87,7 +87,7 @@ def test_what_was_screened_before_is_not_asked_again() -> None:
     judge = Scripted([ValueError("asked"), Decision(), Decision(), Decision(Outcome.LIFTED)])
     asked: list[Stage] = []
     passed = ScreenAnswers().then(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
-    verdict = judge_grasp(judge, GRASP, asked.append, passed)
+    verdict = judge_grasp(judge, GRASP, passed, asked.append)
     assert asked == list(Stage)[1:]
     assert verdict.outcome is Outcome.LIFTED and verdict.margins == {"overlap": 0.0}
     assert list(verdict.cpu) == list(Stage) and verdict.cpu[Stage.CLEAR] == 2.5e-5
@@ -95,7 +95,7 @@ def test_what_was_screened_before_is_not_asked_again() -> None:
     rejected = ScreenAnswers().then(
         Stage.CLEAR, Decision(Outcome.COLLISION_TABLE, blocker="table"), 2.5e-5
     )
-    verdict = judge_grasp(judge, GRASP, asked.append, rejected)
+    verdict = judge_grasp(judge, GRASP, rejected, asked.append)
     assert (verdict.outcome, verdict.stage) == (Outcome.COLLISION_TABLE, Stage.CLEAR)
     assert verdict.blocker == "table" and verdict.cpu == {Stage.CLEAR: 2.5e-5}
     assert len(asked) == 3

@@ -165,7 +165,7 @@ def test_of_many_scenes_only_who_asks_gets_reports(
     def reports() -> list[bool]:
         return [run.report_path.exists() for run in campaign.runs]
 
-    monkeypatch.setattr("burg_drake.evaluation.campaign_document.MAX_SCENES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.run_document.MAX_SCENES", 2)
     campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
     assert campaign.complete and reports() == [False] * 3
     assert all(run.table_path.exists() for run in campaign.runs)

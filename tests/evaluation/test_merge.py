@@ -196,7 +196,7 @@ def test_the_same_merge_finishes_what_was_killed(
     shards = [
         run_all(scenes, station, tmp_path / f"many{k}", **few, shard=f"{k}/3").path for k in (1, 2)
     ]
-    for paths, where in ((halves, "finish_run"), (shards, "PartWriter")):
+    for paths, where in ((halves, "finish_run"), (shards, "update_parts")):
         whole = merge_folders(paths, tmp_path / f"whole_{where}")
         out = tmp_path / where
         with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):

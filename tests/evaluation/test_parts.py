@@ -167,7 +167,9 @@ def test_what_nobody_touched_is_not_read(campaign: Campaign, monkeypatch) -> Non
     read = []
     segments = importlib.import_module("burg_drake.evaluation.table_parts")
     hashed = segments._stream_hash
-    monkeypatch.setattr(segments, "_stream_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1])
+    monkeypatch.setattr(
+        segments, "_stream_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1]
+    )
     load_campaign(campaign.path).columns(["slip"])
     assert read and max(read) <= 64
 

@@ -19,9 +19,9 @@ from burg_drake.evaluation import (
     GROUP_CLASSES,
     MAX_DRAWN_GRASPS,
     MAX_PICTURED_INSTANCES,
+    HistogramSeries,
     Limit,
     Run,
-    Series,
     drawn_rows,
     mirrored_histogram,
     report_page,
@@ -213,9 +213,13 @@ def test_the_grasps_that_are_drawn_are_in_the_shares_of_all() -> None:
 def test_mirrored_bars_hold_every_value_on_their_side() -> None:
     rng = np.random.default_rng(0)
     good, bad = rng.exponential(2.0, 400), np.append(rng.exponential(4.0, 50), 1e3)
-    series = [Series(bad[:30], "g2", "lost"), Series(bad[30:], "g3", "never")]
+    series = [HistogramSeries(bad[:30], "g2", "lost"), HistogramSeries(bad[30:], "g3", "never")]
     chart = mirrored_histogram(
-        Series(good, "g0", "lifted"), series, title="slip", unit="mm", limit=Limit(3.0, "limit")
+        HistogramSeries(good, "g0", "lifted"),
+        series,
+        title="slip",
+        unit="mm",
+        limit=Limit(3.0, "limit"),
     )
     root = read_page(chart)
     axis = float(next(line for line in root.find("line", "axis")).attributes["y1"])

@@ -406,10 +406,10 @@ def test_what_is_read_of_a_changed_text_is_what_is_read_of_all_of_it(data: st.Da
         end = at if data.draw(st.booleans()) else end
         piece = "".join(data.draw(st.lists(st.sampled_from(PIECES), max_size=2)))
         text = text[: min(at, end)] + piece + text[max(at, end) :]
-        found, expected = _sheet_or_error(known.after, text), _sheet_or_error(_all_of, text)
+        found, expected = _sheet_or_error(known.read_changed, text), _sheet_or_error(_all_of, text)
         assert found == expected
         if not isinstance(found, str):
-            known = known.after(text)
+            known = known.read_changed(text)
 
 
 def _all_of(text: str) -> SheetText:

@@ -10,7 +10,7 @@ import pytest
 
 import burg_drake as burg
 from burg_drake.core import InvalidInputError, MissingDependencyError, Pose, UnknownNameError
-from burg_drake.export import LegalNames, lay_out
+from burg_drake.export import lay_out, model_names, prim_names
 from burg_drake.objects import ContactGeometry
 from burg_drake.scene import Instance, Scene
 from burg_drake.station import Station
@@ -74,12 +74,12 @@ def test_contact_that_a_format_does_not_have_is_told(scene: Scene, tmp_path: Pat
 def test_legal_names_are_unique(scene: Scene) -> None:
     names = ("a.b", "a_b", "a-b", "1", "world", "__x__", "größe")
     layout = lay_out(of(scene, *(Instance(name=n, object="mug", X_SO=Pose()) for n in names)))
-    assert LegalNames.of_sdf(layout).by_name == {n: n for n in names} | {
+    assert model_names(layout) == {n: n for n in names} | {
         "bowl": "bowl",
         "world": "world_1",
         "__x__": "__x___1",
     }
-    usd = LegalNames.of_usd(layout).by_name
+    usd = prim_names(layout)
     assert usd == {
         "a.b": "a_b_2",
         "a_b": "a_b",

@@ -102,10 +102,10 @@ def test_what_cannot_be_is_said(tmp_path: Path) -> None:
         contact_geometry("mesh", holey, False, [torus()], tmp_path)
     with pytest.raises(
         MeshError,
-        match=r"^contact 'surface': its surface is not closed; make the mesh watertight and",
+        match=r"^contact 'surface': its surface is not closed",
     ):
         contact_geometry("surface", holey, False, [torus()], tmp_path)
-    with pytest.raises(MeshError, match="no box, cylinder or sphere comes close to its volume"):
+    with pytest.raises(MeshError, match="no box, cylinder or sphere"):
         contact_geometry("primitive", torus(), True, [], tmp_path)
     bottle = load_library("household").surface("bottle")
     with pytest.raises(MeshError, match=r"^contact 'primitive': .*; choose 'pieces'"):

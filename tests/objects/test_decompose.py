@@ -51,29 +51,33 @@ def test_convex_things_are_their_hull() -> None:
 
 
 @pytest.fixture(scope="module")
-def corner_pieces() -> convex_decomposition.Pieces:
+def corner_pieces() -> convex_decomposition.ConvexPieces:
     return convex_pieces(_corner(), closed=True)
 
 
-def test_a_corner_is_two_bars(corner_pieces: convex_decomposition.Pieces) -> None:
+def test_a_corner_is_two_bars(corner_pieces: convex_decomposition.ConvexPieces) -> None:
     assert _corner().volume == pytest.approx(CORNER_VOLUME)
     assert len(corner_pieces.meshes) == 2
     total = sum(p.volume for p in corner_pieces.meshes)
     assert total == pytest.approx(CORNER_VOLUME, rel=0.05)
 
 
-def test_pieces_are_convex_and_wound_outward(corner_pieces: convex_decomposition.Pieces) -> None:
+def test_pieces_are_convex_and_wound_outward(
+    corner_pieces: convex_decomposition.ConvexPieces,
+) -> None:
     for piece in corner_pieces.meshes:
         assert piece.is_volume
         assert piece.volume == pytest.approx(piece.convex_hull.volume, rel=1e-9)
 
 
-def test_the_notch_stays_free(corner_pieces: convex_decomposition.Pieces) -> None:
+def test_the_notch_stays_free(corner_pieces: convex_decomposition.ConvexPieces) -> None:
     for piece in corner_pieces.meshes:
         assert not piece.contains([[0.06, 0.06, 0.01]])[0]
 
 
-def test_the_same_mesh_gives_the_same_pieces(corner_pieces: convex_decomposition.Pieces) -> None:
+def test_the_same_mesh_gives_the_same_pieces(
+    corner_pieces: convex_decomposition.ConvexPieces,
+) -> None:
     again = convex_pieces(_corner(), closed=True)
     for a, b in zip(corner_pieces.meshes, again.meshes, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
@@ -116,7 +120,7 @@ def test_given_pieces_that_are_none() -> None:
     inverted.invert()
     with pytest.raises(MeshError, match="piece 1 is not convex: its hull has 1"):
         check_given_pieces([_bar((0.02, 0.02, 0.02), (0, 0, 0)), _corner()])
-    with pytest.raises(MeshError, match="piece 0 is not a closed surface with outward winding"):
+    with pytest.raises(MeshError, match="piece 0 is not a closed surface"):
         check_given_pieces([inverted])
     with pytest.raises(MeshError, match="pieces is empty"):
         check_given_pieces([])
@@ -131,6 +135,6 @@ def test_a_crash_of_the_library_is_an_error() -> None:
 def test_too_long_is_an_error() -> None:
     with pytest.raises(
         MeshError,
-        match=r"longer than 0.01 s of CPU time; .*threshold above 0.05, or give convex pieces",
+        match=r"longer than 0.01 s.*threshold above 0.05",
     ):
         convex_pieces(_corner(), closed=True, parameters=Decomposition(timeout=0.01))

@@ -86,9 +86,7 @@ def test_missing_files(library: ObjectLibrary) -> None:
 def test_missing_libraries(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="does not exist"):
         load_library(tmp_path / "none")
-    with pytest.raises(
-        DocumentError, match=r"is not an object library \(library.yaml is missing\)"
-    ):
+    with pytest.raises(DocumentError, match=r"library.yaml is missing"):
         load_library(tmp_path)
 
 
@@ -123,7 +121,7 @@ def test_surfaces_have_no_seams_and_are_in_the_object_frame() -> None:
 def test_damaged_meshes(library: ObjectLibrary, content: bytes) -> None:
     (library.root / "box").mkdir()
     (library.root / "box" / "mesh.obj").write_bytes(content)
-    with pytest.raises(MeshError, match=r"box/mesh.obj is damaged or not a mesh; build library"):
+    with pytest.raises(MeshError, match=r"box/mesh.obj is damaged"):
         library.surface("box")
 
 

@@ -92,9 +92,7 @@ def test_density() -> None:
 @pytest.mark.parametrize("mass", [0.0, -1.0, float("nan"), float("inf")])
 def test_masses_that_no_object_has(mass: float) -> None:
     box = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
-    with pytest.raises(
-        InvalidInputError, match=r"mass is .* kg; for a free object it must be above 0"
-    ):
+    with pytest.raises(InvalidInputError, match=r"mass is .* kg; .* above 0"):
         mass_properties(box, mass=mass)
 
 

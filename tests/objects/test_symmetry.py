@@ -96,13 +96,13 @@ def test_any_turn_takes_a_ball_onto_itself() -> None:
 def test_lumpy_balls_are_not_tried_in_every_direction(monkeypatch: pytest.MonkeyPatch) -> None:
     """As scans of fruit are: no direction is singled out, and no turn fits."""
     tried = []
-    refined = SymmetrySearch._refined
+    refined = SymmetrySearch._refine_rotation
 
     def counted(search: SymmetrySearch, R: Array) -> Array | None:
         tried.append(R)
         return refined(search, R)
 
-    monkeypatch.setattr(SymmetrySearch, "_refined", counted)
+    monkeypatch.setattr(SymmetrySearch, "_refine_rotation", counted)
     ball = trimesh.creation.icosphere(4, 0.04)
     rng = np.random.default_rng(0)
     lumps = rng.normal(size=(60, 3))

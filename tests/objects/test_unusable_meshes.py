@@ -195,14 +195,10 @@ def test_triangles_are_counted_before_a_file_is_read(tmp_path: Path, name: str) 
 def test_meshes_of_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mesh_file, "MAX_MESH_TRIANGLES", 100)
     _box(2).export(tmp_path / "box.ply")
-    with pytest.raises(
-        MeshError, match=r"box.ply: 192 triangles; a mesh may have 100: reduce the number of faces"
-    ):
+    with pytest.raises(MeshError, match=r"box.ply: 192 triangles; .* 100"):
         load_mesh(tmp_path / "box.ply")
     sheet = _raw(_box(2).vertices, _box(2).faces[:80])
-    with pytest.raises(
-        MeshError, match="80 triangles; an open surface that becomes a wall may have 50"
-    ):
+    with pytest.raises(MeshError, match=r"80 triangles; .* wall may have 50"):
         load_mesh(sheet)
 
 
@@ -222,7 +218,7 @@ def test_textures_of_too_many_pixels(
     mesh = _with_texture(tmp_path, suffix)
     assert texture_image(load_mesh(mesh).visual) is not None
     monkeypatch.setattr(mesh_file, "MAX_TEXTURE_PIXELS", 1000)
-    with pytest.raises(MeshError, match=": 40 x 30 pixels; a texture may have 31 x 31: scale it"):
+    with pytest.raises(MeshError, match=r": 40 x 30 pixels; .* 31 x 31"):
         load_mesh(mesh)
 
 

@@ -365,9 +365,11 @@ def test_another_coacd_version_cuts_again_what_it_cut(
     given = ObjectSource(name="given", mesh=_box(), pieces=(_box(),), mass=0.1)
     sources = [*_sources(meshes), given]
     build(sources, tmp_path / "lib")
-    true = build_record.metadata.version
+    true = build_record.package_version
     monkeypatch.setattr(
-        build_record.metadata, "version", lambda name: "another" if name == "coacd" else true(name)
+        build_record,
+        "package_version",
+        lambda name, missing: "another" if name == "coacd" else true(name, missing),
     )
     report = build(sources, tmp_path / "lib")
     assert (report.built, report.cached) == (("box", "can"), ("given",))

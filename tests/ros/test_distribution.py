@@ -82,7 +82,7 @@ def test_no_master() -> None:
 
 def test_what_is_no_master(monkeypatch: pytest.MonkeyPatch) -> None:
     """Something listens, and never answers."""
-    monkeypatch.setattr(node_implementations.RosMaster, "timeout", 0.1)
+    monkeypatch.setattr(node_implementations, "MASTER_TIMEOUT", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()

@@ -58,15 +58,15 @@ def test_reasons_that_alternate_do_not_flood_the_log() -> None:
 def test_silence_is_told_once_and_again_after_images() -> None:
     account = StatusLog(0.0)
     topics = {"/camera/image_raw": 0, "/camera/camera_info": 0}
-    assert account.record_silence(topics, 0.9 * StatusLogIntervals.no_image) is None
-    assert account.record_silence(topics, 1.1 * StatusLogIntervals.no_image) == (
+    assert account.record_no_image(topics, 0.9 * StatusLogIntervals.no_image) is None
+    assert account.record_no_image(topics, 1.1 * StatusLogIntervals.no_image) == (
         "nothing publishes /camera/image_raw and /camera/camera_info; is the camera running?"
         " Still waiting"
     )
-    assert account.record_silence(topics, 9.0 * StatusLogIntervals.no_image) is None
+    assert account.record_no_image(topics, 9.0 * StatusLogIntervals.no_image) is None
     account.record_image(FOUND, 10.0 * StatusLogIntervals.no_image)
-    assert account.record_silence({"/image": 1}, 10.5 * StatusLogIntervals.no_image) is None
-    assert account.record_silence({"/image": 1}, 11.5 * StatusLogIntervals.no_image) == (
+    assert account.record_no_image({"/image": 1}, 10.5 * StatusLogIntervals.no_image) is None
+    assert account.record_no_image({"/image": 1}, 11.5 * StatusLogIntervals.no_image) == (
         "/image has a publisher, but no images arrive; still waiting"
     )
 

@@ -257,8 +257,8 @@ def test_actuators_of_a_model_are_unknown_before_finalize() -> None:
 
 
 def test_depth_of_an_overlap_is_not_the_shortest_way_out(tmp_path: Path) -> None:
-    """Fixed: take Drake's depth in place of `geometry.convex_shapes`. A convex pad reaches 20 mm into
-    a table top, and its way out to the side is ten times as long."""
+    """Fixed: take Drake's depth in place of `geometry.convex_shapes`. A convex pad reaches 20 mm
+    into a table top, and its way out to the side is ten times as long."""
     builder = RobotDiagramBuilder(time_step=0.001)
     plant = builder.plant()
     pad = add_body(plant, "pad")

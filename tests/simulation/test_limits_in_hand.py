@@ -101,7 +101,7 @@ def creeping(
     motion = GripMotion(settings, np.eye(4))
     motion.grip()
     for k in range(2 * settings.steady_polls, -1, -1):
-        motion.look(at(angle - k * a_look), others_rest=True)
+        motion.record(at(angle - k * a_look), others_rest=True)
     return motion
 
 
@@ -111,8 +111,8 @@ def creeping(
 def test_what_creep_may_still_add(share: float, stays: bool) -> None:
     """A second of 100 looks adds a hundred times the angle of one."""
     a_look = 1e-4
-    assert creeping(0.5 + share * 100 * a_look, 0.0, a_look).stays_on_one_side(1.0) is stays
-    assert creeping(0.5 + share * 100 * a_look, 0.0, 0.0).stays_on_one_side(1.0)
+    assert creeping(0.5 + share * 100 * a_look, 0.0, a_look).is_verdict_stable(1.0) is stays
+    assert creeping(0.5 + share * 100 * a_look, 0.0, 0.0).is_verdict_stable(1.0)
 
 
 def test_whatever_a_target_turns_about_it_stays_where_that_was_foretold() -> None:
@@ -129,10 +129,10 @@ def test_whatever_a_target_turns_about_it_stays_where_that_was_foretold() -> Non
         beyond = []
         for k in range(n + 100):
             if k == n:
-                decided = motion.stays_on_one_side(1.0)
+                decided = motion.is_verdict_stable(1.0)
             R = Rotation.from_rotvec(k * turn).as_matrix()
             X_W = make_pose(R, about - R @ about + k * slide)
-            motion.look(X_W @ make_pose(offset, start), others_rest=True)
+            motion.record(X_W @ make_pose(offset, start), others_rest=True)
             beyond.append(motion.is_beyond_limits)
         told[decided] += 1
         assert not decided or len({*beyond[n - 1 :]}) == 1
@@ -142,10 +142,10 @@ def test_whatever_a_target_turns_about_it_stays_where_that_was_foretold() -> Non
 def test_no_limit_is_none_for_a_target_that_hangs_upside_down() -> None:
     settings = replace(SETTINGS, **NO_GRIP_LIMITS)
     motion = creeping(math.pi - 1e-3, 0.5, 1e-4, settings)
-    assert motion.stays_on_one_side(10.0) and not motion.is_beyond_limits
+    assert motion.is_verdict_stable(10.0) and not motion.is_beyond_limits
 
 
 def test_before_the_grip_nothing_is_beyond() -> None:
     motion = GripMotion(SETTINGS, np.eye(4))
-    motion.look(inverse(make_pose(np.eye(3), (0.0, 0.5, 0.0))), others_rest=True)
+    motion.record(inverse(make_pose(np.eye(3), (0.0, 0.5, 0.0))), others_rest=True)
     assert all(map(math.isnan, motion.since_grip)) and not motion.is_beyond_limits

@@ -10,14 +10,21 @@ import pytest
 from trial_world import FORCE, GRAVITY, QUICK, from_above, make_station
 
 from burg_drake.core import InvalidInputError, Outcome, inverse, make_pose, rotation_angle
-from burg_drake.simulation import HandTrial, Noise, Perturbed, SuccessRate, perturb, success_rate
+from burg_drake.simulation import (
+    HandTrial,
+    Noise,
+    PerturbedTrial,
+    SuccessRate,
+    perturb,
+    success_rate,
+)
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""
 NONE = Noise(translation=0.0, rotation=0.0, mass=0.0, friction=0.0)
 
 
-def draw(noise: Noise, repeat: int = 0, seed: int = 0, grasp: str = "a") -> Perturbed:
+def draw(noise: Noise, repeat: int = 0, seed: int = 0, grasp: str = "a") -> PerturbedTrial:
     return perturb(CENTRE, 0.3, 0.5, noise, seed=seed, grasp=grasp, repeat=repeat)
 
 

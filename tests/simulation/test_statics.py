@@ -108,7 +108,7 @@ def test_pads_that_slide_pull_with_coulombs_force(slow_trials, friction: float) 
     for _ in range(20):
         execution.advance()
         pulls.append(execution.contact.force[:, 2].sum())
-    assert execution.followed() == pytest.approx(0.0, abs=1e-4)
+    assert execution.distance_followed() == pytest.approx(0.0, abs=1e-4)
     assert np.mean(pulls[5:]) == pytest.approx(2 * friction * FORCE, rel=0.02)
 
 

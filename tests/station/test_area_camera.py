@@ -80,5 +80,5 @@ def test_mean_of_the_fine_image(n: int) -> None:
 
 @pytest.mark.parametrize("samples", [0, 9])
 def test_samples_out_of_range(samples: int) -> None:
-    with pytest.raises(FieldError, match=rf"samples of a camera is {samples}; it must be 1 to 8"):
+    with pytest.raises(FieldError, match=rf"samples of a camera is {samples}.* 1 to 8"):
         replace(CAMERA, samples=samples)

@@ -278,8 +278,7 @@ def test_instance_named_like_a_part_of_the_station(
     taken = make_scene(Instance(name=name, object="can"))
     with pytest.raises(
         InvalidInputError,
-        match=rf"three.yaml: the station has something called '{name}' already; rename this"
-        r" instance",
+        match=rf"three.yaml: .*'{name}' already",
     ):
         build_station_diagram(taken, station, robot=robot)  # type: ignore[arg-type]
 

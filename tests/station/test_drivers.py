@@ -304,8 +304,7 @@ def test_an_arm_with_actuators_in_another_order(empty: Scene, tmp_path: Path) ->
     document = replace(station.document, arm=arm)
     with pytest.raises(
         InvalidInputError,
-        match=r"arm.urdf: the actuators are in the order elbow, shoulder, which differs from"
-        r" that of the joints .* write them in the order shoulder, elbow$",
+        match=r"arm.urdf: .*order elbow, shoulder,.* in the order shoulder, elbow$",
     ):
         build_station_diagram(
             empty, replace(station, document=document, arm_model=model), drivers=True

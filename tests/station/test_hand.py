@@ -95,9 +95,7 @@ def test_unknown_key_and_name(tmp_path: Path) -> None:
     text = resolve_reference("panda_hand", "models/hands").read_text(encoding="utf-8")
     file = tmp_path / "mine.yaml"
     file.write_text(text.replace("closing_speed:", "closing_sped:"), encoding="utf-8")
-    with pytest.raises(
-        DocumentError, match=r"mine\.yaml:\d+: unknown key 'closing_sped'; did you mean 'closing_s"
-    ):
+    with pytest.raises(DocumentError, match=r"mine\.yaml:\d+: .*'closing_sped'.*'closing_s"):
         load_hand(str(file))
     with pytest.raises(UnknownNameError, match=r"pandahand .*did you mean 'panda_hand'"):
         load_hand("pandahand")

@@ -63,7 +63,7 @@ class Setup:
         """Where a point of the scene is on the tab [pixel]."""
         client = list(self.door.server.get_clients().values())[-1]
         box = self.tab.locator("canvas").first.bounding_box()
-        x, y = PageCamera.of(client.camera).on_screen(p_SQ)[0]
+        x, y = PageCamera.from_viser(client.camera).on_screen(p_SQ)[0]
         return float(box["x"] + x * box["width"]), float(box["y"] + y * box["height"])
 
     def middle(self, name: str) -> Any:
@@ -151,7 +151,7 @@ def setup(opened: Setup) -> Setup:
     opened.tab_of("Object")
     until(lambda: len(opened.door.server.get_clients()) == 1, "no other page")
     (client,) = opened.door.server.get_clients().values()
-    opened.page._views.look(client, above=False)
+    opened.page._views.set_view(client, above=False)
     until(lambda: opened.page.actions.queue.idle(0.1), "nothing left to do")
     until(opened.has_view, "the view from the front")
     return opened

@@ -14,14 +14,14 @@ from burg_drake.visualization import COLOR_BINS, ColorScale, color_scale
 def test_range_of_well_behaved_numbers_is_theirs() -> None:
     scale = color_scale(np.linspace(0.0, 1.0, 101))
     assert (scale.lower, scale.upper) == (0.0, 1.0)
-    assert scale.beyond(np.linspace(0.0, 1.0, 101)) == (0, 0)
+    assert scale.count_outside(np.linspace(0.0, 1.0, 101)) == (0, 0)
 
 
 def test_outliers_do_not_widen_the_range() -> None:
     numbers = np.concatenate([np.linspace(0.0, 1.0, 1000), [1e6, -1e9, 4e5]])
     scale = color_scale(numbers)
     assert -0.2 <= scale.lower <= 0.05 and 0.95 <= scale.upper <= 1.2
-    below, above = scale.beyond(numbers)
+    below, above = scale.count_outside(numbers)
     assert below >= 1 and above >= 2
     assert below + above < 0.05 * len(numbers)
 
@@ -38,7 +38,7 @@ def test_infinite_and_missing_numbers_do_not_count() -> None:
         0,
         COLOR_BINS - 1,
     ]
-    assert scale.beyond(numbers) == (1, 2)
+    assert scale.count_outside(numbers) == (1, 2)
 
 
 @pytest.mark.parametrize("numbers", [[], [math.nan], [math.inf, -math.inf]])

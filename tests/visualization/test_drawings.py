@@ -79,7 +79,9 @@ def test_a_drawing_does_not_depend_on_where_things_are() -> None:
     moved = SolidMesh(shown.vertices + np.array([1.0, -2.0, 0.5]), shown.faces)
     here = fit_view(shown.vertices, R_WC, 200.0, 200.0)
     there = fit_view(moved.vertices, R_WC, 200.0, 200.0)
-    np.testing.assert_allclose(here.places(shown.vertices), there.places(moved.vertices), atol=1e-9)
+    np.testing.assert_allclose(
+        here.project(shown.vertices), there.project(moved.vertices), atol=1e-9
+    )
     corners = polygons(footprint(shown, here))[0], polygons(footprint(moved, there))[0]
     np.testing.assert_allclose(corners[0], corners[1], atol=0.11)
 
@@ -87,12 +89,12 @@ def test_a_drawing_does_not_depend_on_where_things_are() -> None:
 def test_a_view_holds_all_points_in_its_middle() -> None:
     points = np.random.default_rng(0).normal(size=(50, 3))
     for size in ((200.0, 80.0), (80.0, 200.0)):
-        places = fit_view(points, camera_rotation(0.6), *size, margin=5.0).places(points)
+        places = fit_view(points, camera_rotation(0.6), *size, margin=5.0).project(points)
         low, high = places.min(axis=0), places.max(axis=0)
         np.testing.assert_allclose(low + high, size, atol=1e-6)
         assert low.min() == pytest.approx(5.0)
     free = fit_view(points, camera_rotation(0.6), 200.0)
-    assert free.places(points).max(axis=0)[1] <= free.size[1]
+    assert free.project(points).max(axis=0)[1] <= free.size[1]
 
 
 def test_strokes_of_a_grasp_keep_their_lengths_in_a_plane() -> None:

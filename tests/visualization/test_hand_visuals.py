@@ -69,7 +69,7 @@ def test_pads_of_a_gripper_that_is_closed_to_a_width(
     gripper = GripperView(recorder, hand, model)  # type: ignore[arg-type]
     assert recorder.properties[GRIPPER_PATH, "visible"] is False
     X_WG = make_pose(rotation_from_rpy([2.9, 0.2, 1.0]), (0.3, 0.1, 0.2))
-    gripper.put(X_WG, width)
+    gripper.place(X_WG, width)
     assert recorder.properties[GRIPPER_PATH, "visible"] is True
     points = []
     for k, visual in enumerate(hand_visuals(hand, model)):
@@ -78,5 +78,5 @@ def test_pads_of_a_gripper_that_is_closed_to_a_width(
     low = np.vstack(points)
     low = low[low[:, 2] > -0.005]  # what reaches as far as the pads
     assert np.abs(low[:, 0]).min() == pytest.approx(width / 2, abs=2e-3)
-    gripper.put(X_WG, 1.0)
-    assert gripper.closed_by(1.0) == 0.0 and gripper.shown
+    gripper.place(X_WG, 1.0)
+    assert gripper.closing_distance(1.0) == 0.0 and gripper.shown

@@ -38,8 +38,8 @@ def renderer(library: ObjectLibrary) -> ObjectRenderer:
 
 def check_framing(picture: Thumbnail) -> None:
     """The object is inside margins, in the middle, and as large as it is meant to be."""
-    height, width = picture.cover.shape
-    rows, columns = np.nonzero(picture.cover > 0.02)
+    height, width = picture.coverage.shape
+    rows, columns = np.nonzero(picture.coverage > 0.02)
     left, right = columns.min(), width - 1 - columns.max()
     top, bottom = rows.min(), height - 1 - rows.max()
     assert min(left, right) >= (1 - MAX_FILLED_SHARE) / 2 * width - 2
@@ -52,8 +52,8 @@ def check_framing(picture: Thumbnail) -> None:
 def check_ink(picture: Thumbnail) -> None:
     """Where the object is, pixels are not background; in the corners they are."""
     background = 255 * np.array(THUMBNAIL_BACKGROUND)
-    inside = picture.pixels[picture.cover == 1.0].astype(float)
-    assert len(inside) > 500 or picture.cover.size < 30_000
+    inside = picture.pixels[picture.coverage == 1.0].astype(float)
+    assert len(inside) > 500 or picture.coverage.size < 30_000
     assert (np.abs(inside - background).max(axis=1) > 12).mean() > 0.97
     assert np.ptp(inside, axis=0).max() > 30, "no shading"
     for row in (0, -1):
@@ -86,7 +86,7 @@ def test_every_stable_pose(library: ObjectLibrary, renderer: ObjectRenderer) -> 
 def test_pieces_are_seen_in_their_colours(renderer: ObjectRenderer) -> None:
     picture = renderer.pieces("screwdriver")
     check_framing(picture)
-    inside = picture.pixels[picture.cover == 1.0] / 255.0
+    inside = picture.pixels[picture.coverage == 1.0] / 255.0
     colors = np.array(distinct_colors(6))
 
     def chroma(values: np.ndarray) -> np.ndarray:

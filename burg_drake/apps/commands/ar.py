@@ -21,10 +21,15 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
 from burg_drake.apps.options.values import positive, positive_int
-from burg_drake.apps.terminal import ignore_interrupts, open_in_browser, sigterm_as_interrupt
+from burg_drake.apps.terminal import (
+    ignore_interrupts,
+    open_in_browser,
+    print_remark,
+    sigterm_as_interrupt,
+)
 
 if TYPE_CHECKING:
-    from burg_drake.cameras import Event, FrameSource, Intrinsics, LiveSession, ViewActions
+    from burg_drake.cameras import FrameSource, Intrinsics, LiveSession, ViewActions
     from burg_drake.scene import Scene
 
 
@@ -74,17 +79,13 @@ def _add_view_options(parser: Any) -> None:
 def _add_result_options(parser: Any) -> None:
     results = parser.add_argument_group("results")
     results.add_argument(
-        "--record",
-        metavar="FILE",
-        help="record a video (.mp4, .avi) and a table of camera poses",
+        "--record", metavar="FILE", help="record a video (.mp4, .avi) and a table of camera poses"
     )
     results.add_argument(
         "--plain", action="store_true", help="also record the video without overlay"
     )
     results.add_argument(
-        "--snapshot",
-        metavar="FOLDER",
-        help="at the end, save picture, overlay and camera pose",
+        "--snapshot", metavar="FOLDER", help="at the end, save picture, overlay and camera pose"
     )
     results.add_argument(
         "--check",
@@ -104,12 +105,14 @@ def _add_result_options(parser: Any) -> None:
 
 def run_ar(arguments: argparse.Namespace) -> int:
     """Looks at frames until told to end; 1 if a script's frames had no pose."""
+    from burg_drake.cameras import open_source
     from burg_drake.scene import load_scene
 
     scene = load_scene(arguments.scene)
     _require_writable_outputs(arguments)
     intrinsics = intrinsics_from_options(arguments)
-    source = _open_frame_source(arguments, scene, intrinsics)
+    size = (intrinsics.width, intrinsics.height)  # a camera of this computer gives what was asked
+    source = open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
     with sigterm_as_interrupt():
         try:
             live, actions = _create_session(arguments, scene, intrinsics, source)
@@ -173,11 +176,7 @@ def _serve_live_view(
     from burg_drake.apps.live_view import ViewServer
 
     server = ViewServer(
-        live,
-        actions,
-        host=arguments.host,
-        port=arguments.port,
-        connections=arguments.connections,
+        live, actions, host=arguments.host, port=arguments.port, connections=arguments.connections
     )
     server.start()
     closing.callback(server.close)
@@ -208,26 +207,12 @@ def _create_session(
             scene, intrinsics, print_scale=print_scale_from_options(arguments), style=style
         ),
         source,
-        events=EventLog(_print_event),
+        events=EventLog(lambda event: print_remark(event.text)),
         settings=ViewSettings(opacity=style.opacity),
         paced=not arguments.no_browser,
         idle_after=math.inf if always else idle_timeout,
     )
     return live, ViewActions(live, arguments.output, plain=arguments.plain)
-
-
-def _print_event(event: Event) -> None:
-    print(f"burg-drake: {event.text}", file=sys.stderr, flush=True)
-
-
-def _open_frame_source(
-    arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics
-) -> FrameSource:
-    """Opens the source; a camera of this computer in the resolution that was calibrated."""
-    from burg_drake.cameras import open_source
-
-    size = (intrinsics.width, intrinsics.height)
-    return open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
 
 
 def _require_writable_outputs(arguments: argparse.Namespace) -> None:

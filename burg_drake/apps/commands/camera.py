@@ -8,8 +8,9 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.commands.printout import add_target_board_options, target_from_options
-from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps.options.arguments import Parser, add_output, examples_text
 from burg_drake.apps.options.values import input_file, positive_int, two_numbers
+from burg_drake.apps.terminal import print_remark
 
 if TYPE_CHECKING:
     from burg_drake.cameras import Calibration, CharucoTarget, CharucoView, FrameSource, Intrinsics
@@ -85,9 +86,7 @@ def add_camera_calibrate_options(calibrate: Parser) -> None:
         help="photos of the calibration board, folders of them, or a video",
     )
     calibrate.add_argument(
-        "--camera",
-        metavar="CAMERA",
-        help="take the views live: 0, /dev/video0, rtsp://...",
+        "--camera", metavar="CAMERA", help="take the views live: 0, /dev/video0, rtsp://..."
     )
     calibrate.add_argument(
         "--size", metavar="WxH", type=two_numbers, help="image size of the live camera"
@@ -100,9 +99,7 @@ def add_camera_calibrate_options(calibrate: Parser) -> None:
         help="number of live views (default: %(default)s); Ctrl-C ends earlier",
     )
     calibrate.add_argument("--save-views", metavar="FOLDER", help="save the live images here")
-    calibrate.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="intrinsics file to write (.yaml)"
-    )
+    add_output(calibrate, "FILE", "intrinsics file to write (.yaml)")
     calibrate.add_argument(
         "--report", metavar="FILE", help="page with all residuals to write (.html)"
     )
@@ -142,7 +139,7 @@ def run_camera_calibrate(arguments: argparse.Namespace) -> int:
     _print_calibration(calibration)
     lines = calibration_advice(calibration)
     for line in lines:
-        print(f"burg-drake: {line}", file=sys.stderr)
+        print_remark(line)
     useless = is_useless(calibration)
     if arguments.report:
         from burg_drake.visualization import write_calibration_report
@@ -150,10 +147,9 @@ def run_camera_calibrate(arguments: argparse.Namespace) -> int:
         write_calibration_report(calibration, lines, arguments.report)
         print(f"report  {arguments.report}")
     if useless and not arguments.keep:
-        print(
-            "burg-drake: no file was written: the views do not determine the camera well enough;"
-            " take more, or give --keep",
-            file=sys.stderr,
+        print_remark(
+            "no file was written: the views do not determine the camera well enough;"
+            " take more, or give --keep"
         )
     else:
         _save_calibration(calibration, arguments)
@@ -222,7 +218,7 @@ def _views_from_camera(
             else:
                 if frame is None:
                     break
-                taken, word = collector.offer(frame)
+                taken, word = collector.add_frame(frame)
                 if taken and folder:
                     number = len(collector.views)
                     write_image(Path(folder) / f"view_{number:03d}.png", frame.image)
@@ -280,16 +276,13 @@ def _print_calibration(calibration: Calibration) -> None:
 
 def add_camera_list_options(parser: Parser) -> None:
     """Adds the options of `burg-drake camera list`."""
-    parser.epilog = examples_text(
-        "burg-drake camera list",
-    )
+    parser.epilog = examples_text("burg-drake camera list")
 
 
 def add_camera_show_options(show: Parser) -> None:
     """Adds the options of `burg-drake camera show`."""
     show.epilog = examples_text(
-        "burg-drake camera show K.yaml",
-        "burg-drake camera show sim:panda_tabletop/board",
+        "burg-drake camera show K.yaml", "burg-drake camera show sim:panda_tabletop/board"
     )
     _add_intrinsics_argument(show)
 
@@ -308,7 +301,7 @@ def add_camera_convert_options(convert: Parser) -> None:
         default="burg",
         help="format to write (default: %(default)s)",
     )
-    convert.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write")
+    add_output(convert, "FILE", "file to write")
 
 
 def _add_intrinsics_argument(parser: Any) -> None:
@@ -329,10 +322,9 @@ def run_camera_list(arguments: argparse.Namespace) -> int:
         print(f"camera {name}: {width} x {height} pixels")
         found += 1
     if not found:
-        print(
-            "burg-drake: no camera gives images; is one plugged in and not in use, and do you have"
-            " permission to read it?",
-            file=sys.stderr,
+        print_remark(
+            "no camera gives images; is one plugged in and not in use, and do you have"
+            " permission to read it?"
         )
     return 0 if found else 1
 

@@ -6,22 +6,24 @@ import argparse
 import math
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import (
     Parser,
     add_depth_unit,
     add_intrinsics,
     add_measured_board,
+    add_output,
     add_scene,
     add_station,
     examples_text,
     print_scale_from_options,
 )
+from burg_drake.apps.terminal import print_warning
 from burg_drake.core import TextTable, format_number
 
 if TYPE_CHECKING:
-    from burg_drake.cameras import BoardEstimate, ExtraObject, Intrinsics, Placement, PlacementCheck
+    from burg_drake.cameras import ExtraObject, Intrinsics, Placement, PlacementCheck
     from burg_drake.scene import Scene
 
 
@@ -109,12 +111,10 @@ def add_camera_placement_options(parser: Parser) -> None:
     add_intrinsics(parser, required=True)
     add_measured_board(parser)
     parser.add_argument(
-        "--depth",
-        metavar="FILE",
-        help="depth image of the same camera (16-bit .png, or .npy)",
+        "--depth", metavar="FILE", help="depth image of the same camera (16-bit .png, or .npy)"
     )
     add_depth_unit(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", help="placement file to write (.yaml)")
+    add_output(parser, "FILE", "placement file to write (.yaml)", required=False)
     parser.add_argument(
         "--overlay", metavar="FILE", help="picture to write: the photo with targets and errors"
     )
@@ -123,11 +123,14 @@ def add_camera_placement_options(parser: Parser) -> None:
 def run_camera_placement(arguments: argparse.Namespace) -> int:
     """Measures, prints a line an object, and writes what is asked for."""
     from burg_drake.cameras import (
+        Overlay,
+        OverlayStyle,
         combine_checks,
         load_intrinsics,
         read_image,
         require_image_format,
         save_placement,
+        write_image,
     )
     from burg_drake.core import InvalidInputError, require_writable
     from burg_drake.scene import load_scene
@@ -149,7 +152,10 @@ def run_camera_placement(arguments: argparse.Namespace) -> int:
         save_placement(check, arguments.output)
         print(f"wrote {arguments.output}")
     if arguments.overlay:
-        _write_overlay(arguments.overlay, check, scene, read_image(arguments.photo[0]))
+        assert check.camera is not None
+        overlay = Overlay(scene, check.intrinsics, OverlayStyle(opacity=0.15))
+        photo, X_SC = read_image(arguments.photo[0]), check.camera.X_SC.matrix()
+        write_image(arguments.overlay, overlay.draw(photo, X_SC, placement=check))
         print(f"wrote {arguments.overlay}")
     whole = all(p.status == "measured" for p in check.instances.values())
     return 0 if whole and not check.extra else 1
@@ -188,18 +194,12 @@ def _check_photo(
     )
     if check.reason:
         raise InvalidInputError(f"{path}: {check.reason}")
-    for warning in _pose_warnings(estimate, len(scene.board.layout.ids)):
-        print(f"burg-drake: warning: {path}: {warning}", file=sys.stderr)
+    if estimate.reason:
+        print_warning(f"{path}: {estimate.reason}")
+    seen, markers = len(estimate.ids), len(scene.board.layout.ids)
+    if seen < 4:  # the camera's pose is doubtful
+        print_warning(f"{path}: only {seen} of {markers} markers are seen; show more of them")
     return check
-
-
-def _pose_warnings(estimate: BoardEstimate, markers: int) -> list[str]:
-    """What to doubt about the camera's place, a line each."""
-    min_markers = 4  # With fewer visible markers the camera's pose is doubtful.
-    doubts = [estimate.reason] if estimate.reason else []
-    if len(estimate.ids) < min_markers:
-        doubts.append(f"only {len(estimate.ids)} of {markers} markers are seen; show more of them")
-    return doubts
 
 
 def placement_table(placements: Mapping[str, Placement]) -> TextTable:
@@ -232,13 +232,3 @@ def _placement_cells(placement: Placement) -> list[str]:
     deviation = format_number(1e3 * max(placement.displacement_sd), 1)
     remark = f"uncertain: {placement.reason}" if placement.reason else ""
     return [*distances, deviation, *(format_number(value, 1) for value in turn), remark]
-
-
-def _write_overlay(path: str, check: PlacementCheck, scene: Any, photo: Any) -> None:
-    """The photo with each object's target, and what is left to do."""
-    from burg_drake.cameras import Overlay, OverlayStyle, write_image
-
-    assert check.camera is not None
-    overlay = Overlay(scene, check.intrinsics, OverlayStyle(opacity=0.15))
-    X_SC = check.camera.X_SC.matrix()
-    write_image(path, overlay.draw(photo, X_SC, placement=check))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import glob
-import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from burg_drake.apps.commands.render import without_unavailable_colors
 from burg_drake.apps.options.arguments import (
     Parser,
     add_cluster,
+    add_output,
     add_quiet,
     add_station,
     add_view_options,
@@ -20,6 +21,8 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.options.settings_options import add_settings_options
 from burg_drake.apps.options.values import positive, positive_int
+from burg_drake.apps.terminal import print_remark, print_warning
+from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.dataset import DatasetRecipe, ReadableSamples
@@ -32,7 +35,7 @@ def warn_of_damage(samples: ReadableSamples) -> bool:
     """Whether samples were left out; a line on stderr then names each damaged shard or file."""
     for message, count in samples.damaged.items():
         left_out = f"{count} sample{'s are' if count > 1 else ' is'} left out"
-        print(f"burg-drake: warning: {left_out}: {message}", file=sys.stderr)
+        print_warning(f"{left_out}: {message}")
     return bool(samples.damaged)
 
 
@@ -45,17 +48,8 @@ def add_dataset_show_options(parser: Parser) -> None:
         "burg-drake dataset show data -o sheet.png --rows 6",
     )
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
-    parser.add_argument(
-        "--sample",
-        metavar="KEY",
-        help="sample to show (default: the first)",
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="write a sheet of samples (.png, .html)",
-    )
+    parser.add_argument("--sample", metavar="KEY", help="sample to show (default: the first)")
+    add_output(parser, "FILE", "write a sheet of samples (.png, .html)", required=False)
     parser.add_argument(
         "--rows", metavar="N", type=positive_int, default=4, help="rows of the sheet (default: 4)"
     )
@@ -72,7 +66,6 @@ def add_dataset_show_options(parser: Parser) -> None:
 def run_dataset_show(arguments: argparse.Namespace) -> int:
     """Shows a sample in 3D, or writes a sheet; those that are damaged are left out, and named."""
     from burg_drake.apps.terminal import open_view, present_view, print_legend
-    from burg_drake.core import InvalidInputError
     from burg_drake.dataset import (
         ReadableSamples,
         contact_sheet,
@@ -126,9 +119,7 @@ def add_dataset_export_options(parser: Parser) -> None:
     )
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
     parser.add_argument("--to", required=True, choices=tuple(EXPORT_FORMATS), help="format")
-    parser.add_argument(
-        "-o", "--output", metavar="FOLDER", required=True, help="folder to write, new or empty"
-    )
+    add_output(parser, "FOLDER", "folder to write, new or empty")
     parser.add_argument(
         "--sensor-depth",
         action="store_true",
@@ -145,7 +136,6 @@ def add_dataset_export_options(parser: Parser) -> None:
 def run_dataset_export(arguments: argparse.Namespace) -> int:
     """Writes a data set in another format; what that cannot carry goes to stderr. 1 if some
     samples are damaged, and left out."""
-    from burg_drake.core import InvalidInputError
     from burg_drake.dataset import (
         ReadableSamples,
         load_dataset,
@@ -172,7 +162,7 @@ def run_dataset_export(arguments: argparse.Namespace) -> int:
             ).about(name)
     samples = ReadableSamples(load_dataset(arguments.data))
     for remark in writers[arguments.to](samples, arguments.output, **options):
-        print(f"burg-drake: warning: {remark}", file=sys.stderr)
+        print_warning(remark)
     damaged = warn_of_damage(samples)
     written = len(samples) - sum(samples.damaged.values())
     print(f"wrote {arguments.output}: {written} samples")
@@ -181,13 +171,7 @@ def run_dataset_export(arguments: argparse.Namespace) -> int:
 
 def add_dataset_check_options(parser: Parser) -> None:
     """Adds the options of `burg-drake dataset check`."""
-    parser.epilog = examples_text(
-        "burg-drake dataset check data",
-    )
-    _add_dataset_argument(parser)
-
-
-def _add_dataset_argument(parser: Parser) -> None:
+    parser.epilog = examples_text("burg-drake dataset check data")
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
 
 
@@ -226,13 +210,7 @@ def add_dataset_generate_options(parser: Parser) -> None:
         help=f"objects in a sampled scene (default: {SceneRecipe.count})",
     )
     add_station(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="DATA",
-        required=True,
-        help="folder to write; the same command continues it",
-    )
+    add_output(parser, "DATA", "folder to write; the same command continues it")
     parser.add_argument(
         "--camera",
         metavar="NAME",
@@ -264,7 +242,7 @@ def add_dataset_generate_options(parser: Parser) -> None:
 
 def run_dataset_generate(arguments: argparse.Namespace) -> int:
     """Writes a data set; 1 if some scenes have no samples."""
-    from burg_drake.core import InvalidInputError, Progress, ProgressMeter, Reporter
+    from burg_drake.core import Progress, ProgressMeter, Reporter
     from burg_drake.dataset import generate_dataset, load_dataset
     from burg_drake.station import load_station
 
@@ -273,7 +251,7 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
     scenes: list[Scene] | ObjectLibrary
     if arguments.sample is not None:
         scenes, count, sampled = _parse_sample_option(arguments, recipe, station)
-        recipe = _replace_fields(recipe, sampled=sampled)
+        recipe = replace(recipe, sampled=sampled)
     elif arguments.objects is not None:
         raise InvalidInputError(
             f"-n {arguments.objects} is for sampled scenes; leave it out, or give --sample"
@@ -296,7 +274,7 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
             progress=lambda number, error: pace.step(),
         )
     for number, error in found.failed.items():
-        print(f"burg-drake: scene {number}: {error}", file=sys.stderr)
+        print_remark(f"scene {number}: {error}")
     samples = len(load_dataset(found.folder))
     old = f", {len(found.known)} were there" if found.known else ""
     print(f"{found.folder}: {samples} samples of {len(found.new)} new scenes{old}")
@@ -304,8 +282,6 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
 
 
 def _recipe_from_options(arguments: argparse.Namespace) -> DatasetRecipe:
-    from dataclasses import replace
-
     from burg_drake.core import declared_fields, load_document
     from burg_drake.dataset import DatasetRecipe
 
@@ -320,18 +296,10 @@ def _recipe_from_options(arguments: argparse.Namespace) -> DatasetRecipe:
         values["viewpoints"] = replace(recipe.viewpoints, cameras=tuple(arguments.camera))
     if arguments.plain:
         values["looks"] = None
-    return _replace_fields(recipe, **values, **_parse_grasps_option(arguments.grasps))
-
-
-def _replace_fields(recipe: DatasetRecipe, **values: Any) -> DatasetRecipe:
-    from dataclasses import replace
-
-    return replace(recipe, **values)
+    return replace(recipe, **values, **_parse_grasps_option(arguments.grasps))
 
 
 def _parse_grasps_option(text: str | None) -> dict[str, Any]:
-    from burg_drake.core import InvalidInputError
-
     if text is None:
         return {}
     if not text.startswith("sample:"):
@@ -343,7 +311,6 @@ def _parse_grasps_option(text: str | None) -> dict[str, Any]:
 
 
 def _load_scenes(references: list[str]) -> list[Scene]:
-    from burg_drake.core import InvalidInputError
     from burg_drake.scene import load_scene
 
     names: list[str] = []
@@ -361,10 +328,7 @@ def _load_scenes(references: list[str]) -> list[Scene]:
 def _parse_sample_option(
     arguments: argparse.Namespace, asked: DatasetRecipe, station: Station
 ) -> tuple[ObjectLibrary, int, SceneRecipe]:
-    from dataclasses import replace
-
     from burg_drake.apps.commands.scene_sampling import library_reference, station_reference
-    from burg_drake.core import InvalidInputError
     from burg_drake.objects import load_library
     from burg_drake.scene import SceneRecipe
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from burg_drake.apps.options.arguments import (
     DEFAULT_STATION,
     Parser,
+    add_output,
     add_quiet,
     add_workers,
     examples_text,
@@ -34,11 +35,11 @@ def add_demo_options(parser: Parser) -> None:
         "Six objects on a table, a Panda arm. With 100 grasps an object it takes some minutes."
         " The same command continues where an interrupted one stopped.",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="RUN",
-        help=f"folder to write (default: {DEMO_FOLDER}, with another -n {DEMO_FOLDER}_N)",
+    add_output(
+        parser,
+        "RUN",
+        f"folder to write (default: {DEMO_FOLDER}, with another -n {DEMO_FOLDER}_N)",
+        required=False,
     )
     parser.add_argument(
         "-n",

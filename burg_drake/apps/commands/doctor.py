@@ -79,7 +79,7 @@ def unmet_requirements(extra: str = "") -> list[str]:
         found = installed_version(name)
         if found is None:
             unmet.append(requirement)
-        elif not _satisfies(found, bounds):
+        elif not _is_within(found, bounds):
             unmet.append(f"{requirement} ({found} is installed)")
     return unmet
 
@@ -99,7 +99,7 @@ def _requirements(extra: str) -> list[str]:
     return found
 
 
-def _satisfies(found: str, bounds: str) -> bool:
+def _is_within(found: str, bounds: str) -> bool:
     """Whether a version is within bounds such as `>=1.1,<1.2`."""
     limits = re.findall(r"(>=|<)\s*([\d.]+)", bounds)
     ours = _version_numbers(found)
@@ -118,9 +118,8 @@ def install_command(extra: str, installed: list[str]) -> str:
         installed: extras that are there, and that uv would remove.
     """
     if _is_pipx_environment():
-        return (
-            f"pipx inject {PACKAGE_NAME} {' '.join(map(_quote_requirement, _requirements(extra)))}"
-        )
+        quoted = [f"'{requirement}'" for requirement in _requirements(extra)]
+        return f"pipx inject {PACKAGE_NAME} {' '.join(quoted)}"
     if _is_uv_tool_environment():
         return f"uv tool install '{PACKAGE_NAME}[{','.join([*installed, extra])}]'"
     return f"{pip_install()} '{PACKAGE_NAME}[{extra}]'"
@@ -141,10 +140,6 @@ def _is_pipx_environment() -> bool:
 
 def _is_uv_tool_environment() -> bool:
     return Path(sys.prefix, "uv-receipt.toml").exists()
-
-
-def _quote_requirement(requirement: str) -> str:
-    return f"'{requirement}'"
 
 
 Finding = Literal["ok", "missing", "broken", "low"]
@@ -219,26 +214,13 @@ def all_checks() -> list[FeatureCheck]:
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
         list(pool.map(import_error, tried))
     names = [extra.name for extra in installed]
-    checks = [
-        _check_python(),
-        _check_drake(),
-        _check_packages(),
-        _check_cores_and_memory(),
-        _check_disk(),
-        _check_cache(),
-    ]
-    checks += [
-        _check_renderer(),
-        _check_allocator(),
-        *(_check_extra(extra, names) for extra in EXTRAS),
-    ]
+    gpu = "NVIDIA" if Path("/dev/nvidia0").exists() else "no NVIDIA card"
     return [
-        *checks,
-        _check_blender(names),
-        _check_ros(),
-        _check_cameras(),
-        _check_browser(),
-        _check_gpu(),
+        *(_check_python(), _check_drake(), _check_packages(), _check_cores_and_memory()),
+        *(_check_disk(), _check_cache(), _check_renderer(), _check_allocator()),
+        *(_check_extra(extra, names) for extra in EXTRAS),
+        *(_check_blender(names), _check_ros(), _check_cameras(), _check_browser()),
+        FeatureCheck("GPU", "ok", f"{gpu}; none is needed, physics runs on the processor"),
     ]
 
 
@@ -255,40 +237,26 @@ def _check_drake() -> FeatureCheck:
     feature = "simulation (Drake)"
     found = installed_version("drake")
     if missing := missing_import_libraries():
-        return FeatureCheck(
-            feature,
-            "broken",
-            f"lacks {', '.join(missing)}",
-            _libraries_remedy(missing),
-            required=True,
-        )
-    install = pip_install()
+        lacking = f"lacks {', '.join(missing)}"
+        return FeatureCheck(feature, "broken", lacking, _libraries_remedy(missing), True)
     if error := import_error("pydrake.common"):
-        state: Finding = "broken" if found else "missing"
-        return FeatureCheck(
-            feature, state, error if found else "", f"{install} drake", required=True
-        )
+        remedy = f"{pip_install()} drake"
+        if not found:
+            return FeatureCheck(feature, "missing", "", remedy, True)
+        return FeatureCheck(feature, "broken", error, remedy, True)
     return FeatureCheck(feature, "ok", f"drake {found or 'of unknown version'}", required=True)
 
 
 def _check_packages() -> FeatureCheck:
     feature = "packages it always needs"
-    install = pip_install()
     if unmet := unmet_requirements():
-        return FeatureCheck(
-            feature, "missing", ", ".join(unmet), f"{install} --upgrade burg-drake", True
-        )
+        remedy = f"{pip_install()} --upgrade burg-drake"
+        return FeatureCheck(feature, "missing", ", ".join(unmet), remedy, True)
     if error := import_error(COMPILED_MODULES):
-        return FeatureCheck(
-            feature, "broken", error, f"{install} --force-reinstall burg-drake", True
-        )
-    return FeatureCheck(
-        feature,
-        "ok",
-        f"numpy {installed_version('numpy')}, scipy {installed_version('scipy')}, ...",
-        "",
-        True,
-    )
+        remedy = f"{pip_install()} --force-reinstall burg-drake"
+        return FeatureCheck(feature, "broken", error, remedy, True)
+    found = f"numpy {installed_version('numpy')}, scipy {installed_version('scipy')}, ..."
+    return FeatureCheck(feature, "ok", found, required=True)
 
 
 def _check_cores_and_memory() -> FeatureCheck:
@@ -303,15 +271,14 @@ def _check_cores_and_memory() -> FeatureCheck:
 def _check_disk() -> FeatureCheck:
     min_free = 1.0  # GiB.
     here = Path.cwd()
-    free = free_bytes(here) / BYTES_PER_GIB
-    found = f"{free:.0f} GiB free here"
+    free = shutil.disk_usage(here).free / BYTES_PER_GIB
     if not can_write_in(here):
         return FeatureCheck(
             "disk", "broken", f"{here} cannot be written to", "work in another folder"
         )
     if free < min_free:
         return FeatureCheck("disk", "low", f"{free:.1f} GiB free here", "free some space")
-    return FeatureCheck("disk", "ok", found)
+    return FeatureCheck("disk", "ok", f"{free:.0f} GiB free here")
 
 
 def _check_cache() -> FeatureCheck:
@@ -319,16 +286,15 @@ def _check_cache() -> FeatureCheck:
         from burg_drake.core import BurgError, cache_folder
     except ImportError as error:  # numpy is broken, which another check tells
         return FeatureCheck("cache", "broken", str(error))
+    remedy = "set BURG_DRAKE_CACHE to a folder"
     try:
         folder = cache_folder()
     except BurgError as error:
-        return FeatureCheck("cache", "broken", str(error), "set BURG_DRAKE_CACHE to a folder")
+        return FeatureCheck("cache", "broken", str(error), remedy)
     if folder is None:
         return FeatureCheck("cache", "ok", "off, by BURG_DRAKE_CACHE")
     if not can_write_in(folder):
-        return FeatureCheck(
-            "cache", "broken", f"{folder} cannot be written to", "set BURG_DRAKE_CACHE to a folder"
-        )
+        return FeatureCheck("cache", "broken", f"{folder} cannot be written to", remedy)
     return FeatureCheck("cache", "ok", f"{folder_bytes(folder) / 1e6:.0f} MB in {folder}")
 
 
@@ -354,14 +320,12 @@ def _check_allocator() -> FeatureCheck:
     from burg_drake.core import worker_preload
 
     if missing_useful_libraries():
-        return FeatureCheck(
-            feature, "missing", SystemLibrary.atomic, _libraries_remedy([SystemLibrary.atomic])
-        )
+        library = SystemLibrary.atomic
+        return FeatureCheck(feature, "missing", library, _libraries_remedy([library]))
     if found := worker_preload().get(AllocatorSettings.preload_variable):
         return FeatureCheck(feature, "ok", Path(found.rpartition(":")[2]).name)
-    return FeatureCheck(
-        feature, "missing", "trials are a quarter slower", f"{pip_install()} cmeel-mimalloc"
-    )
+    remedy = f"{pip_install()} cmeel-mimalloc"
+    return FeatureCheck(feature, "missing", "trials are a quarter slower", remedy)
 
 
 def _check_extra(extra: OptionalFeature, installed: list[str]) -> FeatureCheck:
@@ -379,24 +343,16 @@ def _check_extra(extra: OptionalFeature, installed: list[str]) -> FeatureCheck:
 def _check_blender(installed: list[str]) -> FeatureCheck:
     variable = "BURG_DRAKE_BLENDER"
     bpy_pythons = ((3, 11), (3, 13))  # Python versions for which bpy has wheels.
-    given = os.environ.get(variable)
-    if given:
-        program = shutil.which(given)
-        if program is None:
-            return FeatureCheck(
-                BLENDER_EXTRA.feature,
-                "broken",
-                f"{variable}={given} is not a program",
-                f"set {variable} to a Blender, or to a Python that has bpy",
-            )
-        return FeatureCheck(BLENDER_EXTRA.feature, "ok", program)
-    if importlib.util.find_spec("bpy") is None and sys.version_info[:2] not in bpy_pythons:
-        return FeatureCheck(
-            BLENDER_EXTRA.feature,
-            "missing",
-            f"bpy has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}",
-            f"install Blender and set {variable} to it",
-        )
+    feature = BLENDER_EXTRA.feature
+    if given := os.environ.get(variable):
+        if program := shutil.which(given):
+            return FeatureCheck(feature, "ok", program)
+        remedy = f"set {variable} to a Blender, or to a Python that has bpy"
+        return FeatureCheck(feature, "broken", f"{variable}={given} is not a program", remedy)
+    major, minor = sys.version_info[:2]
+    if importlib.util.find_spec("bpy") is None and (major, minor) not in bpy_pythons:
+        found = f"bpy has no wheel for Python {major}.{minor}"
+        return FeatureCheck(feature, "missing", found, f"install Blender and set {variable} to it")
     return _check_extra(BLENDER_EXTRA, installed)
 
 
@@ -418,7 +374,7 @@ def _check_cameras() -> FeatureCheck:
     feature = "cameras"
     if sys.platform != "linux":
         return FeatureCheck(feature, "ok", "burg-drake camera list finds them")
-    found = camera_devices()
+    found = sorted(str(path) for path in Path("/dev").glob("video*"))
     if not found:
         return FeatureCheck(feature, "missing", "", "plug one in; photos and videos need none")
     closed = [path for path in found if not os.access(path, os.R_OK | os.W_OK)]
@@ -429,17 +385,14 @@ def _check_cameras() -> FeatureCheck:
 
 
 def _check_browser() -> FeatureCheck:
-    found = find_browser()
+    programs = ("chromium", "chromium-browser", "google-chrome", "firefox", "microsoft-edge")
+    if sys.platform == "darwin":
+        return FeatureCheck("browser", "ok", "the system's")
+    found = next(filter(None, map(shutil.which, (*programs, "safari"))), None)
     if found is None:
-        return FeatureCheck(
-            "browser", "missing", "", "open pages on another computer; --html writes files"
-        )
+        remedy = "open pages on another computer; --html writes files"
+        return FeatureCheck("browser", "missing", "", remedy)
     return FeatureCheck("browser", "ok", found)
-
-
-def _check_gpu() -> FeatureCheck:
-    found = "NVIDIA" if Path("/dev/nvidia0").exists() else "no NVIDIA card"
-    return FeatureCheck("GPU", "ok", f"{found}; none is needed, physics runs on the processor")
 
 
 def doctor_summary(checks: list[FeatureCheck]) -> Iterator[str]:
@@ -482,11 +435,6 @@ def can_write_in(folder: Path) -> bool:
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
-def free_bytes(folder: Path) -> int:
-    """Free space of the disk that a folder is on."""
-    return shutil.disk_usage(folder).free
-
-
 def folder_bytes(folder: Path) -> int:
     """Size of the files that lie directly in a folder."""
     total = 0
@@ -496,26 +444,6 @@ def folder_bytes(folder: Path) -> int:
         except OSError:  # removed meanwhile, by another process
             continue
     return total
-
-
-def camera_devices() -> list[str]:
-    """Video devices of this machine; Linux names them, other systems do not."""
-    return sorted(str(path) for path in Path("/dev").glob("video*"))
-
-
-def find_browser() -> str | None:
-    """A browser that is installed here."""
-    programs = (
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "firefox",
-        "microsoft-edge",
-        "safari",
-    )
-    if sys.platform == "darwin":
-        return "the system's"
-    return next((found for name in programs if (found := shutil.which(name))), None)
 
 
 def add_doctor_options(parser: Parser) -> None:
@@ -531,7 +459,6 @@ def add_doctor_options(parser: Parser) -> None:
 
 def run_doctor(arguments: argparse.Namespace) -> int:
     """Prints the table; 1 if something that `evaluate` needs is missing."""
-
     checks = all_checks()
     if arguments.json:
         found = {"burg_drake": __version__, "checks": [asdict(check) for check in checks]}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from burg_drake.apps.options.arguments import (
     Parser,
     add_cluster,
+    add_output,
     add_quiet,
     add_retry_failed,
     add_station,
@@ -35,6 +35,7 @@ from burg_drake.apps.options.evaluated_grasps import (
     require_grasp_file,
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning
 from burg_drake.core import CONTESTED_CONFIDENCE, InvalidInputError, list_names
 
 if TYPE_CHECKING:
@@ -223,13 +224,12 @@ def campaign_exit_code(campaign: Campaign) -> int:
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
     for name, why in campaign.failed.items():
-        print(f"burg-drake: scene {name} could not be judged: {why}", file=sys.stderr)
+        print_remark(f"scene {name} could not be judged: {why}")
     if failed:
         where = list_names([s.scene for s in states if s.failed])
-        print(
-            f"burg-drake: {failed} grasps could not be simulated (scenes {where});"
-            f" {retry_advice(interrupted, failed)}",
-            file=sys.stderr,
+        print_remark(
+            f"{failed} grasps could not be simulated (scenes {where});"
+            f" {retry_advice(interrupted, failed)}"
         )
     return 1 if failed or campaign.failed else 0
 
@@ -272,8 +272,7 @@ def _grasps_from_file(arguments: argparse.Namespace, station: Station) -> Grasps
         gripper_for(arguments, station),
         arguments.correction,
     )
-    for note in imported.notes:
-        print(f"note: {note}")
+    print_note_lines(imported.notes)
     frame = POSE_FRAMES.get(arguments.grasps_frame) or imported.frame
     if frame != "object":
         poses = arguments.camera_pose
@@ -346,19 +345,17 @@ def add_evaluate_options(parser: Parser) -> None:
         help=f"scene file, folder of scenes, or built-in: {scene_names()}",
     )
     add_station(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="RUN",
-        help=f"folder of the run (default: {RUNS_FOLDER}/SCENE; required for several scenes)",
+    add_output(
+        parser,
+        "RUN",
+        f"folder of the run (default: {RUNS_FOLDER}/SCENE; required for several scenes)",
+        required=False,
     )
     which = parser.add_mutually_exclusive_group()
     add_sampling_options(parser, 100, which)
     add_grasp_file_options(parser, which)
     add_settings_options(
-        parser,
-        EvaluationSettings,
-        *("until_balanced", "balanced_among", "max_grasps_per_object"),
+        parser, EvaluationSettings, *("until_balanced", "balanced_among", "max_grasps_per_object")
     )
     add_settings_options(parser, EvaluationSettings, "engine")
     add_rejudge_contested(parser)
@@ -405,13 +402,12 @@ def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
     given = (
         None if arguments.grasps is None else read_grasps_from_options(arguments, scene, station)
     )
-    for note in given.notes if given else ():
-        print(f"note: {note}")
+    print_note_lines(given.notes if given else ())
     warnings = require_valid_scene(scene, station)
     if mode != "hand":
         warnings += require_usable_arm(scene, station)
     for warning in warnings:
-        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+        print_warning(warning)
     folder = arguments.output or f"{RUNS_FOLDER}/{scene.name}"
     settings = requested_settings(arguments, mode, motion)
     settings = replace(settings, engine=first_engine(arguments, folder, mode))
@@ -454,24 +450,19 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     print(f"report  {run.report_path}")
     if best := run.best(each=True):
         print("best    " + "\n        ".join(best))
-        print(_show_grasps_hint(str(run.path)))
-    if run.failures:
+        replay = shlex.join(["burg-drake", "replay", str(run.path), "--grasp"])
+        show = shlex.join(["burg-drake", "grasps", "show", str(run.path), "--outcome", "lifted"])
         print(
-            f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
-            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
-            f" {retry_advice(len(run.interrupted), len(run.failures))}",
-            file=sys.stderr,
+            "best: of each object the lifted grasp with the most room around the open hand; see"
+            f" one by\n    {replay} ID\nthe table has all lifted grasps; see them by\n"
+            f"    {show} --all"
         )
-
-
-def _show_grasps_hint(folder: str) -> str:
-    """How to look at the best grasps, and at all that lifted."""
-    replay = shlex.join(["burg-drake", "replay", folder, "--grasp"])
-    show = shlex.join(["burg-drake", "grasps", "show", folder, "--outcome", "lifted"])
-    return (
-        "best: of each object the lifted grasp with the most room around the open hand; see one by"
-        f"\n    {replay} ID\nthe table has all lifted grasps; see them by\n    {show} --all"
-    )
+    if run.failures:
+        print_remark(
+            f"{len(run.failures)} of {len(run.candidates)} grasps could not be"
+            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
+            f" {retry_advice(len(run.interrupted), len(run.failures))}"
+        )
 
 
 def print_summary(run: Run) -> None:

@@ -13,6 +13,7 @@ from burg_drake.apps.options.arguments import (
     DEFAULT_STATION,
     Parser,
     add_cluster,
+    add_output,
     add_quiet,
     add_station,
     add_workers,
@@ -33,6 +34,7 @@ from burg_drake.apps.options.evaluated_grasps import (
     require_grasp_file,
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.terminal import print_remark
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -63,12 +65,8 @@ def add_gap_options(parser: Parser) -> None:
         metavar="SCENE|RUN",
         help=f"folder of a run, scene file, or built-in scene: {scene_names()}",
     )
-    parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder to write")
-    add_station(
-        parser,
-        f"with a scene: station (default: {DEFAULT_STATION})",
-        default=None,
-    )
+    add_output(parser, "GAP", "folder to write")
+    add_station(parser, f"with a scene: station (default: {DEFAULT_STATION})", default=None)
     parser.add_argument(
         "--mode",
         choices=MODES,
@@ -233,9 +231,8 @@ def _report_failed_trials(measured: GapSteps) -> int:
         return 0
     run, id = failed[0]
     again = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", id])
-    print(
-        f"burg-drake: {len(failed)} trials could not be simulated, such as {id} in {run.path}"
-        f" ({again} tries it again)",
-        file=sys.stderr,
+    print_remark(
+        f"{len(failed)} trials could not be simulated, such as {id} in {run.path}"
+        f" ({again} tries it again)"
     )
     return 1

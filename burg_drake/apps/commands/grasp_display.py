@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +24,7 @@ from burg_drake.apps.options.grasp_files import (
     station_for,
 )
 from burg_drake.apps.options.values import input_file, number, positive_int
+from burg_drake.apps.terminal import print_note_lines
 from burg_drake.core import InvalidInputError, Outcome, suggest_names
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def add_choice_options(show: Parser) -> None:
-    """Adds the options."""
+    """Adds options that choose grasps."""
     add_only(show, "grasps")
     show.add_argument(
         "--outcome",
@@ -137,9 +137,7 @@ def add_grasps_show_options(show: Parser) -> None:
     add_renaming(show)
     add_choice_options(show)
     show.add_argument(
-        "--color",
-        metavar="COLUMN",
-        help="column to colour by (default: outcome, else score)",
+        "--color", metavar="COLUMN", help="column to colour by (default: outcome, else score)"
     )
     show.add_argument(
         "--range",
@@ -194,7 +192,7 @@ def run_grasps_show(arguments: argparse.Namespace) -> int:
     draw_grasps(meshcat, X_WG, width, groups)
     gripper = GripperView(meshcat, station.hand, station.hand_model, station.packages)
     if selected is not None:
-        gripper.put(X_WG[selected], width[selected])
+        gripper.place(X_WG[selected], width[selected])
     print_legend(legend)
     if len(grasps) < len(content.grasps):
         print(caption)
@@ -229,6 +227,7 @@ def _finger_widths(grasps: GraspSet, widest: float) -> Array:
 
 
 def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
+    from burg_drake.core import GraspSet
     from burg_drake.evaluation import FileReading, rank_by_score, read_grasps, read_input
     from burg_drake.formats import with_objects_renamed
     from burg_drake.scene import load_scene
@@ -263,9 +262,10 @@ def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
             objects=objects,
         )
         provenance = imported.grasps.provenance
-        grasps = dataclasses.replace(
-            _concatenate_instances(given.by_instance), provenance=provenance
+        placed = GraspSet.concatenate(
+            one.with_columns(instance=name) for name, one in given.by_instance.items()
         )
+        grasps = dataclasses.replace(placed, provenance=provenance)
     _print_mistakes(grasps, source, station)
     return DisplayedGrasps(grasps, source, station, rank_by_score(grasps), title=path.name)
 
@@ -291,21 +291,12 @@ def _load_run_content(arguments: argparse.Namespace) -> DisplayedGrasps:
             raise InvalidInputError(
                 f"--{option} is for grasp files; {run.path} is a run, which has its own"
             )
-    for note in run_notes(run):
-        print(f"note: {note}")
+    print_note_lines(run_notes(run))
     scene = run.scene()
     source = GraspSource(scene.library, scene)
     grasps = run_grasps(run)
     title = f"{scene.name}: grasps"
     return DisplayedGrasps(grasps, source, run.station(), rank_run_grasps(run, grasps), title=title)
-
-
-def _concatenate_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
-    from burg_drake.core import GraspSet
-
-    return GraspSet.concatenate(
-        grasps.with_columns(instance=name) for name, grasps in by_instance.items()
-    )
 
 
 def _list_labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[str], str]:

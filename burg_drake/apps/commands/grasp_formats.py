@@ -72,15 +72,12 @@ def _add_selection_options(parser: Parser) -> None:
 def _add_frame_options(parser: Parser) -> None:
     """Options about frames."""
     group = parser.add_argument_group(
-        "frames",
-        ("For files whose poses are in the frame of a scene or a camera."),
+        "frames", "For files whose poses are in the frame of a scene or a camera."
     )
     group.add_argument("--scene", metavar="SCENE", help="scene in which the objects stand")
     add_camera_options(group)
     group.add_argument(
-        "--frame",
-        choices=tuple(POSE_FRAMES),
-        help="frame of the poses in IN, if not the format's",
+        "--frame", choices=tuple(POSE_FRAMES), help="frame of the poses in IN, if not the format's"
     )
     group.add_argument(
         "--out-frame",
@@ -212,8 +209,9 @@ def add_frames_options(frames: Parser) -> None:
 
 def run_frames(arguments: argparse.Namespace) -> int:
     """Prints the tables and shows the frames."""
-    own_format = "burg_drake"
-    formats = _load_formats(arguments.names)
+    from burg_drake.formats import GRASP_FORMATS, format_named
+
+    formats = {name: format_named(name) for name in arguments.names or GRASP_FORMATS}
     if arguments.text:
         _print_tables(formats, gripper_by_name(arguments.hand))
         return 0
@@ -228,7 +226,7 @@ def run_frames(arguments: argparse.Namespace) -> int:
     shown = [
         formats[name]
         for name in arguments.names or formats
-        if name != own_format or arguments.names
+        if name != "burg_drake" or arguments.names
     ]
     legend = show_frames(hand, model, gripper, shown, meshcat)
     _print_tables(formats, gripper)
@@ -237,26 +235,23 @@ def run_frames(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _load_formats(names: list[str]) -> Mapping[str, GraspFormat]:
-    from burg_drake.formats import GRASP_FORMATS, format_named
-
-    return {name: format_named(name) for name in names or GRASP_FORMATS}
-
-
 def _print_tables(formats: Mapping[str, GraspFormat], gripper: Gripper) -> None:
     from burg_drake.formats import convention_of
 
     _print_table("frames of burg_drake", ("frame", "of", "where"), OWN_FRAMES)
-    found = [convention_of(format, gripper) for format in formats.values()]
+    found = [(format, convention_of(format, gripper)) for format in formats.values()]
     _print_table(
         f"grasp frames F of files, for {gripper.name}",
         ("format", "approach", "closing", "origin of F", "poses in", "file"),
-        [(c.name, c.approach, c.closing, c.origin, c.frame, " ".join(c.suffixes)) for c in found],
+        [
+            (f.name, c.approach, c.closing, c.origin, f.frame, " ".join(f.suffixes))
+            for f, c in found
+        ],
     )
     _print_table(
         "what files do not carry",
         ("format", "lost when written"),
-        [(c.name, ", ".join(c.cannot_carry) or "-") for c in found],
+        [(f.name, ", ".join(f.cannot_carry) or "-") for f in formats.values()],
     )
 
 

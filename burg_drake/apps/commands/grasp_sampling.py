@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_renaming,
     add_station,
@@ -19,13 +22,24 @@ from burg_drake.apps.options.evaluated_grasps import (
     grasps_per_object,
     print_shortfalls,
 )
-from burg_drake.apps.options.grasp_files import add_format_option, grasp_output
+from burg_drake.apps.options.grasp_files import (
+    GraspSource,
+    add_file_station,
+    add_format_option,
+    add_reading_options,
+    add_source_options,
+    grasp_output,
+    gripper_for,
+    load_grasp_source,
+    open_grasp_source,
+    station_for,
+)
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
 from burg_drake.apps.options.values import friction, input_file, number
+from burg_drake.apps.terminal import print_note_lines
 from burg_drake.core import InvalidInputError, TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.apps.options.grasp_files import GraspSource
     from burg_drake.core import Array, GraspSet
     from burg_drake.evaluation import SamplingSettings
     from burg_drake.station import Station
@@ -45,13 +59,7 @@ def add_grasps_sample_options(parser: Parser) -> None:
         "source", metavar="SCENE|LIB", help="scene file, library folder, or built-in name"
     )
     add_sampling_options(parser, 1000)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        required=True,
-        help="grasp file to write, such as .h5, or folder for a file per object",
-    )
+    add_output(parser, "OUT", "grasp file to write, such as .h5, or folder for a file per object")
     add_format_option(parser)
     add_station(parser)
     _add_sampling_settings(parser)
@@ -85,7 +93,7 @@ def _add_sampling_settings(parser: Parser) -> None:
 
 def run_grasps_sample(arguments: argparse.Namespace) -> int:
     """Samples and writes a file; 1 if there are no grasps at all."""
-    from burg_drake.apps.options.grasp_files import open_grasp_source
+    from burg_drake.core import open_npy
     from burg_drake.evaluation import SamplingSettings, sampled_set
     from burg_drake.station import load_station, station_gripper
 
@@ -93,12 +101,16 @@ def run_grasps_sample(arguments: argparse.Namespace) -> int:
     source = open_grasp_source(arguments.source)
     output.require_fits(_objects_to_sample(arguments.only, source))
     station = load_station(arguments.station)
+    weights: dict[str, Array] = {}
+    for name, path in arguments.weights:
+        with open_npy(Path(path)) as stored:
+            weights[name] = stored.read("fiu").astype(float)
     settings = settings_from(
         arguments,
         SamplingSettings,
         approach_angle_deg=arguments.approach_angle,
         standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
-        weights={name: _load_weights(path) for name, path in arguments.weights},
+        weights=weights,
         blind=arguments.blind,
     )
     asked = grasps_per_object(arguments)
@@ -151,15 +163,6 @@ def _sample_objects(
     return sampled, seconds
 
 
-def _load_weights(path: str) -> Array:
-    from pathlib import Path
-
-    from burg_drake.core import open_npy
-
-    with open_npy(Path(path)) as stored:
-        return stored.read("fiu").astype(float)
-
-
 def sampling_table(
     sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int
 ) -> TextTable:
@@ -195,11 +198,6 @@ Adds these columns, which are nan where a pad meets nothing:
 
 def add_grasps_score_options(parser: Parser) -> None:
     """Adds the options of `burg-drake grasps score`."""
-    from burg_drake.apps.options.grasp_files import (
-        add_file_station,
-        add_reading_options,
-        add_source_options,
-    )
     from burg_drake.grasping import DEFAULT_METRIC
 
     parser.epilog = examples_text(
@@ -214,11 +212,8 @@ def add_grasps_score_options(parser: Parser) -> None:
         "file", metavar="FILE", type=input_file, help="grasp file of any format, or folder of a run"
     )
     add_reading_options(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        help="grasp file to write, or folder (default: only print)",
+    add_output(
+        parser, "OUT", "grasp file to write, or folder (default: only print)", required=False
     )
     add_format_option(parser)
     add_source_options(parser)
@@ -243,7 +238,6 @@ def add_grasps_score_options(parser: Parser) -> None:
 
 def run_grasps_score(arguments: argparse.Namespace) -> int:
     """Scores, prints a table and writes a file."""
-    from burg_drake.apps.options.grasp_files import gripper_for, load_grasp_source, station_for
     from burg_drake.evaluation import read_input, scored_set
     from burg_drake.formats import with_objects_renamed
 
@@ -262,8 +256,7 @@ def run_grasps_score(arguments: argparse.Namespace) -> int:
     source = load_grasp_source(arguments, grasps, arguments.file)
     if output is not None:
         output.require_fits(grasps.object.tolist())
-    for note in imported.notes:
-        print(f"note: {note}")
+    print_note_lines(imported.notes)
     scored = scored_set(
         grasps,
         source.library,
@@ -282,8 +275,6 @@ def run_grasps_score(arguments: argparse.Namespace) -> int:
 
 def _print_score_tables(grasps: GraspSet) -> None:
     """Quantiles of each metric by object, and what the hand collides with."""
-    from collections import Counter
-
     import numpy as np
 
     from burg_drake.apps.commands.grasp_tables import TABLE_QUANTILES, print_numbers

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -19,6 +18,7 @@ from burg_drake.apps.commands.library_sources import (
 )
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_view_options,
     add_workers,
@@ -33,6 +33,7 @@ from burg_drake.apps.options.values import (
     positive,
     unit,
 )
+from burg_drake.apps.terminal import print_remark
 from burg_drake.core import (
     BurgError,
     InvalidInputError,
@@ -249,8 +250,9 @@ def _build_library(
         def on_failure(name: str, message: str, error: BaseException) -> None:
             """Told at once, as the others may take long; an only object's ends the command."""
             if len(sources) > 1:
-                text = _failure_message(by_name[name], message) + _suggest_unit_option(name, error)
-                print(f"burg-drake: error: {text}", file=sys.stderr)
+                units = error.units if isinstance(error, MeshError) else ()
+                hint = f"; for this mesh alone --unit {name}={units[0]}" if units else ""
+                print_remark(f"error: {_failure_message(by_name[name], message)}{hint}")
 
         report = build_library(
             sources,
@@ -274,7 +276,6 @@ def _build_library(
 
 
 def _print_build_notes(report: BuildReport) -> None:
-
     for name in report.built:
         print_contact_geometry(report.library, [name])
         repairs = report.library.objects[name].source.repairs
@@ -295,12 +296,6 @@ def _failure_message(source: ObjectSource, message: str) -> str:
     """A message that names the object or its mesh file."""
     is_named = message.startswith(f"{source.name}: ") or str(source.mesh) in message
     return message if is_named else f"{source.name}: {message}"
-
-
-def _suggest_unit_option(name: str, error: BaseException) -> str:
-    """How the unit that an error proposes is given for one of several meshes."""
-    units = error.units if isinstance(error, MeshError) else ()
-    return f"; for this mesh alone --unit {name}={units[0]}" if units else ""
 
 
 LIBRARY_FORMATS_HELP = """\
@@ -387,9 +382,7 @@ def add_library_import_burg_options(burg: Parser) -> None:
 
 def add_library_import_ycb_options(ycb: Parser) -> None:
     """Adds the options of `burg-drake library import-ycb`."""
-    ycb.epilog = examples_text(
-        "burg-drake library import-ycb ~/data/ycb -o ycb_library",
-    )
+    ycb.epilog = examples_text("burg-drake library import-ycb ~/data/ycb -o ycb_library")
     ycb.add_argument("folder", metavar="DIR", help="folder with the downloaded objects")
     _add_shared_import_options(ycb)
 
@@ -410,17 +403,14 @@ def _add_library_argument(parser: Parser) -> None:
 def add_library_list_options(listing: Parser) -> None:
     """Adds the options of `burg-drake library list`."""
     listing.epilog = examples_text(
-        "burg-drake library list household",
-        "burg-drake library list my_library",
+        "burg-drake library list household", "burg-drake library list my_library"
     )
     _add_library_argument(listing)
 
 
 def add_library_check_options(check: Parser) -> None:
     """Adds the options of `burg-drake library check`."""
-    check.epilog = examples_text(
-        "burg-drake library check my_library",
-    )
+    check.epilog = examples_text("burg-drake library check my_library")
     _add_library_argument(check)
 
 
@@ -433,11 +423,7 @@ def add_library_show_options(show: Parser) -> None:
     )
     _add_library_argument(show)
     show.add_argument(
-        "--only",
-        metavar="A,B",
-        type=names,
-        action="extend",
-        help="only these objects",
+        "--only", metavar="A,B", type=names, action="extend", help="only these objects"
     )
     show.add_argument(
         "--sheet",
@@ -448,9 +434,7 @@ def add_library_show_options(show: Parser) -> None:
 
 
 def _add_output(parser: Parser) -> None:
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", required=True, help="folder of the library"
-    )
+    add_output(parser, "DIR", "folder of the library")
     parser.add_argument("--name", help="name of the library (default: that of its folder)")
 
 
@@ -510,7 +494,7 @@ def _add_common_values(parser: Parser) -> None:
         "--wall-thickness",
         metavar="M",
         type=positive,
-        help=("treat surfaces as walls of this thickness in metres"),
+        help="treat surfaces as walls of this thickness in metres",
     )
     parser.add_argument(
         "--openings",
@@ -518,9 +502,7 @@ def _add_common_values(parser: Parser) -> None:
         help="large openings in a mesh: make the surface a wall (default), or close them",
     )
     parser.add_argument(
-        "--contact",
-        choices=CONTACT_KINDS,
-        help="collision geometry (default: chosen by the shape)",
+        "--contact", choices=CONTACT_KINDS, help="collision geometry (default: chosen by the shape)"
     )
     _add_build_run_options(parser)
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import Parser, add_measured_board, add_scene, examples_text
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_measured_board,
+    add_output,
+    add_scene,
+    examples_text,
+)
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.terminal import print_warning
 
 if TYPE_CHECKING:
     from burg_drake.cameras import CharucoTarget
@@ -26,9 +32,7 @@ def add_printout_options(parser: Parser) -> None:
         " long, print again with what they measure, such as --measured-mm 98.5,99.2.",
     )
     add_scene(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"
-    )
+    add_output(parser, "FILE", "file to write (.pdf)")
     add_settings_options(parser, PrintSettings, "page", "margin")
     add_measured_board(
         parser,
@@ -36,9 +40,7 @@ def add_printout_options(parser: Parser) -> None:
     )
     add_settings_options(parser, PrintSettings, "height_map", "names")
     parser.add_argument(
-        "--no-instructions",
-        action="store_true",
-        help="leave out the page of instructions",
+        "--no-instructions", action="store_true", help="leave out the page of instructions"
     )
 
 
@@ -69,7 +71,7 @@ def run_printout(arguments: argparse.Namespace) -> int:
     printout = print_board(scene, settings)
     printout.save(arguments.output)
     for warning in printout.warnings:
-        print(f"burg-drake: warning: {scene.path}: {warning}", file=sys.stderr)
+        print_warning(f"{scene.path}: {warning}")
     tiling = printout.tiling
     columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
     across = " landscape" if tiling.paper.width > tiling.paper.height else " portrait"
@@ -89,13 +91,10 @@ def add_camera_target_options(target: Parser) -> None:
         "burg-drake camera target -o target.pdf",
         "burg-drake camera target --page A3 --square-mm 30 --marker-mm 22 -o target.pdf",
     )
-    target.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"
-    )
+    add_output(target, "FILE", "file to write (.pdf)")
     add_settings_options(target, PrintSettings, "page")
     add_measured_board(
-        target,
-        "length of the 100 mm rulers of an earlier print, to correct this one",
+        target, "length of the 100 mm rulers of an earlier print, to correct this one"
     )
     add_target_board_options(target)
 

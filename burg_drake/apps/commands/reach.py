@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_retry_failed,
     add_scene,
@@ -31,11 +31,11 @@ from burg_drake.apps.options.evaluated_grasps import (
     require_grasp_file,
 )
 from burg_drake.apps.options.grasp_files import GraspOutput, add_format_option, grasp_output
+from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning
 from burg_drake.core import InvalidInputError, TextTable, require_writable
 
 if TYPE_CHECKING:
     from burg_drake.core import GraspSet, Outcome
-    from burg_drake.evaluation import PlanOutput
     from burg_drake.scene import Scene
     from burg_drake.station import GraspMotion, Station
 
@@ -64,8 +64,7 @@ def print_reach_tables(
     outcome_table(grasps, by_object, total).show()
     ended, blocker = grasps.column("outcome"), grasps.column("blocker")
     notes = unclear_notes(grasps.object, ended, blocker, given=given)
-    for note in (*notes, *unmoved_notes(grasps.object, ended, blocker, motion)):
-        print(f"note: {note}")
+    print_note_lines((*notes, *unmoved_notes(grasps.object, ended, blocker, motion)))
     clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())
     if clear and seconds > 0.0:
@@ -144,12 +143,12 @@ def add_reach_options(parser: Parser) -> None:
     add_grasp_file_options(parser, which)
     add_station(parser)
     add_motion_options(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="OUT",
-        help="table (.csv, .parquet), grasp file (.h5, .npz, ...), or folder for a file per"
+    add_output(
+        parser,
+        "OUT",
+        "table (.csv, .parquet), grasp file (.h5, .npz, ...), or folder for a file per"
         " object (default: only print)",
+        required=False,
     )
     add_format_option(parser)
     parser.add_argument("--only-reachable", action="store_true", help="write only reachable grasps")
@@ -175,7 +174,7 @@ def add_reach_options(parser: Parser) -> None:
 
 def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
-    from burg_drake.evaluation import mistake_notes, reach
+    from burg_drake.evaluation import PlanOutput, mistake_notes, reach
     from burg_drake.motion import require_usable_arm
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station, require_valid_scene
@@ -190,20 +189,22 @@ def run_reach(arguments: argparse.Namespace) -> int:
     if isinstance(output, GraspOutput):
         output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
     for warning in (*warnings, *require_usable_arm(scene, station)):
-        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+        print_warning(warning)
+    plans = None
+    if arguments.plans is not None:
+        plans = PlanOutput(arguments.plans, arguments.plan_format or "json", arguments.retry_failed)
     judged = reach(
         scene,
         station,
         grasps,
         motion=motion,
         exact=not arguments.screening,
-        plans=_plans_folder(arguments),
+        plans=plans,
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
     _print_answers(judged, scene, motion, arguments)
-    for hint in hints:
-        print(f"note: {hint}")
+    print_note_lines(hints)
     reachable = _reachable_mask(judged)
     if arguments.plans is not None:
         print(f"{(reachable & ~_unplanned_mask(judged)).sum()} plans are in {arguments.plans}")
@@ -284,24 +285,12 @@ def _report_failures(judged: GraspSet, arguments: argparse.Namespace) -> int:
     return 0 if answered.all() and not unplanned.any() else 1
 
 
-def _plans_folder(arguments: argparse.Namespace) -> PlanOutput | None:
-    """Where plans go, if they are wanted."""
-    from burg_drake.evaluation import PlanOutput
-
-    if arguments.plans is None:
-        return None
-    return PlanOutput(arguments.plans, arguments.plan_format or "json", arguments.retry_failed)
-
-
 def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:
     """A line about grasps whose computation has failed, if there are any."""
     if len(failed):
         reason = failed.column("reason")[0].removeprefix("no plan: ")
         id = f"{failed.column('instance')[0]}-{failed.id[0]}"
-        print(
-            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}{retry}",
-            file=sys.stderr,
-        )
+        print_remark(f"{len(failed)} of {total} grasps {what}, such as {id}: {reason}{retry}")
 
 
 def _load_or_sample_grasps(
@@ -312,8 +301,7 @@ def _load_or_sample_grasps(
 
     if arguments.grasps is not None:
         given = read_grasps_from_options(arguments, scene, station)
-        for note in given.notes:
-            print(f"note: {note}")
+        print_note_lines(given.notes)
         return select_instances(scene, given.by_instance, arguments.only)
     return sampled_grasps(arguments, scene, station)
 

@@ -7,11 +7,17 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import Parser, add_scene, add_station, examples_text
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_output,
+    add_scene,
+    add_station,
+    examples_text,
+)
 from burg_drake.apps.options.settings_options import add_settings_options
 
 if TYPE_CHECKING:
-    from burg_drake.dataset import DatasetRecipe, Images
+    from burg_drake.dataset import DatasetRecipe
 
 
 def warn_without_colors(consequence: str) -> bool:
@@ -48,7 +54,10 @@ def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRe
     missing = missing_render_libraries()
     if not recipe.colors or recipe.renderer != "drake" or not missing:
         return recipe
-    if _has_colors(folder):
+    from burg_drake.dataset import DATASET_FILE, load_dataset_document
+
+    document = folder / DATASET_FILE
+    if document.exists() and (load_dataset_document(document).recipe or {}).get("colors"):
         raise MissingDependencyError(
             f"the samples of {folder} have colours, and so must new ones:"
             f" {describe_missing(missing)}"
@@ -56,15 +65,6 @@ def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRe
     dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""
     warn_without_colors(f"the data set has no colours{dark}")
     return replace(recipe, colors=False)
-
-
-def _has_colors(folder: Path) -> bool:
-    """Whether a folder holds a data set that is generated with colours."""
-    from burg_drake.dataset import DATASET_FILE, load_dataset_document
-
-    if not (folder / DATASET_FILE).exists():
-        return False
-    return bool((load_dataset_document(folder / DATASET_FILE).recipe or {}).get("colors"))
 
 
 def add_render_options(parser: Parser) -> None:
@@ -88,9 +88,7 @@ def add_render_options(parser: Parser) -> None:
         default="board",
         help="camera of the station (default: %(default)s)",
     )
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="file to write (.png)"
-    )
+    add_output(parser, "FILE", "file to write (.png)")
     parser.add_argument("--arm", action="store_true", help="show the arm in its home posture")
     add_settings_options(parser, DatasetRecipe, "renderer")
     for kind in ("depth", "labels", "normals"):
@@ -99,6 +97,8 @@ def add_render_options(parser: Parser) -> None:
 
 def run_render(arguments: argparse.Namespace) -> int:
     """Writes the images; 1 if there is none that can be made."""
+    import numpy as np
+
     from burg_drake.core import InvalidInputError, atomic_write, require_writable
     from burg_drake.dataset import ImageKind, depth_unit_of, encode_image, render, station_view
     from burg_drake.scene import load_scene
@@ -107,16 +107,11 @@ def run_render(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     if output.suffix.lower() != ".png":
         raise InvalidInputError(f"{output}: only PNG is written; end the name with .png")
-    kinds: list[ImageKind] = []
     by_drake = arguments.renderer == "drake"
-    if not (by_drake and warn_without_colors(f"{output} is not written, as it has colours")):
-        kinds.append("color")
-    if arguments.depth:
-        kinds.append("depth")
-    if arguments.labels:
-        kinds.append("labels")
-    if arguments.normals:
-        kinds.append("normals")
+    missing = by_drake and warn_without_colors(f"{output} is not written, as it has colours")
+    extra: tuple[ImageKind, ...] = ("depth", "labels", "normals")
+    kinds: list[ImageKind] = [] if missing else ["color"]
+    kinds += [kind for kind in extra if getattr(arguments, kind)]
     if not kinds:
         return 1
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
@@ -129,14 +124,8 @@ def run_render(arguments: argparse.Namespace) -> int:
         atomic_write(path, encode_image(kind, image, depth_unit_of(view.depth_range)))
         print(f"wrote {path}")
     if images.labels is not None:
-        _print_numbers(images, [*scene.instances, *scene.background])
+        names = [*scene.instances, *scene.background]
+        counts = np.bincount(images.labels.ravel(), minlength=len(names) + 1)
+        for number, name in enumerate(names, 1):
+            print(f"  {number} {name}: {counts[number]} pixels")
     return 0
-
-
-def _print_numbers(images: Images, names: list[str]) -> None:
-    import numpy as np
-
-    assert images.labels is not None
-    counts = np.bincount(images.labels.ravel(), minlength=len(names) + 1)
-    for number, name in enumerate(names, 1):
-        print(f"  {number} {name}: {counts[number]} pixels")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options.arguments import Parser, add_only, add_view_options, examples_text
 from burg_drake.apps.options.values import positive_int
+from burg_drake.apps.terminal import print_remark
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -39,9 +40,7 @@ def add_replay_options(parser: Parser) -> None:
         "One row with its header is enough. The new result is compared with the recorded one.",
     )
     parser.add_argument(
-        "results",
-        metavar="RESULTS",
-        help="folder of a run, or table of results (.csv, .parquet)",
+        "results", metavar="RESULTS", help="folder of a run, or table of results (.csv, .parquet)"
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--grasp", metavar="ID", help="id of the grasp")
@@ -55,9 +54,7 @@ def add_replay_options(parser: Parser) -> None:
     parser.add_argument("--scene", metavar="FILE", help="scene file, if it has moved")
     parser.add_argument("--station", metavar="FILE", help="station file, if it has moved")
     parser.add_argument(
-        "--force",
-        action="store_true",
-        help="replay even if scene or station have changed",
+        "--force", action="store_true", help="replay even if scene or station have changed"
     )
     add_view_options(parser)
 
@@ -84,7 +81,7 @@ def run_replay(arguments: argparse.Namespace) -> int:
         )
     source = _source_from_table(path, arguments) if is_table else _source_from_run(path, arguments)
     for note in source.inputs.notes:
-        print(f"burg-drake: {note}", file=sys.stderr)
+        print_remark(note)
     meshcat = open_view(arguments)
     verdict, shown, who = _simulate_trial(source, meshcat)
     lines = [*describe_trial(as_result(verdict)), *arm_figures(verdict)]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import (
     Parser,
     add_only,
+    add_output,
     add_quiet,
     add_retry_failed,
     add_workers,
@@ -17,6 +17,7 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
 from burg_drake.apps.options.values import positive_int, seed
+from burg_drake.apps.terminal import print_remark
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -66,11 +67,11 @@ def add_robustness_options(parser: Parser) -> None:
     add_settings_options(noise, RobustnessSettings, "repeats")
     add_settings_options(noise, Noise)
     noise.add_argument("--seed", metavar="N", type=seed, help="random seed (default: the run's)")
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="table to write (default: robustness.csv in the run's folder)",
+    add_output(
+        parser,
+        "FILE",
+        "table to write (default: robustness.csv in the run's folder)",
+        required=False,
     )
     add_workers(parser)
     add_retry_failed(parser, "tests")
@@ -108,10 +109,9 @@ def run_robustness(arguments: argparse.Namespace) -> int:
     print(f"table   {found.table_path}")
     if found.failures:
         id, reason = next(iter(found.failures.items()))
-        print(
-            f"burg-drake: {len(found.failures)} tests could not be simulated, such as {id}:"
-            f" {reason}; {retry_advice(found.interrupted, len(found.failures))}",
-            file=sys.stderr,
+        print_remark(
+            f"{len(found.failures)} tests could not be simulated, such as {id}:"
+            f" {reason}; {retry_advice(found.interrupted, len(found.failures))}"
         )
         return 1
     return 0

@@ -39,9 +39,7 @@ def add_ros_options(parser: Parser) -> None:
     )
     add_intrinsics(parser, "intrinsics file instead of the topic")
     parser.add_argument(
-        "--rectified",
-        action="store_true",
-        help="the images have no distortion (image_rect)",
+        "--rectified", action="store_true", help="the images have no distortion (image_rect)"
     )
     add_measured_board(parser)
     parser.add_argument(

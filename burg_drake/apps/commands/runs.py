@@ -8,7 +8,8 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps.options.arguments import Parser, add_output, examples_text
+from burg_drake.apps.terminal import print_note_lines
 
 if TYPE_CHECKING:
     from burg_drake.evaluation import Status
@@ -22,11 +23,7 @@ def add_status_options(parser: Parser) -> None:
         "burg-drake status runs/many --json",
     )
     parser.add_argument("run_folder", metavar="RUN", help="folder of a run, of one scene or many")
-    parser.add_argument(
-        "--follow",
-        action="store_true",
-        help="repeat until the run is complete",
-    )
+    parser.add_argument("--follow", action="store_true", help="repeat until the run is complete")
     parser.add_argument("--json", action="store_true", help="print JSON, one line per update")
 
 
@@ -44,11 +41,8 @@ def run_status(arguments: argparse.Namespace) -> int:
     while not status.complete:
         time.sleep(poll_interval)
         status = watch.look()
-        if (status.judged, status.done, status.working) != (
-            shown.judged,
-            shown.done,
-            shown.working,
-        ):
+        now = (status.judged, status.done, status.working)
+        if now != (shown.judged, shown.done, shown.working):
             shown = status
             _print_status(status, arguments.json, again=not arguments.json)
     return 1 if status.failed else 0
@@ -145,13 +139,9 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 def add_merge_options(parser: Parser) -> None:
     """Adds the options of `burg-drake merge`."""
-    parser.epilog = examples_text(
-        "burg-drake merge runs/shard* -o runs/whole",
-    )
+    parser.epilog = examples_text("burg-drake merge runs/shard* -o runs/whole")
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
-    parser.add_argument(
-        "-o", "--output", metavar="RUN", required=True, help="folder of the merged run"
-    )
+    add_output(parser, "RUN", "folder of the merged run")
 
 
 def run_merge(arguments: argparse.Namespace) -> int:
@@ -169,6 +159,5 @@ def run_merge(arguments: argparse.Namespace) -> int:
         print(f"table   {result.table_path}")
         print(f"report  {result.report_path}")
         code = 1 if result.failures else 0
-    for note in merged.notes:
-        print(f"note: {note}")
+    print_note_lines(merged.notes)
     return code

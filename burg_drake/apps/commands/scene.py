@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from burg_drake.apps.commands.scene_sampling import library_reference, require_another_file
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_scene,
     add_station,
@@ -17,6 +20,7 @@ from burg_drake.apps.options.arguments import (
     examples_text,
 )
 from burg_drake.apps.options.values import positive
+from burg_drake.apps.terminal import print_remark, print_warning
 from burg_drake.core import InvalidInputError, TextTable, format_number
 
 if TYPE_CHECKING:
@@ -38,18 +42,8 @@ def add_scene_export_options(parser: Parser) -> None:
     )
     add_scene(parser)
     parser.add_argument("--to", choices=SCENE_FORMATS, required=True, help="format")
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="FOLDER",
-        required=True,
-        help="folder to write; an earlier export is replaced",
-    )
-    add_station(
-        parser,
-        "export table and obstacles of this station, too",
-        default=None,
-    )
+    add_output(parser, "FOLDER", "folder to write; an earlier export is replaced")
+    add_station(parser, "export table and obstacles of this station, too", default=None)
     parser.add_argument(
         "--hand",
         action="store_true",
@@ -66,7 +60,7 @@ def run_scene_export(arguments: argparse.Namespace) -> int:
     scene = load_scene(arguments.scene)
     station = load_station(arguments.station) if arguments.station is not None else None
     for issue in validate_scene(scene) if station is None else check_scene(scene, station):
-        print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
+        print_warning(f"{scene.path}: {issue.message}")
     exported = export_scene(scene, arguments.output, arguments.to, station, hand=arguments.hand)
     for note in exported.notes:
         print(note)
@@ -90,27 +84,17 @@ def add_scene_import_burg_options(parser: Parser) -> None:
     )
     parser.add_argument("file", metavar="SCENE.yaml", help="scene file of BURG-Toolkit")
     parser.add_argument(
-        "--library",
-        metavar="LIB",
-        required=True,
-        help="library made by `library import-burg`",
+        "--library", metavar="LIB", required=True, help="library made by `library import-burg`"
     )
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
-    )
+    add_output(parser, "FILE", "scene file to write (.yaml)")
     parser.add_argument("--name", metavar="NAME", help="name of the scene (default: that of FILE)")
     parser.add_argument(
-        "--station-out",
-        metavar="FILE",
-        help="also write a station that the scene fits on",
+        "--station-out", metavar="FILE", help="also write a station that the scene fits on"
     )
 
 
 def run_scene_import_burg(arguments: argparse.Namespace) -> int:
     """Writes a scene document."""
-    from pathlib import Path
-
-    from burg_drake.apps.commands.scene_sampling import library_reference, require_another_file
     from burg_drake.core import make_name, require_writable
     from burg_drake.formats import read_burg_scene
     from burg_drake.objects import load_library
@@ -142,8 +126,6 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
 
 def _propose_station(scene: Scene, output: str | None) -> None:
     """Says which station fits, and writes it if that is asked for."""
-    from pathlib import Path
-
     from burg_drake.core import save_document
     from burg_drake.motion import find_built_in, propose_station
 
@@ -160,16 +142,13 @@ def _propose_station(scene: Scene, output: str | None) -> None:
     proposal = propose_station(scene, Path(output))
     _print_fits(proposal.source, proposal.misfits)
     save_document(proposal.document, output)
-    arm = proposal.document.arm
-    where = (
-        "without an arm"
-        if arm is None
-        else "the arm's base at ({:g}, {:g}, {:g}) m".format(*arm.X_WA.translation)
-    )
+    where = "without an arm"
+    if (arm := proposal.document.arm) is not None:
+        where = "the arm's base at ({:g}, {:g}, {:g}) m".format(*arm.X_WA.translation)
     width, depth, _ = proposal.document.table.size
     print(f"wrote {output}: a table of {width:g} x {depth:g} m, {where}")
     for warning in proposal.warnings:
-        print(f"burg-drake: warning: {output}: {warning}", file=sys.stderr)
+        print_warning(f"{output}: {warning}")
 
 
 def _print_fits(fitting: str, misfits: dict[str, str]) -> None:
@@ -194,9 +173,7 @@ def add_scene_show_options(parser: Parser) -> None:
 
 def add_scene_validate_options(parser: Parser) -> None:
     """Adds the options of `burg-drake scene validate`."""
-    parser.epilog = examples_text(
-        "burg-drake scene validate my_scene.yaml",
-    )
+    parser.epilog = examples_text("burg-drake scene validate my_scene.yaml")
     add_scene(parser)
     add_station(parser)
 
@@ -215,9 +192,7 @@ def add_scene_settle_options(settle: Parser) -> None:
     )
     add_scene(settle)
     add_station(settle)
-    settle.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
-    )
+    add_output(settle, "FILE", "scene file to write (.yaml)")
     settle.add_argument(
         "--time-limit",
         metavar="S",
@@ -226,9 +201,7 @@ def add_scene_settle_options(settle: Parser) -> None:
         help="simulated time in seconds (default: %(default)g)",
     )
     settle.add_argument(
-        "--keep",
-        action="store_true",
-        help="write the scene anyway, without objects that fell off",
+        "--keep", action="store_true", help="write the scene anyway, without objects that fell off"
     )
     settle.add_argument(
         "--engine",
@@ -250,7 +223,7 @@ def run_scene_show(arguments: argparse.Namespace) -> int:
     station = load_station(arguments.station)
     issues = check_scene(scene, station)
     for issue in issues:
-        print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
+        print_warning(f"{scene.path}: {issue.message}")
     meshcat = open_view(arguments)
     with_arm = station.document.arm is not None and not arguments.no_robot
     show_scene(scene, station, meshcat, robot="arm" if with_arm else "none")
@@ -271,23 +244,22 @@ def run_scene_validate(arguments: argparse.Namespace) -> int:
     issues = check_scene(scene, station)
     for issue in issues:
         print(f"{'error' if issue.is_error else 'warning'}: {issue.message}")
-    if not issues:
-        count = len(scene.instances)
+    count = len(scene.instances)
+    if not issues and count:
         objects = f"{count} object{'' if count == 1 else 's'}"
         print(
             f"{scene.path}: no mistakes on station {station.name}: {objects}, all standing within"
             " the board, none overlapping another"
-            if count
-            else f"{scene.path}: no mistakes, but it has no objects"
         )
+    elif not issues:
+        print(f"{scene.path}: no mistakes, but it has no objects")
     return 1 if any(issue.is_error for issue in issues) else 0
 
 
 def run_scene_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
-    from burg_drake.apps.commands.scene_sampling import require_another_file
     from burg_drake.core import Progress, ProgressMeter, Reporter, require_writable
-    from burg_drake.scene import load_scene
+    from burg_drake.scene import load_scene, save_scene
     from burg_drake.simulation import settle_scene
     from burg_drake.station import check_scene, load_station
 
@@ -309,28 +281,17 @@ def run_scene_settle(arguments: argparse.Namespace) -> int:
     faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
     written = arguments.keep or not faults
     if written:
-        _write_settled(settled, arguments.output)
+        path, document = Path(arguments.output), settled.scene.document
+        library = library_reference(document.library, settled.scene.library, path.parent)
+        save_scene(replace(document, library=library, origin=None), path)
     displacement_table(settled.displacements).show()
     if settled.at_rest:
         print(f"at rest after {settled.duration:.2f} s")
     if written:
         print(f"wrote {arguments.output}")
     for line in faults:
-        print(f"burg-drake: {scene.path}: {line}", file=sys.stderr)
+        print_remark(f"{scene.path}: {line}")
     return 1 if faults else 0
-
-
-def _write_settled(settled: SettledScene, output: str) -> None:
-    """Writes a scene so that its library is found from there, too."""
-    import dataclasses
-    from pathlib import Path
-
-    from burg_drake.apps.commands.scene_sampling import library_reference
-    from burg_drake.scene import save_scene
-
-    path, scene = Path(output), settled.scene
-    library = library_reference(scene.document.library, scene.library, path.parent)
-    save_scene(dataclasses.replace(scene.document, library=library, origin=None), path)
 
 
 def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:

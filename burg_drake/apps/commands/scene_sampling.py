@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_station,
     add_workers,
@@ -19,7 +19,8 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
 from burg_drake.apps.options.values import names, positive_int
-from burg_drake.core import InvalidInputError
+from burg_drake.apps.terminal import print_remark, print_warning
+from burg_drake.core import InvalidInputError, builtin_names, portable_reference
 
 if TYPE_CHECKING:
     from burg_drake.generation import ReproducedScene, SampledFolder, SampledScene
@@ -41,35 +42,19 @@ def require_another_file(scene: Path, output: str) -> None:
 def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
     """How a scene file in `folder` refers to a library so that it is found from there: the name of
     a built-in one, else package:// or the relative path."""
-    from burg_drake.core import builtin_names, portable_reference
-
     return given if given in builtin_names("models") else portable_reference(library.root, folder)
 
 
 def station_reference(given: str, station: Station, folder: Path) -> str:
     """The same for a station."""
-    from burg_drake.core import builtin_names, portable_reference
-
     return given if given in builtin_names("stations") else portable_reference(station.path, folder)
 
 
 def add_recipe_options(parser: Any) -> None:
-    """Adds them."""
+    """Adds the options that make up a recipe."""
     _add_object_options(parser)
     _add_layout_options(parser)
     _add_rule_options(parser)
-
-
-def recipe_defaults() -> dict[str, Any]:
-    """Values of the options that nobody gave, by name."""
-    parser = argparse.ArgumentParser(add_help=False)
-    add_recipe_options(parser)
-    return vars(parser.parse_args([]))
-
-
-def recipe_option_name(name: str) -> str:
-    """How the option of a value is written."""
-    return "-n" if name == "objects" else f"--{name.replace('_', '-')}"
 
 
 def _add_object_options(parser: Any) -> None:
@@ -136,7 +121,6 @@ def recipe_from_options(
 ) -> SceneRecipe:
     """The recipe that the options ask for, with references that start from a folder."""
     max_objects = 1000
-    from burg_drake.core import InvalidInputError
     from burg_drake.scene import Board, SceneRecipe
 
     if arguments.objects > max_objects:
@@ -196,13 +180,7 @@ def add_scene_sample_options(parser: Parser) -> None:
         nargs="?",
         help="folder of a library, or the built-in household",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="SCENES",
-        required=True,
-        help="folder to write, or for one scene a file (.yaml)",
-    )
+    add_output(parser, "SCENES", "folder to write, or for one scene a file (.yaml)")
     add_recipe_options(parser)
     parser.add_argument(
         "--again",
@@ -219,7 +197,6 @@ def add_scene_sample_options(parser: Parser) -> None:
 
 def run_scene_sample(arguments: argparse.Namespace) -> int:
     """Writes scenes; 1 if not all were accepted."""
-    from burg_drake.core import InvalidInputError
     from burg_drake.objects import load_library
     from burg_drake.station import load_station
 
@@ -263,9 +240,10 @@ def _sample_one(
         save_scene(sampled.scene.document, arguments.output)
     _print_refused(Counter(sampled.refused))
     if not sampled.accepted:
-        print(f"burg-drake: no scene: {_refusal_text(sampled, recipe)}", file=sys.stderr)
+        print_remark(f"no scene: {_refusal_text(sampled, recipe)}")
         return 1
-    _print_missing(sampled)
+    if sampled.missing:
+        print_remark(f"no place was found for {', '.join(sampled.missing)}")
     print(f"wrote {arguments.output}: {_object_count_text(sampled.placed)}")
     return 0
 
@@ -313,10 +291,9 @@ def _print_folder(found: SampledFolder, arguments: argparse.Namespace) -> int:
         )
     if found.failed:
         number, reason = min(found.failed.items())
-        print(
-            f"burg-drake: {len(found.failed)} scenes could not be sampled, and are tried again the"
-            f" next time; scene {number}: {reason}",
-            file=sys.stderr,
+        print_remark(
+            f"{len(found.failed)} scenes could not be sampled, and are tried again the"
+            f" next time; scene {number}: {reason}"
         )
     return 0 if accepted == arguments.count else 1
 
@@ -327,18 +304,17 @@ def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: there is one.
     """
-    from burg_drake.core import InvalidInputError
-
-    for name, default in recipe_defaults().items():
+    parser = argparse.ArgumentParser(add_help=False)
+    add_recipe_options(parser)
+    for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
-            raise InvalidInputError(
-                f"--again takes the recipe of its scene: leave out {recipe_option_name(name)}"
-            )
+            option = "-n" if name == "objects" else f"--{name.replace('_', '-')}"
+            raise InvalidInputError(f"--again takes the recipe of its scene: leave out {option}")
 
 
 def _reproduce_scene(arguments: argparse.Namespace) -> int:
     """Makes a scene again, and says whether it is the same."""
-    from burg_drake.core import InvalidInputError, require_writable
+    from burg_drake.core import require_writable
     from burg_drake.generation import sample_again
     from burg_drake.scene import load_scene, save_scene
 
@@ -349,9 +325,9 @@ def _reproduce_scene(arguments: argparse.Namespace) -> int:
     require_writable(arguments.output)
     again = sample_again(scene, force=arguments.force)
     for line in again.differences:
-        print(f"burg-drake: warning: {scene.path}: {line}", file=sys.stderr)
+        print_warning(f"{scene.path}: {line}")
     if again.scene is None:
-        print(f"burg-drake: {scene.path}: no scene was accepted this time", file=sys.stderr)
+        print_remark(f"{scene.path}: no scene was accepted this time")
         return 1
     save_scene(
         _with_references(again, again.scene, Path(arguments.output).parent), arguments.output
@@ -375,7 +351,7 @@ def _with_references(again: ReproducedScene, scene: Scene, folder: Path) -> Scen
 def _print_refused(refused: Counter[str]) -> None:
     """Says on standard error how many attempts were refused, and why."""
     for reason, count in refused.most_common():
-        print(f"burg-drake: {count} refused: {reason}", file=sys.stderr)
+        print_remark(f"{count} refused: {reason}")
 
 
 def _refusal_text(sampled: SampledScene, recipe: SceneRecipe) -> str:
@@ -384,12 +360,6 @@ def _refusal_text(sampled: SampledScene, recipe: SceneRecipe) -> str:
     if sampled.missing:
         text += "; an object found no place (--fewer accepts scenes without it)"
     return f"{text}; give a larger --size, a smaller -n, another --seed or more --attempts"
-
-
-def _print_missing(sampled: SampledScene) -> None:
-    if sampled.missing:
-        names = ", ".join(sampled.missing)
-        print(f"burg-drake: no place was found for {names}", file=sys.stderr)
 
 
 def _object_count_text(count: int) -> str:

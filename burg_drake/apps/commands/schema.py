@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps.options.arguments import Parser, add_output, examples_text
 
 
 def add_schema_options(parser: Parser) -> None:
@@ -12,9 +12,7 @@ def add_schema_options(parser: Parser) -> None:
     from burg_drake.core import DOCUMENT_KINDS
 
     parser.epilog = examples_text(
-        "burg-drake schema",
-        "burg-drake schema scene -o scene.json",
-        "burg-drake schema -o schemas",
+        "burg-drake schema", "burg-drake schema scene -o scene.json", "burg-drake schema -o schemas"
     )
     parser.add_argument(
         "document",
@@ -23,12 +21,12 @@ def add_schema_options(parser: Parser) -> None:
         choices=list(DOCUMENT_KINDS),
         help=f"one kind of document: {', '.join(DOCUMENT_KINDS)}",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="file for the schema of one kind, which is printed otherwise; without DOCUMENT, a"
+    add_output(
+        parser,
+        "PATH",
+        "file for the schema of one kind, which is printed otherwise; without DOCUMENT, a"
         " folder for the schemas of all kinds",
+        required=False,
     )
 
 

@@ -18,6 +18,7 @@ from burg_drake.apps.options.arguments import (
 from burg_drake.apps.terminal import (
     ignore_interrupts,
     open_in_browser,
+    print_remark,
     sigterm_as_interrupt,
     wait_for_interrupt,
 )
@@ -47,8 +48,7 @@ def add_setup_options(parser: Parser) -> None:
     )
     add_station(parser)
     add_page_options(
-        parser,
-        "others can open it by the address that is printed, good for one browser",
+        parser, "others can open it by the address that is printed, good for one browser"
     )
 
 
@@ -61,7 +61,11 @@ def run_setup(arguments: argparse.Namespace) -> int:
     with sigterm_as_interrupt():
         closing = contextlib.ExitStack()
         try:
-            session = closing.enter_context(_open_session(arguments))
+            from burg_drake.compose import ComposeSession
+            from burg_drake.station import load_station
+
+            station = load_station(arguments.station)
+            session = closing.enter_context(ComposeSession.open(arguments.what, station))
             closing.callback(_print_unsaved, session)
             door = _serve_setup_page(arguments, session, closing)
             _print_opened(door, session)
@@ -82,13 +86,6 @@ def limit_picture_size() -> None:
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(max_pixels))
 
 
-def _open_session(arguments: argparse.Namespace) -> ComposeSession:
-    from burg_drake.compose import ComposeSession
-    from burg_drake.station import load_station
-
-    return ComposeSession.open(arguments.what, load_station(arguments.station))
-
-
 def _serve_setup_page(
     arguments: argparse.Namespace, session: ComposeSession, closing: contextlib.ExitStack
 ) -> ServedPage:
@@ -100,7 +97,9 @@ def _serve_setup_page(
     )
     closing.callback(SetupPage(door.server, session).close)
     session.announce(door.address)
-    door.admission.on_admitted = lambda address: _print_admitted(door, address)
+    door.admission.on_admitted = lambda address: print(
+        f"opened by {address}; another browser: open {door.url}", flush=True
+    )
     return door
 
 
@@ -111,19 +110,14 @@ def _print_opened(door: ServedPage, session: ComposeSession) -> None:
     where = view.path or f"not saved yet, to be saved in {session.folder}"
     print(f"{view.document.name} ({objects}, {where}): open {door.url} in a browser", flush=True)
     for notice in view.notices:
-        print(f"burg-drake: {notice}", file=sys.stderr, flush=True)
+        print_remark(notice)
     print("Press Ctrl-C to end.", flush=True)
 
 
 def _print_unsaved(session: ComposeSession) -> None:
     view = session.view
     if not view.saved and (view.undo_label or view.redo_label):
-        print(
-            f"burg-drake: changes of {view.document.name} are not saved; opening the same scene"
-            " again restores them",
-            file=sys.stderr,
+        print_remark(
+            f"changes of {view.document.name} are not saved; opening the same scene"
+            " again restores them"
         )
-
-
-def _print_admitted(door: ServedPage, address: str) -> None:
-    print(f"opened by {address}; another browser: open {door.url}", flush=True)

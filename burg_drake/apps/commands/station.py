@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_view_options,
-    examples_text,
-)
+from burg_drake.apps.options.arguments import Parser, add_view_options, examples_text
+from burg_drake.apps.terminal import print_warning
 from burg_drake.core import TextTable
 
 if TYPE_CHECKING:
@@ -21,9 +17,7 @@ if TYPE_CHECKING:
 
 def add_station_list_options(parser: Parser) -> None:
     """Adds the options of `burg-drake station list`."""
-    parser.epilog = examples_text(
-        "burg-drake station list",
-    )
+    parser.epilog = examples_text("burg-drake station list")
 
 
 def add_station_check_options(check: Parser) -> None:
@@ -65,9 +59,8 @@ def run_station_list(arguments: argparse.Namespace) -> int:
     from burg_drake.core import builtin_names
     from burg_drake.station import load_station
 
-    stations = [load_station(name) for name in builtin_names("stations")]
     table = TextTable().texts("station", "description")
-    for station in stations:
+    for station in map(load_station, builtin_names("stations")):
         table.row(station.name, station.document.description)
     table.show()
     return 0
@@ -82,7 +75,7 @@ def run_station_check(arguments: argparse.Namespace) -> int:
         table.row(name, text)
     table.show()
     for warning in report.warnings:
-        print(f"burg-drake: warning: {station.path}: {warning}", file=sys.stderr)
+        print_warning(f"{station.path}: {warning}")
     return 0
 
 
@@ -95,7 +88,7 @@ def run_station_show(arguments: argparse.Namespace) -> int:
     meshcat = open_view(arguments)
     station, scene, report = _inspect_station(arguments)
     for warning in report.warnings:
-        print(f"burg-drake: warning: {station.path}: {warning}", file=sys.stderr)
+        print_warning(f"{station.path}: {warning}")
     arm = report.arm
     legend = show_station(
         scene or empty_scene(),
@@ -130,6 +123,7 @@ def _station_lines(
 ) -> list[tuple[str, str]]:
     """What is printed about a station, by name."""
     from burg_drake.evaluation import motion_text
+    from burg_drake.motion import format_share
 
     low, high = (round(1e3 * width) + 0 for width in report.hand.opening)
     hand = station.hand
@@ -143,7 +137,7 @@ def _station_lines(
     for name, share in report.seen.items():
         camera = station.document.cameras[name]
         size = f"{camera.width} x {camera.height} pixels"
-        lines.append((f"camera {name}", f"{size}, sees {_percent_text(share)} of the board"))
+        lines.append((f"camera {name}", f"{size}, sees {format_share(share)} of the board"))
     return lines
 
 
@@ -170,6 +164,7 @@ def _arm_lines(station: Station, arm: ArmFigures) -> list[tuple[str, str]]:
 
 
 def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tuple[str, str]]:
+    from burg_drake.motion import format_share
     from burg_drake.scene import Board
 
     width, height = (1e3 * extent for extent in (scene.board if scene else Board()).size)
@@ -178,51 +173,37 @@ def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tup
     if reach is None:
         return lines
     for k, z in enumerate(reach.heights):
-        lines.append(
-            (
-                f"  {100 * z:g} cm above",
-                f"{_percent_text(reach.covered_from_above[k])} reached from straight above,"
-                f" {_percent_text(reach.covered[k])} with any orientation,"
-                f" {_percent_text(reach.share[k].mean())} of all orientations",
-            )
+        text = (
+            f"{format_share(reach.covered_from_above[k])} reached from straight above,"
+            f" {format_share(reach.covered[k])} with any orientation,"
+            f" {format_share(reach.share[k].mean())} of all orientations"
         )
+        lines.append((f"  {100 * z:g} cm above", text))
     return lines
-
-
-def _percent_text(share: float) -> str:
-    from burg_drake.motion import format_share
-
-    return format_share(share)
 
 
 def add_hand_list_options(parser: Parser) -> None:
     """Adds the options of `burg-drake hand list`."""
-    parser.epilog = examples_text(
-        "burg-drake hand list",
-    )
+    parser.epilog = examples_text("burg-drake hand list")
 
 
 def add_hand_check_options(check: Parser) -> None:
     """Adds the options of `burg-drake hand check`."""
     check.epilog = examples_text(
-        "burg-drake hand check wsg_50",
-        "burg-drake hand check my_hand.yaml",
+        "burg-drake hand check wsg_50", "burg-drake hand check my_hand.yaml"
     )
     check.add_argument(
-        "hand",
-        metavar="HAND",
-        help="hand file, or built-in name (burg-drake hand list)",
+        "hand", metavar="HAND", help="hand file, or built-in name (burg-drake hand list)"
     )
 
 
 def run_hand_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in hand."""
-    from burg_drake.core import TextTable, builtin_names
+    from burg_drake.core import builtin_names
     from burg_drake.station import load_hand
 
-    hands = [load_hand(name) for name in builtin_names("models/hands")]
     table = TextTable().texts("hand", "description")
-    for hand in hands:
+    for hand in map(load_hand, builtin_names("models/hands")):
         table.row(hand.name, hand.description)
     table.show()
     return 0

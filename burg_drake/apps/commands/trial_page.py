@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import secrets
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ from burg_drake.apps.options.arguments import (
     intrinsics_from_options,
     print_scale_from_options,
 )
-from burg_drake.apps.terminal import sigterm_as_interrupt, wait_for_interrupt
+from burg_drake.apps.terminal import print_remark, sigterm_as_interrupt, wait_for_interrupt
 
 if TYPE_CHECKING:
     from burg_drake.experiment import LabBook, LabCamera
@@ -43,10 +42,7 @@ def add_trials_serve_options(parser: Parser) -> None:
     )
     add_trials_argument(parser)
     add_moved_run_option(parser)
-    add_page_options(
-        parser,
-        "tablets can open it, by the address with a token that is printed",
-    )
+    add_page_options(parser, "tablets can open it, by the address with a token that is printed")
     add_show_simulated_option(parser)
     camera = parser.add_argument_group("camera")
     camera.add_argument(
@@ -81,7 +77,7 @@ def run_trials_serve(arguments: argparse.Namespace) -> int:
             port=arguments.port,
             secret=_load_or_create_secret(lab.plan),
         )
-        server.on_admitted = lambda peer: _print_line(
+        server.on_admitted = lambda peer: print_remark(
             f"{peer} opened the page; for another browser: {server.url}"
         )
         closing.callback(pictures.close)
@@ -89,18 +85,13 @@ def run_trials_serve(arguments: argparse.Namespace) -> int:
         closing.callback(server.close)
         print(f"{len(runs.sheet.trials)} trials: open {server.url} in a browser", flush=True)
         print(
-            ("Press Ctrl-C to end. Entries that the page shows as saved are in the file."),
-            flush=True,
+            "Press Ctrl-C to end. Entries that the page shows as saved are in the file.", flush=True
         )
         if arguments.open:
             open_in_browser(server.url)
         with contextlib.suppress(KeyboardInterrupt):
             wait_for_interrupt()
     return 0
-
-
-def _print_line(line: str) -> None:
-    print(f"burg-drake: {line}", file=sys.stderr, flush=True)
 
 
 def _open_lab_camera(arguments: argparse.Namespace, lab: LabBook) -> LabCamera:

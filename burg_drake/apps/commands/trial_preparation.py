@@ -15,6 +15,7 @@ from burg_drake.apps.commands.trial_records import (
 )
 from burg_drake.apps.options.arguments import (
     Parser,
+    add_output,
     add_quiet,
     add_retry_failed,
     add_station,
@@ -22,6 +23,7 @@ from burg_drake.apps.options.arguments import (
     examples_text,
 )
 from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.terminal import print_note_lines, print_remark
 from burg_drake.core import require_writable, shorten_text
 
 if TYPE_CHECKING:
@@ -48,9 +50,7 @@ def add_trials_plan_options(parser: Parser) -> None:
         help="table of robustness (default: robustness.csv in the run's folder)",
     )
     add_settings_options(parser, SelectionSettings, "seed")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="trials file to write (.yaml)"
-    )
+    add_output(parser, "FILE", "trials file to write (.yaml)")
 
 
 def run_trials_plan(arguments: argparse.Namespace) -> int:
@@ -72,8 +72,7 @@ def run_trials_plan(arguments: argparse.Namespace) -> int:
     _print_choice(sheet)
     power_table(sheet).show()
     print(detectable_difference_sentence(len(sheet.trials)))
-    for note in sheet.notes:
-        print(f"note: {note}")
+    print_note_lines(sheet.notes)
     print(f"wrote {len(sheet.trials)} trials to {arguments.output}")
     return 0
 
@@ -107,9 +106,7 @@ def add_trials_sheet_options(parser: Parser) -> None:
     )
     add_trials_argument(parser)
     add_moved_run_option(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="page to write (.html)"
-    )
+    add_output(parser, "FILE", "page to write (.html)")
     add_show_simulated_option(parser)
     parser.add_argument(
         "--no-printouts", action="store_true", help="do not write the boards to print"
@@ -168,13 +165,7 @@ def add_trials_export_options(parser: Parser) -> None:
         " where an interrupted one stopped. Exit code 1 if a trial could not be planned.",
     )
     add_trials_argument(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="DIR",
-        required=True,
-        help="folder to write, 1.5 MB per motion",
-    )
+    add_output(parser, "DIR", "folder to write, 1.5 MB per motion")
     parser.add_argument(
         "--format",
         choices=get_args(PlanFormat),
@@ -211,10 +202,9 @@ def run_trials_export(arguments: argparse.Namespace) -> int:
     failed = [row for row in rows if row.reason and not row.file]
     if failed:
         first = failed[0]
-        print(
-            f"burg-drake: {len(failed)} trials have no motion because a computation failed, such"
-            f" as {first.number}: {shorten_text(first.reason, 200)}",
-            file=sys.stderr,
+        print_remark(
+            f"{len(failed)} trials have no motion because a computation failed, such"
+            f" as {first.number}: {shorten_text(first.reason, 200)}"
         )
     return 1 if failed else 0
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 from collections.abc import Sequence
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,6 +20,7 @@ from burg_drake.apps.options.arguments import (
     print_scale_from_options,
 )
 from burg_drake.apps.options.values import not_negative, positive_int
+from burg_drake.apps.terminal import print_note_lines, print_remark
 from burg_drake.core import InvalidInputError, quote_value
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def print_damage(book: TrialBook) -> bool:
     """Prints damaged lines of the journal to standard error. Returns True if there are any."""
     damage = book.damage()
     if damage:
-        print(f"burg-drake: {damage}", file=sys.stderr)
+        print_remark(damage)
     return bool(damage)
 
 
@@ -109,9 +109,7 @@ def add_trials_record_options(parser: Parser) -> None:
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--correct", action="store_true", help="replace the entry")
     how.add_argument(
-        "--again",
-        action="store_true",
-        help="the trial was repeated: replace all its entries",
+        "--again", action="store_true", help="the trial was repeated: replace all its entries"
     )
 
 
@@ -161,10 +159,7 @@ def run_trials_record(arguments: argparse.Namespace) -> int:
     if arguments.width_mm is not None:
         _warn_of_width(arguments, sheet, recorded)
     if check is not None and not found:
-        print(
-            f"burg-drake: {arguments.photo}: {check.reason}; recorded without placement",
-            file=sys.stderr,
-        )
+        print_remark(f"{arguments.photo}: {check.reason}; recorded without placement")
     return 0 if check is None or found else 1
 
 
@@ -234,15 +229,14 @@ def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
 
 def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options tell, but for photo and placement."""
-    text_fields = ("note", "operator")
-    names = ("outcome", "note", "operator", "time")
-    entry = {name: getattr(arguments, name) for name in names}
-    robot = {name: getattr(arguments, name) for name in ("width_mm", "effort_n")}
-    known = {name: value for name, value in robot.items() if value is not None}
-    given = {name: value for name, value in entry.items() if value is not None}
+
+    def given(*names: str) -> dict[str, Any]:
+        return {name: v for name in names if (v := getattr(arguments, name)) is not None}
+
+    entry, robot = given("outcome", "note", "operator", "time"), given("width_mm", "effort_n")
     if not arguments.correct:  # which may replace them by nothing
-        given = {k: v for k, v in given.items() if k not in text_fields or v.strip()}
-    return given | ({"robot": known} if known else {})
+        entry = {k: v for k, v in entry.items() if k not in ("note", "operator") or v.strip()}
+    return entry | ({"robot": robot} if robot else {})
 
 
 def _placement_check(
@@ -288,10 +282,9 @@ def _warn_of_width(arguments: argparse.Namespace, sheet: TrialSheet, trial: Real
         run = load_source_run(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
         hand = run.station().hand
         if arguments.width_mm > 1e3 * hand.opening[1]:
-            print(
-                f"burg-drake: --width-mm {arguments.width_mm:g} is recorded, but hand"
-                f" {hand.name!r} opens {1e3 * hand.opening[1]:g} mm",
-                file=sys.stderr,
+            print_remark(
+                f"--width-mm {arguments.width_mm:g} is recorded, but hand"
+                f" {hand.name!r} opens {1e3 * hand.opening[1]:g} mm"
             )
 
 
@@ -337,8 +330,7 @@ def run_trials_show(arguments: argparse.Namespace) -> int:
         _print_trials(sheet.trials, arguments.show_simulated)
     _print_progress(sheet, arguments.show_simulated)
     begun = any(trial.carried_out for trial in sheet.trials)
-    for note in () if begun or not arguments.show_simulated else sheet.notes:
-        print(f"note: {note}")
+    print_note_lines(() if begun or not arguments.show_simulated else sheet.notes)
     if sheet.next is not None:
         print(f"next is {sheet.next.number}: {sheet.next.grasp}")
     lacking = book.missing_values()
@@ -394,16 +386,13 @@ def _print_missing_entries(path: str, lacking: Sequence[MissingValues]) -> None:
                 f"{name} {value}" if isinstance(value, str) else name
                 for name, value in found.values.items()
             )
-            print(
-                f"burg-drake: trial {found.number} lacks what was recorded: {text}", file=sys.stderr
-            )
+            print_remark(f"trial {found.number} lacks what was recorded: {text}")
         if found.edited:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")
     if any(found.values for found in lacking):
-        print(
-            f"burg-drake: `burg-drake trials restore {path}` brings it back; with --keep the file"
-            " stays as it is",
-            file=sys.stderr,
+        print_remark(
+            f"`burg-drake trials restore {path}` brings it back; with --keep the file"
+            " stays as it is"
         )
 
 

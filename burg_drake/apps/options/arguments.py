@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import shutil
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from burg_drake.apps.options.values import (
@@ -18,7 +18,13 @@ from burg_drake.apps.options.values import (
     renaming,
     workers,
 )
-from burg_drake.core import InvalidInputError, did_you_mean, quote_value, suggest_names
+from burg_drake.core import (
+    InvalidInputError,
+    builtin_names,
+    did_you_mean,
+    quote_value,
+    suggest_names,
+)
 
 if TYPE_CHECKING:
     from burg_drake.cameras import Intrinsics
@@ -200,23 +206,21 @@ class CommandGroup:
 
 def add_scene(parser: Parser) -> None:
     """The argument SCENE."""
-    parser.add_argument(
-        "scene",
-        metavar="SCENE",
-        help=f"scene file, or built-in: {scene_names()}",
-    )
+    parser.add_argument("scene", metavar="SCENE", help=f"scene file, or built-in: {scene_names()}")
 
 
 def scene_names() -> str:
     """The built-in scenes, for a help text."""
-    from burg_drake.core import builtin_names
-
     return ", ".join(builtin_names("scenes"))
 
 
+def add_output(parser: Any, metavar: str, help: str, *, required: bool = True) -> None:
+    """The option --output, of verbs that write something."""
+    parser.add_argument("-o", "--output", metavar=metavar, required=required, help=help)
+
+
 def add_measured_board(
-    parser: Any,
-    help: str = "length of the printed 100 mm rulers along x and y (default: 100)",
+    parser: Any, help: str = "length of the printed 100 mm rulers along x and y (default: 100)"
 ) -> None:
     """The option --measured-mm, of verbs that look at a board that was printed already, or print.
 
@@ -410,16 +414,15 @@ def add_cluster(group: Any) -> None:
     )
 
 
-@contextlib.contextmanager
-def cluster_from_options(arguments: argparse.Namespace) -> Iterator[Executor | None]:
+def cluster_from_options(
+    arguments: argparse.Namespace,
+) -> contextlib.AbstractContextManager[Executor | None]:
     """The cluster that is asked for, until the block is left; None for this machine's processes."""
     if arguments.cluster is None:
-        yield None
-        return
+        return contextlib.nullcontext()
     from burg_drake.evaluation import connect_cluster
 
-    with connect_cluster(arguments.cluster) as executor:
-        yield executor
+    return connect_cluster(arguments.cluster)
 
 
 def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
@@ -430,9 +433,7 @@ def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
         what: is tried again, in the plural.
     """
     parser.add_argument(
-        "--retry-failed",
-        action="store_true",
-        help=f"also retry {what} that could not be simulated",
+        "--retry-failed", action="store_true", help=f"also retry {what} that could not be simulated"
     )
 
 

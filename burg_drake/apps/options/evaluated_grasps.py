@@ -87,8 +87,7 @@ def add_grasp_file_options(parser: Parser, which: Any) -> None:
         help="grasps of this file or run, instead of sampling",
     )
     group = parser.add_argument_group(
-        "with --grasps",
-        "`burg-drake grasps convert --formats` lists the formats.",
+        "with --grasps", "`burg-drake grasps convert --formats` lists the formats."
     )
     group.add_argument(
         "--grasps-format", metavar="NAME", help="format of the file (default: recognised)"
@@ -103,9 +102,7 @@ def add_grasp_file_options(parser: Parser, which: Any) -> None:
         help="object or instance of the grasps; once for each name in the file",
     )
     group.add_argument(
-        "--grasps-frame",
-        choices=tuple(POSE_FRAMES),
-        help="frame of the poses, if not the format's",
+        "--grasps-frame", choices=tuple(POSE_FRAMES), help="frame of the poses, if not the format's"
     )
     add_camera_options(group)
 

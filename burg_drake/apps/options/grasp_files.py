@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,23 +42,21 @@ def add_reading_options(parser: Parser, *, in_full: bool = False) -> None:
 
 def add_correction_options(parser: Any, *, in_full: bool = False) -> None:
     """The options --gripper-link and --correction."""
-    # After the first one, in a help text.
-    other_corrections = (
-        " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse, transposed,"
-        " wxyz, xyzw, y_up, z_up, millimetres, half_widths"
-    )
+    others = " (see burg-drake grasps convert --help)"
+    if in_full:
+        others = (
+            " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse,"
+            " transposed, wxyz, xyzw, y_up, z_up, millimetres, half_widths"
+        )
     parser.add_argument(
-        "--gripper-link",
-        metavar="NAME",
-        help="hand's link in isaac_grasp files (default: its own)",
+        "--gripper-link", metavar="NAME", help="hand's link in isaac_grasp files (default: its own)"
     )
     parser.add_argument(
         "--correction",
         metavar="NAME,...",
         type=lambda text: tuple(text.split(",")),
         default=(),
-        help="correct poses, such as turn:z90"
-        + (other_corrections if in_full else " (see burg-drake grasps convert --help)"),
+        help=f"correct poses, such as turn:z90{others}",
     )
 
 
@@ -134,7 +132,6 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
     Raises:
         UnknownNameError: it is not there.
     """
-    from burg_drake.core import UnknownNameError, is_resolved
     from burg_drake.evaluation import station_reference
     from burg_drake.station import load_station
 
@@ -164,7 +161,7 @@ def gripper_by_name(hand: str) -> Gripper:
 
 def _gripper_of_file(path: str | None) -> Gripper:
     """The hand that a file or a run says its grasps are for, else the default."""
-    from burg_drake.core import BurgError, UnknownNameError
+    from burg_drake.core import BurgError
     from burg_drake.evaluation import hand_reference
 
     reference = None if path is None else hand_reference(path)
@@ -229,9 +226,7 @@ def add_source_options(parser: Parser) -> None:
     """The options --scene and --library."""
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--scene",
-        metavar="SCENE",
-        help="scene of the grasps (default: what the file names)",
+        "--scene", metavar="SCENE", help="scene of the grasps (default: what the file names)"
     )
     which.add_argument(
         "--library", metavar="LIB", help="library of the grasps (default: what the file names)"
@@ -323,10 +318,10 @@ class GraspOutput:
         written = write_each_object(grasps, self.path, self.format, gripper)
         print(said)
         print(f"  {list_names([path.name for path in written])}")
-        for note, paths in _files_by_note(written).items():
-            if len(paths) < len(written):
-                note = f"{list_names([path.name for path in paths])}: {note}"
-            print_notes([note])
+        for note in dict.fromkeys(note for notes in written.values() for note in notes):
+            files = [path.name for path, notes in written.items() if note in notes]
+            where = f"{list_names(files)}: " if len(files) < len(written) else ""
+            print_notes([f"{where}{note}"])
 
 
 def add_format_option(parser: Parser) -> None:
@@ -371,15 +366,6 @@ def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> 
 def format_title(format: GraspFormat) -> str:
     """A format's name and title."""
     return format.name if format.title == format.name else f"{format.name} ({format.title})"
-
-
-def _files_by_note(written: Mapping[Path, Sequence[str]]) -> dict[str, list[Path]]:
-    """The files that each note is about."""
-    found: dict[str, list[Path]] = {}
-    for path, notes in written.items():
-        for note in notes:
-            found.setdefault(note, []).append(path)
-    return found
 
 
 def print_notes(notes: Sequence[str]) -> None:

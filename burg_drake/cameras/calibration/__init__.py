@@ -1,4 +1,4 @@
 """Intrinsics of a camera from images of a ChArUco board, and how far they can be trusted.
 
-Read `target`, `estimation`, `lens_choice` and `lens_fit`, then `lens_uncertainty`, `promise` and
-`guidance`."""
+Read `charuco_target`, `estimation` and `lens_fit`, then `lens_uncertainty` and `view_guidance`.
+"""

@@ -15,6 +15,7 @@ from burg_drake.core import (
     Array,
     FieldError,
     InvalidInputError,
+    Single,
     Units,
     linear_levels,
     setting,
@@ -49,10 +50,7 @@ class CharucoTarget:
         0.014, "side of a marker", unit=Units.millimetres, metavar="MARKER_MM", above=0
     )
     dictionary: str = setting("5X5_100", "ArUco dictionary of the markers", metavar="DICTIONARY")
-    legacy: bool = setting(
-        False,
-        "the board has the layout of OpenCV before 4.6",
-    )
+    legacy: bool = setting(False, "the board has the layout of OpenCV before 4.6")
 
     def __post_init__(self) -> None:
         if min(self.squares) < 3:
@@ -131,23 +129,19 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
     Returns:
         The view; or why there is none, in a few words.
     """
-    min_spread = 0.02  # Width of the corners across their main direction, fraction of the diagonal.
-    min_gap = 3.0  # Pixels between a corner and a marker; nearer markers disturb the corner.
     gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     light = srgb_to_linear(gray)
     found, ids, _, marker_ids = target._detector.detectBoard(linear_levels(light))
     if ids is None or len(ids) == 0:
         seen = 0 if marker_ids is None else len(marker_ids)
-        return (
-            f"shows {seen} of the target's markers, but no corners between them"
-            if seen
-            else "does not show the target"
-        )
+        if seen:
+            return f"shows {seen} of the target's markers, but no corners between them"
+        return "does not show the target"
     ids = np.asarray(ids, dtype=np.int32).ravel()
     corners = np.asarray(found, dtype=float).reshape(-1, 2)
     gap = _marker_gaps(corners, ids, target)
     inside = ((corners > gap[:, None]) & (corners < gray.shape[::-1] - gap[:, None])).all(axis=1)
-    clear = gap >= min_gap
+    clear = gap >= 3.0  # Pixels between a corner and a marker; nearer markers disturb the corner.
     if inside.sum() >= MIN_CORNERS > (inside & clear).sum():
         side = float(np.median(_square_sides(corners, ids, target)))
         return f"shows the target too small: its squares are {side:.0f} pixels wide"
@@ -155,7 +149,8 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
     if len(ids) < MIN_CORNERS:
         return f"shows {len(ids)} corners of the target; {MIN_CORNERS} are needed"
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[1]
-    if 2.0 * spread / np.sqrt(len(ids)) < min_spread * np.hypot(*gray.shape):
+    # Width of the corners across their main direction, fraction of the diagonal.
+    if 2.0 * spread / np.sqrt(len(ids)) < 0.02 * np.hypot(*gray.shape):
         return "shows only corners on one line of the target"
     refined = refine_corners(light, corners, ids, target)
     blur, side = _measure_edges(light, refined, ids, target)
@@ -163,7 +158,7 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 
 
 def refine_corners(
-    light: NDArray[np.float32], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
+    light: Single, corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> Array:
     """Moves corners to where the edges that meet there cross.
 
@@ -176,10 +171,10 @@ def refine_corners(
     Returns:
         (N, 2) pixels.
     """
-    smoothing_sigma = 1.0  # Pixels. Sharp images are undersampled; this halves the corners' errors.
     windows = np.clip(np.floor(_marker_gaps(corners, ids, target)), 2, 31).astype(int)
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-4)
-    smooth = cv2.GaussianBlur(light, (0, 0), smoothing_sigma)
+    # Pixels. Sharp images are undersampled; this halves the corners' errors.
+    smooth = cv2.GaussianBlur(light, (0, 0), 1.0)
     refined = corners.astype(np.float32).reshape(-1, 1, 2)
     for window in np.unique(windows):
         these = windows == window
@@ -220,7 +215,7 @@ def _neighbour_pairs(ids: NDArray[np.int32], target: CharucoTarget) -> NDArray[n
 
 
 def _measure_edges(
-    light: NDArray[np.float32], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
+    light: Single, corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> tuple[float, float]:
     """Blur and length of the squares' sides [pixels].
 
@@ -239,13 +234,8 @@ def _measure_edges(
     # (M, 5, 49, 2): five lines across each side, whose mean is less noisy than each is.
     p = start[:, None] + along[:, None] * places[:, None]
     p = (p[:, :, None] + across[:, None, None] * t[:, None, :, None]).astype(np.float32)
-    lines = cv2.remap(
-        light,
-        p[..., 0].reshape(len(p), -1),
-        p[..., 1].reshape(len(p), -1),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
+    u, v = np.moveaxis(p.reshape(len(p), -1, 2), 2, 0)
+    lines = cv2.remap(light, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     profile = lines.reshape(p.shape[:3]).mean(axis=1)
     height = profile.max(axis=1) - profile.min(axis=1)
     middle = np.abs(np.linspace(-1.0, 1.0, 49)[1:] - 1 / 48) < 0.25

@@ -70,10 +70,17 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
     Raises:
         InvalidInputError: the views do not determine a camera.
     """
-    perspective, fisheye = _fit_perspective_models(views, target), _fit_fisheye_model(views, target)
-    fits = [*perspective, fisheye] if _is_wide_angle(fisheye) else perspective
+    perspective = _fit_perspective_models(views, target)
+    fisheye = fit_lens(views, target, "fisheye", guess_camera(views, target, "fisheye"))
+    # A fisheye is tried only if the image's corners are farther off the axis.
+    corner_rays = fisheye.intrinsics.rays(image_grid(fisheye.intrinsics, 2, 2))
+    is_wide = np.arccos(corner_rays[:, 2]).max() > np.radians(55.0)
+    fits = [*perspective, fisheye] if is_wide else perspective
     # All lenses distort a little, so that a pinhole is not chosen.
-    evidence = _lens_evidence(fits[1:])
+    # Views disagree by a model that is wrong, and by one that they do not determine, so that the
+    # one by which they agree most tells how alike errors are.
+    limit = HUBER_RATIO * min(fit.typical for fit in fits[1:])
+    evidence = LensEvidence(limit, min(view_disagreement(fit) for fit in fits[1:]) ** 2)
     best = min(fits[1:], key=lambda fit: fit.information(evidence, True))
     # Beside the camera a perspective model means nothing, so it tells nothing about a fisheye.
     hypotheses = lens_hypotheses([best] if best is fisheye else fits, evidence)
@@ -84,13 +91,6 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
         corners = np.concatenate([view.corners for view in views])
         best = _rational_if_better(best, perspective[-1], evidence, hypotheses, corners)
     return LensChoice(best, supported, hypotheses, evidence.dispersion)
-
-
-def _lens_evidence(fits: Sequence[LensFit]) -> LensEvidence:
-    """Views disagree by a model that is wrong, and by one that they do not determine, so that the
-    one by which they agree most tells how alike errors are."""
-    limit = HUBER_RATIO * min(fit.typical for fit in fits)
-    return LensEvidence(limit, min(view_disagreement(fit) for fit in fits) ** 2)
 
 
 def _rational_if_better(
@@ -113,26 +113,13 @@ def _rational_if_better(
 
 def _fit_perspective_models(views: Sequence[CharucoView], target: CharucoTarget) -> list[LensFit]:
     """Fits of the perspective models, each from the one before."""
-    # From the simplest on; each model contains the one before.
-    perspective_models = ("pinhole", "radial4", "radial", "rational")
     start = guess_camera(views, target, "perspective")
     fits = []
-    for model in perspective_models:
+    # From the simplest on; each model contains the one before.
+    for model in ("pinhole", "radial4", "radial", "rational"):
         fits.append(fit_lens(views, target, model, start))
         start = fits[-1].intrinsics, fits[-1].X_CT
     return fits
-
-
-def _fit_fisheye_model(views: Sequence[CharucoView], target: CharucoTarget) -> LensFit:
-    return fit_lens(views, target, "fisheye", guess_camera(views, target, "fisheye"))
-
-
-def _is_wide_angle(fisheye: LensFit) -> bool:
-    # Radians. A fisheye is tried only if the image's corners are farther off the axis.
-    min_wide_angle = np.radians(55.0)
-    camera = fisheye.intrinsics
-    corners = camera.rays(image_grid(camera, 2, 2))
-    return bool(np.arccos(corners[:, 2]).max() > min_wide_angle)
 
 
 MAX_VIEW_BLUR = 0.08
@@ -176,7 +163,7 @@ class Calibration:
         views: that were used.
         rejected: names of the other images, and why each does not count.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients, if the lens is of this model.
-        hypotheses: what the lens may be by these corners, see `uncertainty`.
+        hypotheses: what the lens may be by these corners, see `camera_error`.
         bulge: how far the target is from flat, by its highest and lowest corner [m].
     """
 
@@ -197,7 +184,7 @@ class Calibration:
     @cached_property
     def promise(self) -> Promise:
         """To how many pixels the camera is known, and where it is not."""
-        return calibration_promise(self)
+        return calibration_promise(self.intrinsics, self.hypotheses, self.corners)
 
     @property
     def rms(self) -> float:
@@ -266,19 +253,19 @@ def calibrate_views(
         rejected: images that are no views, and why.
 
     Raises:
-        InvalidInputError: fewer than `LEAST_VIEWS` can be used, or they do not determine a camera.
+        InvalidInputError: fewer than 3 can be used, or they do not determine a camera.
         UnknownNameError: no such model.
     """
-    max_rounds = 6  # Rounds of outlier rejection, at most.
-    if model not in (AUTO_LENS_MODEL, *LENS_MODELS):
+    known = (AUTO_LENS_MODEL, *LENS_MODELS)
+    if model not in known:
         raise UnknownNameError(
-            f"lens model {model!r} does not exist; {suggest_names(model, (AUTO_LENS_MODEL, *LENS_MODELS))}"
+            f"lens model {model!r} does not exist; {suggest_names(model, known)}"
         )
     kept, refused = _select_usable_views(views)
     refused = [*rejected, *refused]
     _require_views(kept, refused)
     chosen = choose_lens(kept, target, model)
-    for _ in range(max_rounds):
+    for _ in range(6):  # Rounds of outlier rejection, at most.
         cleaned, outliers = _reject_outliers(kept, chosen.supported)
         if cleaned == kept:
             break
@@ -310,15 +297,13 @@ def _select_usable_views(
     views: Sequence[CharucoView],
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
     """Views of the size that most have, sharp and different; and the others."""
-    duplicate_distance = 0.005  # Fraction of the diagonal; nearer views are duplicates.
     sizes = Counter(view.size for view in views)
     kept: list[CharucoView] = []
     refused = []
     for view in views:
         (size, _), *_ = sizes.most_common(1)
-        twin = next(
-            (other for other in kept if corner_displacement(view, other) < duplicate_distance), None
-        )
+        # Fraction of the diagonal; nearer views are duplicates.
+        twin = next((other for other in kept if corner_displacement(view, other) < 0.005), None)
         if view.size != size:
             reason = "has {} x {} pixels, the others have {} x {}".format(*view.size, *size)
         elif view.blur > MAX_VIEW_BLUR * view.side:
@@ -359,36 +344,27 @@ def _reject_outliers(
     views: list[CharucoView], fit: LensFit
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
     """Views without those, and without corners, that do not fit to the others."""
-    max_view_ratio = 3.0  # Outlier views exceed this multiple of the median view's residual ...
-    min_view_residual = 0.3  # ... and this residual in pixels.
-    max_corner_ratio = 5.0  # Outlier corners exceed this multiple of the median residual ...
-    min_corner_residual = 0.15  # ... and this residual in pixels.
     lengths = [np.linalg.norm(r, axis=1) for r in fit.residuals]
     typical = float(np.median(np.concatenate(lengths)))
     rms = np.array([rms_length(r) for r in fit.residuals])
-    limit = max(max_view_ratio * float(np.median(rms)), min_view_residual)
-    corner_limit = max(max_corner_ratio * typical, min_corner_residual)
+    median = float(np.median(rms))
+    limit = max(3.0 * median, 0.3)  # Pixels.
+    corner_limit = max(5.0 * typical, 0.15)  # Pixels.
     kept, refused = [], []
     for view, length, of_view in zip(views, lengths, rms, strict=True):
         # The worst first: they pull the view's pose, and with it other corners, off their place.
         good = length <= max(corner_limit, 0.5 * length.max())
         # A few wrong corners are left out by themselves, without their view.
         if of_view > limit and (good.mean() < 0.8 or rms_length(length[good, None]) > limit):
-            refused.append(
-                (
-                    view.name,
-                    f"is {of_view:.2f} pixels off, the median is {np.median(rms):.2f}",
-                )
-            )
+            reason = f"is {of_view:.2f} pixels off, the median is {median:.2f}"
         elif good.sum() < MIN_CORNERS:
-            refused.append(
-                (
-                    view.name,
-                    f"has {good.sum()} corners that agree with the other images;"
-                    f" {MIN_CORNERS} are needed",
-                )
+            reason = (
+                f"has {good.sum()} corners that agree with the other images; {MIN_CORNERS} are"
+                " needed"
             )
         else:
             part = replace(view, ids=view.ids[good], corners=view.corners[good])
             kept.append(view if good.all() else part)
+            continue
+        refused.append((view.name, reason))
     return kept, refused

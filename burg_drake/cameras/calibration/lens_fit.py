@@ -35,11 +35,9 @@ def guess_camera(
             distortion=(0.0,) * 4,
         )
         posed = [_fit_view_pose(view, target, camera) for view in views]
-        found.append(
-            (np.median([error for error, _ in posed]), camera, np.array([X for _, X in posed]))
-        )
-    _, camera, X_CT = min(found, key=lambda one: one[0])
-    return camera, X_CT
+        errors, X_CT = zip(*posed, strict=True)
+        found.append((np.median(errors), camera, np.array(X_CT)))
+    return min(found, key=lambda one: one[0])[1:]
 
 
 def _fit_view_pose(
@@ -112,16 +110,13 @@ def _fisheye_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Ar
     by_camera = np.zeros((len(p_CQ), 2, 8))
     by_camera[:, [0, 1], [0, 1]] = bent
     by_camera[:, [0, 1], [2, 3]] = 1.0
-    within = np.minimum(angle, lens.turn)
+    within = np.minimum(angle, lens.max_angle)
     powers = within[:, None] ** (3 + 2 * np.arange(4))
     by_camera[:, :, 4:] = focal[:, None] * toward[:, :, None] * powers[:, None]
     # A rotation w moves a point p by w x p.
     by_turn = np.cross(p_CQ[:, None], by_point)
-    return (
-        bent * focal + intrinsics.center,
-        np.concatenate([by_turn, by_point], axis=2),
-        by_camera,
-    )
+    by_pose = np.concatenate([by_turn, by_point], axis=2)
+    return bent * focal + intrinsics.center, by_pose, by_camera
 
 
 BEND_TERMS = 3
@@ -139,21 +134,18 @@ def lens_prior(camera: Intrinsics, bends: Array) -> tuple[Array, Array]:
         `(errors, slopes)`: (P + 3,) how many standard deviations their parameters are from what is
         expected, and the derivatives of that.
     """
-    max_term = 1.0  # Standard deviation of a term of the lens formula in the image's corners.
     focal_log_sd = 0.5  # Standard deviation of the logarithm of the focal length over the diagonal.
     center_sd = 0.1  # Standard deviation of the principal point, as a fraction of the diagonal.
     size = np.array([camera.width, camera.height])
     diagonal = float(np.hypot(*size))
     reach = min(1.0, 0.5 * diagonal / camera.focal[0])
     powers = FISHEYE_POWERS if camera.is_fisheye else PERSPECTIVE_POWERS[: len(camera.distortion)]
-    weights = reach**powers / max_term
+    # A term of the lens formula has a standard deviation of 1 in the image's corners.
+    weights = reach**powers
     aside = (np.array(camera.center) - 0.5 * (size - 1)) / (center_sd * diagonal)
-    errors = np.r_[
-        np.log(np.array(camera.focal) / diagonal) / focal_log_sd, aside, weights * camera.distortion
-    ]
-    slopes = np.r_[
-        1.0 / (focal_log_sd * np.array(camera.focal)), [1.0 / (center_sd * diagonal)] * 2, weights
-    ]
+    focal = np.array(camera.focal)
+    errors = np.r_[np.log(focal / diagonal) / focal_log_sd, aside, weights * camera.distortion]
+    slopes = np.r_[1.0 / (focal_log_sd * focal), [1.0 / (center_sd * diagonal)] * 2, weights]
     return np.r_[errors, bends], np.r_[slopes, np.ones(BEND_TERMS)]
 
 
@@ -269,13 +261,12 @@ def fit_lens(
     Raises:
         InvalidInputError: the views do not determine a camera.
     """
-    min_huber_limit = 0.02  # Pixels.
     camera = _pad_coefficients(start[0], model)
     problem = _LensFitProblem(views, target, camera, bend)
-    state = problem.fitted(camera, np.zeros(BEND_TERMS), start[1])
+    state = problem.minimize(camera, np.zeros(BEND_TERMS), start[1])
     typical = float(np.median(np.linalg.norm(state.residuals, axis=1)))
-    problem.limit = max(HUBER_RATIO * typical, min_huber_limit)
-    state = problem.fitted(state.intrinsics, state.bends, state.X_CT)
+    problem.limit = max(HUBER_RATIO * typical, 0.02)  # Pixels.
+    state = problem.minimize(state.intrinsics, state.bends, state.X_CT)
     ends = np.cumsum(problem.counts)[:-1]
     reduced = []
     for of_pose, of_others in zip(
@@ -297,19 +288,18 @@ def fit_lens(
 
 def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
     """Of a camera's parameters."""
-    perspective_names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")  # OpenCV's order.
-    fisheye_names = ("k1", "k2", "k3", "k4")  # OpenCV's order.
-    names = fisheye_names if camera.is_fisheye else perspective_names[: len(camera.distortion)]
+    names: tuple[str, ...] = ("k1", "k2", "k3", "k4")  # OpenCV's order.
+    if not camera.is_fisheye:
+        names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")[: len(camera.distortion)]
     return ("fx", "fy", "cx", "cy", *names)
 
 
 def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
     """A camera with as many coefficients as a model has."""
-    k = np.zeros(COEFFICIENT_COUNTS[model])
-    known = camera.distortion[: len(k)]
-    k[: len(known)] = known
+    count = COEFFICIENT_COUNTS[model]
+    distortion = (*camera.distortion, *(0.0,) * count)[:count]
     lens: LensModel = "fisheye" if model == "fisheye" else "perspective"
-    return replace(camera, model=lens, distortion=tuple(k.tolist()), residual=None)
+    return replace(camera, model=lens, distortion=distortion, residual=None)
 
 
 class _LensFitProblem:
@@ -333,7 +323,7 @@ class _LensFitProblem:
         x, y = ((self.p_TQ[:, :2] - half) / half.max()).T
         self.rise = bend * np.stack([x * x, x * y, y * y], axis=1)
 
-    def at(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
+    def evaluate(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
         """Cost and derivatives."""
         X = X_CT[self.view]
         p_TQ = self.p_TQ + (self.rise @ bends)[:, None] * [0.0, 0.0, 1.0]
@@ -352,21 +342,19 @@ class _LensFitProblem:
         by_others = np.concatenate([by_camera[..., : self.size], by_bends], axis=2)
         return _LensFitState(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
-    def fitted(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
+    def minimize(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
         """The state of lowest cost that steps from a camera lead to.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
         """
-        max_rounds = 200  # Iterations, at most.
-        min_gain = 1e-9  # The fit ends when the sum of squares decreases by a smaller fraction.
-        state, damping = self.at(camera, bends, X_CT), 1e-3
-        for _ in range(max_rounds):
+        state, damping = self.evaluate(camera, bends, X_CT), 1e-3
+        for _ in range(200):  # Iterations, at most.
             better, damping = self.step(state, damping)
             if better is None:
                 break
             gain, state = 1.0 - better.cost / state.cost, better
-            if gain < min_gain:
+            if gain < 1e-9:  # The fit ends when the sum of squares decreases by a smaller fraction.
                 break
         if not np.isfinite(state.cost):
             raise InvalidInputError(
@@ -377,13 +365,9 @@ class _LensFitProblem:
 
     def step(self, state: _LensFitState, damping: float) -> tuple[_LensFitState | None, float]:
         """A state of lower cost and the next damping; None if there is no such."""
-        max_damping = 1e8  # Levenberg-Marquardt damping at which no step lowers the cost.
         root = np.sqrt(state.weights)[:, None]
-        Jp, Jc, r = (
-            state.by_pose * root[..., None],
-            state.by_others * root[..., None],
-            state.residuals * root,
-        )
+        Jp, Jc = state.by_pose * root[..., None], state.by_others * root[..., None]
+        r = state.residuals * root
         pose = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jp), self.starts)
         mixed = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jc), self.starts)
         errors, slopes = lens_prior(state.intrinsics, state.bends)
@@ -392,7 +376,7 @@ class _LensFitProblem:
         of_camera = np.einsum("nki,nk->i", Jc, r)
         of_camera -= CORNER_SD_PX**2 * errors * slopes
         diagonal = np.einsum("vii->vi", pose)
-        while damping < max_damping:
+        while damping < 1e8:  # Levenberg-Marquardt damping at which no step lowers the cost.
             damped = pose + damping * diagonal[:, :, None] * np.eye(6)
             solved = np.linalg.solve(damped, np.concatenate([mixed, of_pose[..., None]], axis=2))
             left = camera + damping * np.diag(np.diag(camera))
@@ -402,13 +386,13 @@ class _LensFitProblem:
             scaled = left * np.outer(scale, scale)
             change = scale * np.linalg.lstsq(scaled, scale * right, rcond=None)[0]
             poses = solved[..., -1] - solved[..., :-1] @ change
-            found = self._moved(state, change, poses)
+            found = self._take_step(state, change, poses)
             if found is not None and found.cost < state.cost:
                 return found, max(0.1 * damping, 1e-12)
             damping *= 10.0
         return None, damping
 
-    def _moved(self, state: _LensFitState, change: Array, poses: Array) -> _LensFitState | None:
+    def _take_step(self, state: _LensFitState, change: Array, poses: Array) -> _LensFitState | None:
         k = state.intrinsics
         values = np.r_[k.focal, k.center, k.distortion] + change[: self.size]
         if not np.isfinite(values).all() or values[:2].min() <= 0.0:
@@ -423,4 +407,4 @@ class _LensFitProblem:
         for X, twist in zip(X_CT, poses, strict=True):
             R = cv2.Rodrigues(twist[:3])[0]
             X[:3, :3], X[:3, 3] = R @ X[:3, :3], R @ X[:3, 3] + twist[3:]
-        return self.at(camera, state.bends + change[self.size :], X_CT)
+        return self.evaluate(camera, state.bends + change[self.size :], X_CT)

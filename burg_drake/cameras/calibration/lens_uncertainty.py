@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,14 +47,13 @@ def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDAr
 
 
 def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
-    """Which of `IMAGE_PARTS` show no corners, or along less than half of an edge; from `corner_coverage`."""
-    min_seen_share = 0.5  # Fraction of an edge's cells in which corners must be seen.
+    """Which of `IMAGE_PARTS` show no corners, or along less than half of an edge, by the counts of
+    `corner_coverage`."""
     bands = (slice(0, 1), slice(1, -1), slice(-1, None))
     cells = (counts[rows, columns] for rows in bands for columns in bands)
+    # Fraction of an edge's cells in which corners must be seen.
     return tuple(
-        name
-        for name, part in zip(IMAGE_PARTS, cells, strict=True)
-        if (part > 0).mean() < min_seen_share
+        name for name, part in zip(IMAGE_PARTS, cells, strict=True) if (part > 0).mean() < 0.5
     )
 
 
@@ -87,22 +85,6 @@ class LensHypothesis:
     covariance: Array
 
 
-class CalibratedCamera(Protocol):
-    """A camera model, what else it may be, and where that was seen."""
-
-    @property
-    def intrinsics(self) -> Intrinsics:
-        """The camera."""
-
-    @property
-    def hypotheses(self) -> tuple[LensHypothesis, ...]:
-        """What it may be."""
-
-    @property
-    def corners(self) -> Array:
-        """(N, 2) that were seen [pixels]."""
-
-
 def image_grid(intrinsics: Intrinsics, columns: int = 13, rows: int = 9) -> Array:
     """(rows * columns, 2) places spread over the image from edge to edge [pixels]."""
     u = np.linspace(0.0, intrinsics.width - 1.0, columns)
@@ -117,18 +99,15 @@ def camera_covariance(fit: LensFit) -> Array:
 
 def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
     """Fits of several models to the same corners, weighed by Akaike's criterion."""
-    min_weight_share = 1e-4  # Models with less support are dropped.
     information = np.array([fit.information(evidence, False) for fit in fits])
     weights = np.exp(-0.5 * (information - information.min()))
-    kept = [k for k in range(len(fits)) if weights[k] > min_weight_share * weights.sum()]
+    # Models with less support are dropped.
+    kept = [k for k in range(len(fits)) if weights[k] > 1e-4 * weights.sum()]
     total = float(weights[kept].sum())
+    covariance = [evidence.dispersion * camera_covariance(fits[k]) for k in kept]
     return tuple(
-        LensHypothesis(
-            float(weights[k]) / total,
-            fits[k].intrinsics,
-            evidence.dispersion * camera_covariance(fits[k]),
-        )
-        for k in kept
+        LensHypothesis(float(weights[k]) / total, fits[k].intrinsics, found)
+        for k, found in zip(kept, covariance, strict=True)
     )
 
 
@@ -150,58 +129,44 @@ def view_disagreement(fit: LensFit) -> float:
     return float(np.sqrt(max(1.0, seen / max(independent, 1e-300))))
 
 
-def pixel_uncertainty(calibrated: CalibratedCamera, pixels: Array) -> Array:
-    """How far the camera model may be off at places of the image.
-
-    A turn of the camera that explains the difference where corners were seen does not count: the
-    camera's pose takes it up.
-
-    Args:
-        calibrated: such as a `Calibration`.
-        pixels: (N, 2) places [pixels].
-
-    Returns:
-        (N,) root mean square distance [pixels].
-    """
-    return camera_error(calibrated.intrinsics, calibrated.hypotheses, calibrated.corners, pixels)
-
-
 def camera_error(
     camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array, pixels: Array
 ) -> Array:
-    """The same of any camera.
+    """How far a camera model may be off at places of the image.
+
+    A turn of the camera that explains the difference where corners were seen does not count: the
+    camera's pose takes it up.
 
     Args:
         camera: whose error is asked for.
         hypotheses: what the true camera may be.
         corners: (N, 2) that were seen [pixels].
         pixels: (N, 2) places [pixels].
+
+    Returns:
+        (N,) root mean square distance [pixels].
     """
-    max_aligned_corners = 400  # Corners at which two models are rotated onto each other.
-    seen = corners[:: max(1, len(corners) // max_aligned_corners)]
+    # Corners at which two models are rotated onto each other.
+    seen = corners[:: max(1, len(corners) // 400)]
     total = np.zeros(len(pixels))
     for hypothesis in hypotheses:
-        here = _CameraDifferences(camera, hypothesis.intrinsics, pixels)
-        there = _CameraDifferences(camera, hypothesis.intrinsics, seen)
-        turn = np.linalg.lstsq(there.by_turn, there.columns, rcond=None)[0]
-        columns = (here.columns - here.by_turn @ turn).reshape(len(pixels), 2, -1)
+        columns, by_turn = _camera_differences(camera, hypothesis.intrinsics, pixels)
+        seen_columns, seen_by_turn = _camera_differences(camera, hypothesis.intrinsics, seen)
+        turn = np.linalg.lstsq(seen_by_turn, seen_columns, rcond=None)[0]
+        columns = (columns - by_turn @ turn).reshape(len(pixels), 2, -1)
         off, J = columns[..., 0], columns[..., 1:]
         variance = np.einsum("nip,pq,niq->n", J, hypothesis.covariance, J)
         total += hypothesis.weight * (np.sum(off**2, axis=1) + np.maximum(variance, 0.0))
     return np.asarray(np.sqrt(total))
 
 
-class _CameraDifferences:
+def _camera_differences(one: Intrinsics, other: Intrinsics, pixels: Array) -> tuple[Array, Array]:
     """How far another camera shows what one shows at some pixels: (2 N, 1 + P), its distance from
     there and how that changes with its parameters; and (2 N, 3), with a turn of it."""
-
-    def __init__(self, one: Intrinsics, other: Intrinsics, pixels: Array) -> None:
-        found, by_pose, by_camera = lens_derivatives(other, one.rays(pixels))
-        count = 4 + len(other.distortion)
-        self.by_turn = by_pose[..., :3].reshape(-1, 3)
-        self.columns = np.column_stack(
-            [(found - pixels).ravel(), by_camera[..., :count].reshape(-1, count)]
-        )
+    found, by_pose, by_camera = lens_derivatives(other, one.rays(pixels))
+    count = 4 + len(other.distortion)
+    columns = [(found - pixels).ravel(), by_camera[..., :count].reshape(-1, count)]
+    return np.column_stack(columns), by_pose[..., :3].reshape(-1, 3)
 
 
 def _fit_covariance(fit: LensFit) -> Array:
@@ -212,9 +177,8 @@ def _fit_covariance(fit: LensFit) -> Array:
 def _fit_information(fit: LensFit) -> Array:
     """(P + 3, P + 3) inverse covariance for corners of variance 1, the prior's included."""
     J = np.concatenate(fit.reduced)
-    return np.asarray(
-        J.T @ J + fit.variance * np.diag(lens_prior(fit.intrinsics, fit.bends)[1] ** 2)
-    )
+    slopes = lens_prior(fit.intrinsics, fit.bends)[1]
+    return np.asarray(J.T @ J + fit.variance * np.diag(slopes**2))
 
 
 def _scaled_inverse(information: Array, fit: LensFit) -> Array:
@@ -247,10 +211,10 @@ class Promise:
     def except_at(self) -> tuple[str, ...]:
         """Parts that nothing is promised of or that are known much worse than the middle, or than
         the best part if the middle is one of those; the worst first."""
-        max_error_ratio = 2.0  # Parts with a larger error relative to the best part are named.
         bounds = {name: self.parts.get(name, np.inf) for name in IMAGE_PARTS}
         best = self.parts.get("middle", min(self.parts.values()))
-        limit = max(NOTABLE_ERROR_PX, max_error_ratio * best)
+        # Parts with a larger error relative to the best part are named.
+        limit = max(NOTABLE_ERROR_PX, 2.0 * best)
         worse = [name for name, bound in bounds.items() if not bound <= limit]
         return tuple(sorted(worse, key=lambda name: -bounds[name]))
 
@@ -266,26 +230,26 @@ class Promise:
         if name not in self.parts:
             return f"beyond {np.degrees(MAX_FISHEYE_ANGLE):.0f} degrees"
         bound = self.parts[name]
-        return (
-            f"{bound:.2g}"
-            if bound < MAX_REPORTED_ERROR_PX
-            else f"more than {MAX_REPORTED_ERROR_PX:g}"
-        )
+        if bound < MAX_REPORTED_ERROR_PX:
+            return f"{bound:.2g}"
+        return f"more than {MAX_REPORTED_ERROR_PX:g}"
 
     def __str__(self) -> str:
         bounds = {name: self.bound(name) for name in self.except_at}
         return f"known {describe_accuracy(self.known_to, self.except_at, bounds)}"
 
 
-def calibration_promise(calibrated: CalibratedCamera) -> Promise:
-    """What a calibration promises."""
-    grid_size = (17, 13)  # Columns and rows of the places where the error is computed.
-    camera = calibrated.intrinsics
-    pixels = image_grid(camera, *grid_size)
+def calibration_promise(
+    camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array
+) -> Promise:
+    """What a calibration promises; see `camera_error`."""
+    # Columns and rows of the places where the error is computed.
+    pixels = image_grid(camera, 17, 13)
     pixels = pixels[camera.rays(pixels)[:, 2] > np.cos(MAX_FISHEYE_ANGLE)]
     if not len(pixels):  # of views that tell nothing
         return Promise(dict.fromkeys(IMAGE_PARTS, np.inf), 1.0)
-    bound = np.nan_to_num(BOUND_SIGMAS * pixel_uncertainty(calibrated, pixels), nan=np.inf)
+    error = camera_error(camera, hypotheses, corners, pixels)
+    bound = np.nan_to_num(BOUND_SIGMAS * error, nan=np.inf)
     part = image_part_indices(pixels, (camera.width, camera.height))
     parts = {
         name: float(bound[part == k].max())

@@ -45,7 +45,9 @@ def write_target(
     """
     settings = settings or PrintSettings()
     papers = page_orientations(settings.page, settings.margin, settings.measured)
-    paper = next((p for p in papers if _fits_on_paper(target, p)), None)
+    # White around the squares. Beyond the room there is the margin, which is white, too.
+    needed = np.array(target.size) + 2.0 * 0.3 * target.square
+    paper = next((p for p in papers if (needed <= np.array(p.room) + 1e-9).all()), None)
     if paper is None:
         raise InvalidInputError(
             "a target of {} x {} squares of {:g} mm measures {:.0f} x {:.0f} mm, but page {} has"
@@ -79,13 +81,6 @@ def target_origin(target: CharucoTarget, paper: Paper) -> Array:
     """(2,) where the target's origin is on the page, from its lower left corner [m]."""
     spare = (np.array(paper.room) - target.size) / 2.0
     return np.array(paper.lower) + spare + [0.0, target.size[1]]
-
-
-def _fits_on_paper(target: CharucoTarget, paper: Paper) -> bool:
-    quiet_zone = 0.3  # White margin around the squares, as a fraction of a square.
-    needed = np.array(target.size) + 2.0 * quiet_zone * target.square
-    # Beyond the room there is the margin, which is white, too.
-    return bool((needed <= np.array(paper.room) + 1e-9).all())
 
 
 def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:

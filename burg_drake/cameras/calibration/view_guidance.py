@@ -35,10 +35,8 @@ def wanted_views(calibration: Calibration) -> tuple[str, ...]:
     """What to do with the target, in a few words each; none if there are views enough."""
     camera, promise = calibration.intrinsics, calibration.promise
     bound = promise.parts
-    counts = corner_coverage(
-        [used.view for used in calibration.views], (camera.width, camera.height)
-    )
-    unseen = unseen_parts(counts)
+    views = [used.view for used in calibration.views]
+    unseen = unseen_parts(corner_coverage(views, (camera.width, camera.height)))
     worst_first = sorted(bound, key=lambda name: -bound[name])
     hidden = [name for name in worst_first if name in unseen]
     poor = [name for name in worst_first if not (name in unseen or bound[name] <= NOTABLE_ERROR_PX)]
@@ -64,16 +62,14 @@ def _list_parts(names: Sequence[str], promise: Promise) -> str:
 
 def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
     """The sides to which the target was hardly tilted."""
-    # Radians. Views tilted less hardly separate focal length from distance.
-    min_tilt = np.radians(15.0)
-    min_tilted_views = 2  # For each side.
-    min_side_share = 0.5  # Fraction of the tilt that must be toward a side.
-    toward = np.array([used.X_CT[:2, 2] for used in views if used.tilt > min_tilt]).reshape(-1, 2)
+    # Views tilted by less than 15 degrees hardly separate focal length from distance.
+    tilted = [used.X_CT[:2, 2] for used in views if used.tilt > np.radians(15.0)]
+    toward = np.array(tilted).reshape(-1, 2)
     toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-9)
     missing = [
         side
         for side, (axis, sign) in TILT_DIRECTIONS.items()
-        if (sign * toward[:, axis] > min_side_share).sum() < min_tilted_views
+        if (sign * toward[:, axis] > 0.5).sum() < 2  # views, of which half of the tilt counts
     ]
     if not missing:
         return []
@@ -82,25 +78,23 @@ def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
 
 def _missing_distances(calibration: Calibration) -> list[str]:
     """Whether the target was always as far away."""
-    min_distance_ratio = 1.3  # Farthest view over nearest view, at least.
-    near_square_side = 45.0  # Pixels. The nearest view is near if its squares are larger.
     views, middle = calibration.views, np.array([*calibration.target.size, 0.0]) / 2.0
     places = transform_points(np.array([used.X_CT for used in views]), middle[None])
     distance = np.linalg.norm(places, axis=-1)
-    if distance.max() > min_distance_ratio * distance.min():
+    if distance.max() > 1.3 * distance.min():  # Farthest view over nearest view, at least.
         return []
-    near = max(used.view.side for used in views) >= near_square_side
+    # Pixels. The nearest view is near if its squares are larger.
+    near = max(used.view.side for used in views) >= 45.0
     return ["take some views from farther away" if near else "take some views from nearer"]
 
 
 def calibration_advice(calibration: Calibration) -> list[str]:
     """What would make a calibration better, a sentence each; empty if it is good."""
-    max_rms = 1.0  # Pixels. Sharp images of a flat target give 0.05 to 0.3.
     views, promise = calibration.views, calibration.promise
     lines = list(wanted_views(calibration))
     if len(views) < MIN_GOOD_VIEWS:
         lines.insert(0, f"{len(views)} views are too few; take 15 to 30")
-    if calibration.rms > max_rms:
+    if calibration.rms > 1.0:  # Pixels. Sharp images of a flat target give 0.05 to 0.3.
         lines.append(
             f"the reprojection error of {calibration.rms:.2f} pixels is large: is the target flat,"
             " do its squares and markers have the given sizes, and was the focus fixed?"
@@ -112,13 +106,11 @@ def calibration_advice(calibration: Calibration) -> list[str]:
 
 def is_useless(calibration: Calibration) -> bool:
     """Images that this camera model is used for would be misread by pixels."""
-    max_unknown_share = 0.5  # Fraction of the image, or of its parts.
     promise = calibration.promise
     bounds = promise.parts.values()
     parts = sum(not bound <= MAX_KNOWN_ERROR_PX for bound in bounds) / len(bounds)
-    known = (
-        promise.known_to <= MAX_KNOWN_ERROR_PX and max(promise.unknown, parts) < max_unknown_share
-    )
+    # Fraction of the image, or of its parts.
+    known = promise.known_to <= MAX_KNOWN_ERROR_PX and max(promise.unknown, parts) < 0.5
     return not known or calibration.rms > MAX_KNOWN_ERROR_PX
 
 
@@ -139,26 +131,24 @@ class ViewCollector:
     enough: bool = False
     _before: CharucoView | None = None
 
-    def offer(self, frame: Frame) -> tuple[bool, str]:
+    def add_frame(self, frame: Frame) -> tuple[bool, str]:
         """Looks at a frame, and takes it if it is a good, new view.
 
         Returns:
             `(taken, word)`: whether it was taken, and what to tell the one who holds the target.
         """
-        # Fraction of the diagonal between two frames; avoids blur and rolling shutter.
-        max_motion = 0.004
-        # Fraction of the diagonal; a tilt by 25 degrees moves corners as far.
-        min_difference = 0.025
         name = f"view {len(self.views) + 1}"
         view = find_target(frame.image, self.target, name)
         before, self._before = self._before, None if isinstance(view, str) else view
         if isinstance(view, str):
             return False, f"the image {view}"
-        if before is None or corner_displacement(view, before) > max_motion:
+        # Fraction of the diagonal between two frames; avoids blur and rolling shutter.
+        if before is None or corner_displacement(view, before) > 0.004:
             return False, "hold still"
         if view.blur > MAX_VIEW_BLUR * view.side:
             return False, "blurred: add light, or focus"
-        if any(corner_displacement(view, other) < min_difference for other in self.views):
+        # Fraction of the diagonal; a tilt by 25 degrees moves corners as far.
+        if any(corner_displacement(view, other) < 0.025 for other in self.views):
             return False, self.wanted
         self.views.append(view)
         self.wanted, self.enough = self._missing()
@@ -166,8 +156,7 @@ class ViewCollector:
 
     def _missing(self) -> tuple[str, bool]:
         """What view is wanted next, and whether there are enough."""
-        min_views = 5  # Views needed before missing ones can be named.
-        if len(self.views) < min_views:
+        if len(self.views) < 5:  # Views needed before missing ones can be named.
             return "show the target from other sides, tilted by 20 to 45 degrees", False
         try:
             calibration = calibrate_views(self.views, self.target)

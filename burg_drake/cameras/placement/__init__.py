@@ -1,4 +1,5 @@
-"""The placement check: how far each object of a real scene stands from its place.
+"""The placement check: how far each object of a real scene stands from its target.
 
-Read `check` first; it goes from `search`, `candidates` and `alignment` over `localization` to
-`assessment`, looks for objects that are `exchanged` and for `extras`, and ends in a `document`."""
+Read `check` first. It searches objects with `object_search` and `localization`, aligns them with
+`silhouette_aligner` or `depth_aligner`, looks for `misplaced_objects` and writes a `document`.
+"""

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.placement.object_shape import TargetShape
-from burg_drake.cameras.placement.pinhole_view import ImageContour, PinholeView, Window
-from burg_drake.core import Array
+from burg_drake.cameras.placement.pinhole_view import ImageContour, ImageWindow, PinholeView
+from burg_drake.core import Array, Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +35,7 @@ def fit_displacement(
     along: Array,
     offset: Array,
     deviation: Array,
-    groups: NDArray[np.int64],
+    groups: Indices,
     symmetric: bool,
     unit: Array,
     nuisance: Array | None = None,
@@ -84,13 +83,12 @@ def fit_displacement(
 def _solve_robustly(A: Array, b: Array, prior: Array, n: int) -> tuple[Array, Array, float] | None:
     """Solution, weights and scale of `A x = b`; None where its first `n` are not determined."""
     mad_to_sd = 1.4826  # Standard deviation over median absolute deviation of normal errors.
-    max_rounds = 12  # Rounds of reweighting.
     if len(b) < 4 * n:
         return None
     x: Array = np.zeros(A.shape[1])
     scale = max(mad_to_sd * float(np.median(np.abs(b))), 1.0)
     weights: Array = np.ones(len(b))
-    for _ in range(max_rounds):
+    for _ in range(12):  # Rounds of reweighting.
         weights = _tukey_weights((b - A @ x) / scale)
         if weights.sum() < 4 * n:
             return None
@@ -105,8 +103,7 @@ def _solve_robustly(A: Array, b: Array, prior: Array, n: int) -> tuple[Array, Ar
 
 
 def _tukey_weights(residual: Array) -> Array:
-    tukey_limit = 4.685  # Standard deviations; 95 % efficiency on normal errors.
-    r = residual / tukey_limit
+    r = residual / 4.685  # Standard deviations; 95 % efficiency on normal errors.
     return np.where(np.abs(r) < 1.0, (1.0 - r**2) ** 2, 0.0)
 
 
@@ -121,9 +118,8 @@ class Alignment:
         agreement: share of what should be seen that the result agrees with.
         coverage: share of all that was looked at that agrees, also of what cannot tell.
         residual: root mean square that is left of what agrees; pixels, or metres for depth.
-        measurements: number of those that agree.
         ambiguous: another place fits almost as well.
-        turnable: turns from here that fit as well [rad]; see `rotation_ambiguity`.
+        equivalent_turns: turns from here that fit as well [rad]; see `add_rotation_ambiguity`.
     """
 
     q: Array
@@ -132,9 +128,8 @@ class Alignment:
     agreement: float
     coverage: float
     residual: float
-    measurements: int
     ambiguous: bool = False
-    turnable: tuple[float, ...] = ()
+    equivalent_turns: tuple[float, ...] = ()
 
     def spread(self, camera: Array) -> Array:
         """(3, 3) covariance of `q` with the camera's error.
@@ -160,13 +155,13 @@ class Aligner(Protocol):
     with colors."""
     required_gain: float
     """By how much a place far from the target's angle must be rated higher."""
-    clearly: float
+    min_rating_margin: float
     """By how much a place must be rated higher than any other to be sure."""
-    strict: bool
+    checks_depth: bool
     """What stands beside the object speaks against a place."""
     sees_colors: bool
     """The image has colors."""
-    rough: float
+    max_residual: float
     """Root mean square that the alignment of the right object does not leave."""
 
     def align(
@@ -179,21 +174,24 @@ class Aligner(Protocol):
         0.5 for an object without."""
 
     def misfit(
-        self, shape: TargetShape, q: Array, others: Array, window: Window
+        self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
         """What disagrees with an object at a displacement, and its silhouette [raster pixels]."""
 
 
+def wrap_to_pi(angle: float) -> float:
+    """The same angle from -pi to pi [rad]."""
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
 def are_different_places(a: Alignment, b: Alignment) -> bool:
     """Whether two alignments mean different places."""
-    # Metres and radians within which two alignments mean the same place.
-    same_place = (0.003, np.deg2rad(5.0))
-    turn = (a.q[2] - b.q[2] + np.pi) % (2.0 * np.pi) - np.pi
-    return bool(np.hypot(*(a.q - b.q)[:2]) > same_place[0] or abs(turn) > same_place[1])
+    turn = wrap_to_pi(a.q[2] - b.q[2])
+    return bool(np.hypot(*(a.q - b.q)[:2]) > 0.003 or abs(turn) > np.deg2rad(5.0))
 
 
-def outline_sectors(contour: ImageContour) -> NDArray[np.int64]:
+def outline_sectors(contour: ImageContour) -> Indices:
     """(N,) number of the neighbourhood around the outline that each point belongs to."""
-    sector_count = 36  # Neighbouring points of a sector may have correlated errors.
     x, y = (contour.pixels - contour.pixels.mean(axis=0)).T if len(contour) else np.empty((2, 0))
-    return np.floor(np.arctan2(y, x) / (2.0 * np.pi) * sector_count).astype(np.int64)
+    # Neighbouring points of a sector may have correlated errors.
+    return np.floor(np.arctan2(y, x) / (2.0 * np.pi) * 36).astype(np.int64)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core import Array, inverse, srgb_to_linear
+from burg_drake.core import Array, Booleans, Bytes, Single, inverse, srgb_to_linear
 from burg_drake.printout import frame_width
 from burg_drake.scene import Board
 
@@ -33,10 +32,10 @@ class EmptyBoard:
         smear: how far evidence reaches beyond what stands there [pixels].
     """
 
-    color: NDArray[np.float32]
-    sheet: NDArray[np.bool_]
+    color: Single
+    sheet: Booleans
     evidence: Array
-    paper: NDArray[np.float32]
+    paper: Single
     contrast: float
     blur: float
     noise: float
@@ -45,11 +44,11 @@ class EmptyBoard:
 
 def empty_board(
     board: Board,
-    image: NDArray[np.uint8],
+    image: Bytes,
     K: Array,
     X_SC: Array,
     scale: tuple[float, float] = (1.0, 1.0),
-    tints: NDArray[np.uint8] | None = None,
+    tints: Bytes | None = None,
 ) -> EmptyBoard | None:
     """Predicts the empty board.
 
@@ -65,9 +64,6 @@ def empty_board(
     Returns:
         None if there is no contrast of paper and ink in the photo.
     """
-    min_contrast = 0.02  # Difference of paper and ink, as a fraction of full scale.
-    ink_reflectance = 0.06  # Relative to paper, before it is measured in the photo.
-    min_texture = 0.3  # Texture score above which the board is seen.
     size = image.shape[1], image.shape[0]
     light = srgb_to_linear(image)
     H_pixel_S = K @ inverse(X_SC)[:3][:, [0, 1, 3]] @ np.diag([*scale, 1.0])  # of the document
@@ -79,27 +75,31 @@ def empty_board(
     density = sheet.sum() / max(float(np.prod(board.size)), 1e-9)
     cell = max(layout.side / layout.cells * float(np.sqrt(density)), 1.0)
     soft = cv2.GaussianBlur(ink, (0, 0), BLUR_SIGMAS_PX[2])
-    pattern = compare_texture(light, soft, ink_reflectance, cell)
-    levels = _light_levels(light, ink, sheet & (pattern.score > min_texture), p_S)
+    # Relative to paper, before it is measured in the photo.
+    pattern = compare_texture(light, soft, 0.06, cell)
+    seen = sheet & (pattern > 0.3)  # The board's texture is seen.
+    levels = _light_levels(light, ink, seen, p_S)
     if levels is None:
         return None
     white, black = levels
     contrast = float((white[sheet] - white[sheet] * black).mean())
-    if contrast < min_contrast:
+    if contrast < 0.02:  # Difference of paper and ink, as a fraction of full scale.
         return None
-    blur, soft = _estimate_blur(light, ink, sheet & (pattern.score > min_texture), black)
-    seen = sheet & (pattern.score > min_texture)
+    blur, soft = _estimate_blur(light, ink, seen, black)
     printed = 1.0 - (1.0 - tint) * (1.0 - frames[..., None])
     paper = white * (printed if _is_tinted(light, white, printed, seen & (soft < 0.05)) else 1.0)
     color = (paper * (1.0 - soft[..., None] * (1.0 - black))).astype(np.float32)
-    told = EvidenceInputs(light, color, tint, soft, white, float(black.mean()), cell)
-    evidence = np.where(sheet, object_evidence(told), 0.0)
+    stands = np.maximum(
+        _color_evidence(light, tint, white), _brightness_evidence(light, color, white)
+    )
+    unseen = -compare_texture(light, soft, float(black.mean()), cell)
+    evidence = np.where(stands > 0.0, np.maximum(stands, unseen), unseen)
     far = cv2.dilate((soft > 0.01).astype(np.uint8), np.ones((5, 5))) == 0
     noise = _paper_noise(light, seen & far)
     return EmptyBoard(
         color,
         sheet,
-        evidence,
+        np.where(sheet, evidence, 0.0),
         white[sheet].mean(axis=0).astype(np.float32),
         contrast,
         blur,
@@ -108,9 +108,7 @@ def empty_board(
     )
 
 
-def _is_tinted(
-    light: NDArray[np.float32], white: Array, printed: Array, paper: NDArray[np.bool_]
-) -> bool:
+def _is_tinted(light: Single, white: Array, printed: Array, paper: Booleans) -> bool:
     """Whether what may be tinted is so in the photo: whose tones fit better, paper's or tints'."""
     here = paper & (np.ptp(printed, axis=-1) > 0.1)
     if here.sum() < 30:
@@ -123,7 +121,7 @@ def _is_tinted(
     return bool(np.median(off_tint - off) < 0.0)
 
 
-def _paper_noise(light: NDArray[np.float32], paper: NDArray[np.bool_]) -> float:
+def _paper_noise(light: Single, paper: Booleans) -> float:
     """Standard deviation of the photo over paper."""
     if not paper.any():
         return 0.01
@@ -133,7 +131,7 @@ def _paper_noise(light: NDArray[np.float32], paper: NDArray[np.bool_]) -> float:
 
 
 def _light_levels(
-    light: NDArray[np.float32], ink: Array, board: NDArray[np.bool_], p_S: Array
+    light: Single, ink: Array, board: Booleans, p_S: Array
 ) -> tuple[Array, Array] | None:
     """(H, W, 3) light of paper without shadow, and (3,) that of ink over that of paper; None if too
     little is in view.
@@ -144,14 +142,13 @@ def _light_levels(
         board: (H, W) pixels in which the board's pattern is seen.
         p_S: (H, W, 2) place on the sheet.
     """
-    max_samples = 20_000  # Pixels of paper that are used, about.
     flat = board & (cv2.dilate(_ink_edges(ink), np.ones((3, 3))) == 0)
     paper, inked = flat & (ink < 0.01), flat & (ink > 0.99)
     if paper.sum() < 50 or inked.sum() < 20:
         return None
     x, y = p_S[..., 0], p_S[..., 1]
     basis = np.stack([np.ones_like(x), x, y, x * y, x * x, y * y], axis=-1)
-    step = max(1, int(paper.sum()) // max_samples)
+    step = max(1, int(paper.sum()) // 20_000)  # Pixels of paper that are used, about.
     white = _upper_surface(basis, basis[paper][::step], light[paper][::step])
     # light of ink over that of the paper around it, shadow or not
     around = cv2.blur(np.where(paper[..., None], light, np.float32(0.0)), (15, 15))
@@ -193,14 +190,12 @@ def _upper_surface(basis: Array, A: Array, levels: Array) -> Array:
     return np.maximum(basis @ w, 1e-3)[..., None] * tone
 
 
-def _ink_edges(ink: Array) -> NDArray[np.uint8]:
+def _ink_edges(ink: Array) -> Bytes:
     """(H, W) 1 where a pixel is partly ink."""
     return ((ink > 0.01) & (ink < 0.99)).astype(np.uint8)
 
 
-def _estimate_blur(
-    light: NDArray[np.float32], ink: Array, board: NDArray[np.bool_], black: Array
-) -> tuple[float, Array]:
+def _estimate_blur(light: Single, ink: Array, board: Booleans, black: Array) -> tuple[float, Array]:
     """The blur under which the board fits the photo best, and (H, W) the ink under it.
 
     The light at an edge is that of the brightest pixel near it, as shadows may be anywhere.
@@ -221,7 +216,7 @@ def _estimate_blur(
 
 def project_print(
     board: Board, H_pixel_S: Array, size: tuple[int, int]
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Booleans]:
     """(H, W) shares of ink and of markers' white frames in each pixel, and which pixels the sheet
     fills."""
     texels_per_metre = 4000.0  # 22 for a cell of the default markers.
@@ -250,17 +245,10 @@ def project_print(
         target = texture[max(top, 0) : top + n, max(left, 0) : left + n]
         target += patch[: target.shape[0], : target.shape[1]].astype(np.float32)
     # from texels of the sheet, centres at integers, to pixels of a finer photo
-    H_S_texel = (
-        np.array([[1.0, 0.0, 0.5], [0.0, -1.0, rows - 0.5], [0.0, 0.0, texels_per_metre]])
-        / texels_per_metre
-    )
-    H_fine_pixel = np.array(
-        [
-            [oversampling, 0.0, (oversampling - 1) / 2],
-            [0.0, oversampling, (oversampling - 1) / 2],
-            [0.0, 0.0, 1.0],
-        ]
-    )
+    H_S_texel = np.array([[1.0, 0.0, 0.5], [0.0, -1.0, rows - 0.5], [0.0, 0.0, texels_per_metre]])
+    H_S_texel /= texels_per_metre
+    n = oversampling
+    H_fine_pixel = np.array([[n, 0.0, (n - 1) / 2], [0.0, n, (n - 1) / 2], [0.0, 0.0, 1.0]])
     H = H_fine_pixel @ H_pixel_S @ H_S_texel
     fine = (oversampling * size[0], oversampling * size[1])
     ink = cv2.warpPerspective(texture, H, fine, flags=cv2.INTER_LINEAR)
@@ -272,23 +260,17 @@ def project_print(
 
 
 def project_tints(
-    board: Board, tints: NDArray[np.uint8] | None, H_pixel_S: Array, size: tuple[int, int]
-) -> NDArray[np.float32]:
+    board: Board, tints: Bytes | None, H_pixel_S: Array, size: tuple[int, int]
+) -> Single:
     """(H, W, 3) reflectance of what may be tinted, over that of paper."""
     if tints is None:
         return np.ones((*size[::-1], 3), np.float32)
     rows, columns = tints.shape[:2]
     x, y = board.size[0] / columns, board.size[1] / rows
     H_S_texel = np.array([[x, 0, x / 2], [0, -y, board.size[1] - y / 2], [0, 0, 1]])
-    return np.asarray(
-        cv2.warpPerspective(
-            srgb_to_linear(tints),
-            H_pixel_S @ H_S_texel,
-            size,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=(1.0, 1.0, 1.0),
-        )
-    )
+    H = H_pixel_S @ H_S_texel
+    white = (1.0, 1.0, 1.0)
+    return np.asarray(cv2.warpPerspective(srgb_to_linear(tints), H, size, borderValue=white))
 
 
 def _texel_coverage(start: float, step: float, cells: int, n: int) -> Array:
@@ -311,50 +293,13 @@ MIN_WINDOW_SIGMA_PX = 2.0
 """Standard deviation of the neighbourhood, at least, in pixels."""
 
 
-@dataclass(frozen=True, eq=False)
-class EvidenceInputs:
-    """What evidence is taken from.
-
-    Attributes:
-        light: (H, W, 3) of the photo.
-        color: (H, W, 3) of the board without shadow.
-        tint: (H, W, 3) reflectance of what may be tinted, over that of paper.
-        ink: (H, W) share of ink, blurred as the photo is.
-        white: (H, W, 3) light of paper without shadow.
-        black: light of ink over that of paper.
-        cell: side of a marker's cell [pixels].
-    """
-
-    light: NDArray[np.float32]
-    color: NDArray[np.float32]
-    tint: NDArray[np.float32]
-    ink: Array
-    white: Array
-    black: float
-    cell: float
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """Whether the board's pattern is seen.
-
-    Attributes:
-        score: (H, W) 1 where it has its contrast, -1 where there is none, 0 in the middle and where
-            no pattern is expected.
-        weight: (H, W) in [0, 1], how much pattern is expected.
-    """
-
-    score: Array
-    weight: Array
-
-
 def window_sigma(cell: float) -> float:
     """Standard deviation of the neighbourhood for cells of a size [pixels]."""
-    window_cells = 0.8  # Standard deviation of the neighbourhood, in cells.
-    return max(window_cells * cell, MIN_WINDOW_SIGMA_PX)
+    # Standard deviation of the neighbourhood, in cells.
+    return max(0.8 * cell, MIN_WINDOW_SIGMA_PX)
 
 
-def compare_texture(light: NDArray[np.float32], ink: Array, black: float, cell: float) -> Texture:
+def compare_texture(light: Single, ink: Array, black: float, cell: float) -> Array:
     """Compares logarithms of a photo and of the board in neighbourhoods.
 
     Of a photo of the board in any light their covariance is the variance of the board's, and of one
@@ -365,44 +310,44 @@ def compare_texture(light: NDArray[np.float32], ink: Array, black: float, cell: 
         ink: (H, W) share of ink, blurred as the photo is.
         black: light of ink over that of paper.
         cell: side of a marker's cell [pixels].
+
+    Returns:
+        (H, W) 1 where the board's pattern has its contrast, -1 where there is none, 0 in the
+        middle and where no pattern is expected.
     """
     dark_offset = 0.02  # Fraction of paper's light added before the logarithm, against noise.
-    full_variance = 0.25  # Log variance of the pattern with full weight; that of a marker is 2.
     sigma = window_sigma(cell)
     grey = light.mean(axis=-1)
-    # what paper gives around here, so that `FAINT` is the same share in shade and sun
+    # what paper gives around here, so that the offset is the same share in shade and sun
     local = cv2.GaussianBlur(cv2.dilate(grey, np.ones((5, 5))), (0, 0), 2.0 * sigma)
     seen = np.log(grey / np.maximum(local, 1e-4) + dark_offset).astype(np.float32)
     known = np.log(1.0 - (1.0 - black) * ink + dark_offset).astype(np.float32)
 
-    def around(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    def around(values: Single) -> Single:
         return np.asarray(cv2.GaussianBlur(values, (0, 0), sigma))
 
     mean_seen, mean_known = around(seen), around(known)
     variance = around(known * known) - mean_known**2
     covariance = around(seen * known) - mean_seen * mean_known
     score = np.clip(2.0 * covariance / np.maximum(variance, 1e-3) - 1.0, -1.0, 1.0)
-    weight = np.clip(variance / full_variance, 0.0, 1.0)
-    return Texture(score * weight, weight)
-
-
-def object_evidence(told: EvidenceInputs) -> Array:
-    """(H, W) from +1, where something stands, to -1, where the board is seen."""
-    pattern = compare_texture(told.light, told.ink, told.black, told.cell)
-    stands = np.maximum(_color_evidence(told), _brightness_evidence(told))
-    return np.where(stands > 0.0, np.maximum(stands, -pattern.score), -pattern.score)
+    # Log variance of the pattern with full weight; that of a marker is 2.
+    weight = np.clip(variance / 0.25, 0.0, 1.0)
+    return np.asarray(score * weight)
 
 
 def _ramp(values: Array, limits: tuple[float, float]) -> Array:
     return np.clip((values - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
 
 
-def _color_evidence(told: EvidenceInputs) -> Array:
-    """(H, W) 0 where grey light on paper, ink and tint, mixed as they like, explains the color."""
-    color_limits = (0.10, 0.22)  # Unexplained fraction of the light with no and with full evidence.
-    light = cv2.GaussianBlur(told.light, (0, 0), 0.8)
-    r = light / told.white.astype(np.float32)
-    tone = told.tint
+def _color_evidence(light: Single, tone: Single, white: Array) -> Array:
+    """(H, W) 0 where grey light on paper, ink and tint, mixed as they like, explains the color.
+
+    Args:
+        light: (H, W, 3) of the photo.
+        tone: (H, W, 3) reflectance of what may be tinted, over that of paper.
+        white: (H, W, 3) light of paper without shadow.
+    """
+    r = cv2.GaussianBlur(light, (0, 0), 0.8) / white.astype(np.float32)
     grey = np.float32(1.0 / np.sqrt(3.0))
     along = r.sum(axis=-1) * grey
     # the part of the tint that is not grey
@@ -415,13 +360,13 @@ def _color_evidence(told: EvidenceInputs) -> Array:
     share = np.minimum(share, most)
     left = r - along[..., None] * grey - share[..., None] * across
     off = np.sqrt((left**2).sum(axis=-1))
-    # in the dark, colors are noise and stray light
-    return _ramp(off / (along + 0.06), color_limits)
+    # Unexplained part of the light; in the dark, colors are noise and stray light.
+    return _ramp(off / (along + 0.06), (0.10, 0.22))
 
 
-def _brightness_evidence(told: EvidenceInputs) -> Array:
-    """(H, W) 0 where the board could be as bright; tolerates a pixel of misalignment."""
-    light_limits = (1.15, 1.45)  # Light over that of the board with no and with full evidence.
-    most = cv2.dilate(told.color.mean(axis=-1), np.ones((3, 3)))
-    # next to a bright pixel an edge's blur is not exact
-    return _ramp(told.light.mean(axis=-1) / (most + 0.03 * told.white.mean(axis=-1)), light_limits)
+def _brightness_evidence(light: Single, color: Single, white: Array) -> Array:
+    """(H, W) 0 where the board of a color (H, W, 3) could be as bright as the light; tolerates a
+    pixel of misalignment."""
+    most = cv2.dilate(color.mean(axis=-1), np.ones((3, 3)))
+    # Light over that of the board; next to a bright pixel an edge's blur is not exact
+    return _ramp(light.mean(axis=-1) / (most + 0.03 * white.mean(axis=-1)), (1.15, 1.45))

@@ -14,10 +14,9 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment import Aligner
+from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
 from burg_drake.cameras.placement.board_background import empty_board
 from burg_drake.cameras.placement.depth_aligner import DepthAligner, check_depth
 from burg_drake.cameras.placement.document import (
@@ -30,7 +29,11 @@ from burg_drake.cameras.placement.document import (
     PlacementStatus,
     camera_versions,
 )
-from burg_drake.cameras.placement.localization import MIN_OBJECT_SUPPORT, Located, locate_objects
+from burg_drake.cameras.placement.localization import (
+    MIN_OBJECT_SUPPORT,
+    ObjectLocation,
+    locate_objects,
+)
 from burg_drake.cameras.placement.misplaced_objects import (
     find_exchanged_objects,
     find_extra_objects,
@@ -41,9 +44,21 @@ from burg_drake.cameras.placement.pinhole_view import PinholeView
 from burg_drake.cameras.placement.silhouette_aligner import SilhouetteAligner
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.cameras.pose.board_pose import BoardPose
-from burg_drake.core import Array, InvalidInputError, Pose, Vector3, content_hash
+from burg_drake.core import (
+    Array,
+    Booleans,
+    Bytes,
+    InvalidInputError,
+    Pose,
+    Single,
+    Vector3,
+    content_hash,
+)
 from burg_drake.printout import height_map
 from burg_drake.scene import Scene, SceneLike, as_scene
+
+MIN_ABSENCE_VISIBILITY = 0.2  # Visible fraction of the silhouette needed to call an object absent.
+MIN_VISIBILITY = 0.4  # Visible fraction needed for a certain measurement.
 
 
 class Undistortion:
@@ -66,40 +81,24 @@ class Undistortion:
             at = intrinsics.project(rays).astype(np.float32)
             self._map = at[..., 0].copy(), at[..., 1].copy()
 
-    def color(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def color(self, image: Bytes) -> Bytes:
         """(H, W, 3); black beyond the given image."""
         if self._map is None:
             return image
         return np.asarray(cv2.remap(image, *self._map, cv2.INTER_CUBIC))
 
-    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    def depth(self, depth: Single) -> Single:
         """(H, W); of the nearest pixel, as distances across an edge have no mean; 0 beyond."""
         if self._map is None:
             return depth
         return np.asarray(cv2.remap(depth, *self._map, cv2.INTER_NEAREST))
 
 
-class PlacementThresholds:
-    """Placement thresholds."""
-
-    # Visible fraction of the silhouette needed to call an object absent.
-    min_absence_visibility = 0.2
-    min_visibility = 0.4  # Visible fraction needed for a certain measurement.
-    min_agreement = 0.6  # Fraction of the outline, or of the depth points, that must fit.
-    min_camouflaged_agreement = 0.85  # The same for objects as dark as ink or as bright as paper.
-    min_support = 0.45  # Mean evidence in the silhouette.
-    max_spill = 0.35  # Fraction around the silhouette with evidence of something else.
-    min_median_likeness = 0.6  # Median colour likeness at which mesh colours are reliable.
-    min_likeness_ratio = 0.4  # Colour likeness over its median.
-    max_angle_sd = np.deg2rad(3.0)  # Radians.
-    max_displacement_sd = 0.003  # Metres.
-
-
 def assess_placement(
     scene: Scene,
     name: str,
     shape: TargetShape,
-    found: Located,
+    found: ObjectLocation,
     camera: Array,
     rough: float,
     typical: float,
@@ -124,7 +123,6 @@ def assess_placement(
     reason = _doubt_reason(shape, found, deviation, rough, typical)
     status: PlacementStatus = "uncertain" if reason else "measured"
     residual = alignment.residual
-    angle = float((q[2] + np.pi) % (2.0 * np.pi) - np.pi)
     return Placement(
         object=scene.instance(name).object,
         status=status,
@@ -134,20 +132,16 @@ def assess_placement(
         reference=cast(Vector3, tuple(np.round(shape.p_OR, 9).tolist())),
         displacement=(float(q[0]), float(q[1])),
         displacement_sd=(float(deviation[0]), float(deviation[1])),
-        angle=None if shape.symmetric else angle,
+        angle=None if shape.symmetric else wrap_to_pi(q[2]),
         angle_sd=None if shape.symmetric else float(deviation[2]),
         seen=round(found.seen, 4),
         residual=float(residual) if np.isfinite(residual) else None,
     )
 
 
-def typical_likeness(located: Iterable[Located]) -> float:
+def typical_likeness(located: Iterable[ObjectLocation]) -> float:
     """Median likeness of the objects that were found; 0 of fewer than three."""
-    likeness = [
-        f.likeness
-        for f in located
-        if f.alignment is not None and f.seen > PlacementThresholds.min_visibility
-    ]
+    likeness = [f.likeness for f in located if f.alignment is not None and f.seen > MIN_VISIBILITY]
     return float(np.median(likeness)) if len(likeness) > 2 else 0.0
 
 
@@ -163,11 +157,11 @@ def unseen_placement(scene: Scene, name: str, reason: str, seen: float = 0.0) ->
     )
 
 
-def _missing_reason(found: Located) -> str:
+def _missing_reason(found: ObjectLocation) -> str:
     """Why an object is not seen; empty if it is."""
-    if found.in_image < PlacementThresholds.min_absence_visibility:
+    if found.in_image < MIN_ABSENCE_VISIBILITY:
         return "it is out of view"
-    if found.seen < PlacementThresholds.min_absence_visibility:
+    if found.seen < MIN_ABSENCE_VISIBILITY:
         return "other objects hide it"
     if found.alignment is None or found.support < MIN_OBJECT_SUPPORT:
         return f"nothing like it was found within {1e3 * SEARCH_RANGE:.0f} mm of its target"
@@ -175,20 +169,18 @@ def _missing_reason(found: Located) -> str:
 
 
 def _doubt_reason(
-    shape: TargetShape, found: Located, deviation: Array, rough: float, typical: float
+    shape: TargetShape, found: ObjectLocation, deviation: Array, rough: float, typical: float
 ) -> str:
     """What is doubtful about a measurement; empty if nothing is."""
     alignment = found.alignment
     assert alignment is not None
-    if alignment.agreement < PlacementThresholds.min_agreement:
+    if alignment.agreement < 0.6:  # Fraction of the outline, or of the depth points, that must fit.
         return (
             f"only {100 * alignment.agreement:.0f} % of its outline match the image: is it another"
             " object, or in another pose?"
         )
-    if (
-        found.support < PlacementThresholds.min_support
-        and alignment.agreement < PlacementThresholds.min_camouflaged_agreement
-    ):
+    # Objects as dark as ink or as bright as paper have little support, but an outline that agrees.
+    if found.support < 0.45 and alignment.agreement < 0.85:
         return (
             "the board is visible where the object should cover it: is it another object, or in"
             " another pose?"
@@ -197,34 +189,31 @@ def _doubt_reason(
         return (
             "its outline does not quite match the image: is it another object, or in another pose?"
         )
-    if (
-        shape.colors is not None
-        and found.likeness < PlacementThresholds.min_likeness_ratio * typical
-        and typical > PlacementThresholds.min_median_likeness
-    ):
+    # Colors of meshes can be relied on if most objects of the scene look like theirs.
+    if shape.colors is not None and found.likeness < 0.4 * typical and typical > 0.6:
         return "it does not have the colors of its mesh: is it another object?"
-    if found.spill > PlacementThresholds.max_spill:
+    if found.spill > 0.35:  # Fraction around the silhouette with evidence of something else.
         return "something sticks out next to it: is it another object, or in another pose?"
     if alignment.ambiguous:
         return "another pose fits almost as well"
-    if alignment.turnable:
-        turn = np.rad2deg(max(alignment.turnable, key=abs))
+    if alignment.equivalent_turns:
+        turn = np.rad2deg(max(alignment.equivalent_turns, key=abs))
         return f"it fits as well when rotated by another {turn:+.0f} deg"
-    if found.seen < PlacementThresholds.min_visibility:
+    if found.seen < MIN_VISIBILITY:
         return f"only {100 * found.seen:.0f} % of it can be seen"
-    if deviation[:2].max() > PlacementThresholds.max_displacement_sd:
+    if deviation[:2].max() > 0.003:  # Metres.
         return f"its position is only known to {1e3 * deviation[:2].max():.1f} mm"
-    if not shape.symmetric and deviation[2] > PlacementThresholds.max_angle_sd:
+    if not shape.symmetric and deviation[2] > np.deg2rad(3.0):  # Radians.
         return f"its rotation is only known to {np.rad2deg(deviation[2]):.0f} deg"
     return ""
 
 
 def check_placement(
     scene: SceneLike,
-    image: NDArray[np.uint8],
+    image: Bytes,
     intrinsics: Intrinsics,
     *,
-    depth: NDArray[np.float32] | None = None,
+    depth: Single | None = None,
     estimate: BoardEstimate | None = None,
     scale: tuple[float, float] = (1.0, 1.0),
     image_source: CheckedImage | None = None,
@@ -264,7 +253,9 @@ def check_placement(
         estimate = BoardPose(scene.board, intrinsics, scale).estimate(color)
     instances, extra, reason = _measure_objects(scene, color, depth, intrinsics, estimate, scale)
     return PlacementCheck(
-        scene=_checked_scene(scene),
+        scene=CheckedScene(
+            name=scene.name, path=str(Path(scene.path).absolute()), content=scene.content
+        ),
         taken=datetime.now().astimezone().isoformat(timespec="seconds"),
         method="silhouette" if depth is None else "depth",
         image=image_source or CheckedImage(content=content_hash(color)),
@@ -278,15 +269,10 @@ def check_placement(
     )
 
 
-def _checked_scene(scene: Scene) -> CheckedScene:
-    path = Path(scene.path).absolute()
-    return CheckedScene(name=scene.name, path=str(path), content=scene.content)
-
-
 def _measure_objects(
     scene: Scene,
-    color: NDArray[np.uint8],
-    depth: NDArray[np.float32] | None,
+    color: Bytes,
+    depth: Single | None,
     intrinsics: Intrinsics,
     estimate: BoardEstimate,
     scale: tuple[float, float],
@@ -301,7 +287,7 @@ def _measure_objects(
     typical = typical_likeness(located.values())
     placements = {
         name: assess_placement(
-            scene, name, shapes[name], found, estimate.covariance, aligner.rough, typical
+            scene, name, shapes[name], found, estimate.covariance, aligner.max_residual, typical
         )
         for name, found in located.items()
     }
@@ -316,37 +302,26 @@ def _measure_objects(
     placed += [where for _, where in stands.values()]
     extra = find_extra_objects(aligner, placed, [shapes[name].p_SR for name in empty])
     for name in {*stands, *elsewhere}:
-        reason = _exchange_reason(
-            name, stands[name][0] if name in stands else "", elsewhere.get(name, "")
-        )
+        instead, place = stands[name][0] if name in stands else "", elsewhere.get(name, "")
+        if instead and place:
+            reason = f"{instead} stands in its place, and {name} where {place} belongs"
+        else:
+            reason = (
+                f"{instead} stands in its place" if instead else f"it stands where {place} belongs"
+            )
         placements[name] = unseen_placement(scene, name, reason, located[name].seen)
     return placements, extra, ""
 
 
-def _exchange_reason(name: str, instead: str, place: str) -> str:
-    """Why an object is not where it belongs, when others' places are mixed up with it.
-
-    Args:
-        name: of the object.
-        instead: what stands in its place; empty if that is not known.
-        place: in whose place it stands; empty if that is not known.
-    """
-    if instead and place:
-        return f"{instead} stands in its place, and {name} where {place} belongs"
-    return f"{instead} stands in its place" if instead else f"it stands where {place} belongs"
-
-
 def _build_aligner(
     scene: Scene,
-    color: NDArray[np.uint8],
-    depth: NDArray[np.float32] | None,
+    color: Bytes,
+    depth: Single | None,
     intrinsics: Intrinsics,
     estimate: BoardEstimate,
     scale: tuple[float, float],
 ) -> Aligner | str:
     """What objects are aligned by; or why nothing can be measured."""
-    # Reason if the photo cannot be measured.
-    no_contrast = "the board's paper and ink look alike in the photo; give it more light"
     if not estimate.valid:
         return f"the board was not found: {estimate.reason}" if estimate.reason else "no board"
     size = intrinsics.width, intrinsics.height
@@ -355,26 +330,26 @@ def _build_aligner(
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
     image = straight.color(color)
-    picture = empty_board(
-        scene.board, image, intrinsics.K, estimate.X_SC, scale, _height_map_tints(scene)
-    )
-    return no_contrast if picture is None else SilhouetteAligner(view, image, picture)
+    tints = _height_map_tints(scene)
+    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale, tints)
+    if picture is None:
+        return "the board's paper and ink look alike in the photo; give it more light"
+    return SilhouetteAligner(view, image, picture)
 
 
 @lru_cache(maxsize=4)
-def _height_map_tints(scene: Scene) -> NDArray[np.uint8]:
+def _height_map_tints(scene: Scene) -> Bytes:
     """(R, C, 3) the height map that may be printed on the sheet."""
-    pixel_size = 1e-3  # Metres. Resolution of the printed height map.
-    return height_map(scene, pixel_size).image
+    return height_map(scene, 1e-3).image  # Metres. Resolution of the printed height map.
 
 
-def _blind_pixels(straight: Undistortion, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _blind_pixels(straight: Undistortion, size: tuple[int, int]) -> Booleans:
     """(H, W) pixels of a straight image that are beyond the given one, or next to these."""
     beyond = straight.depth(np.ones(size[::-1], np.float32)) == 0.0
     return np.asarray(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)
 
 
-def _checked_image(image: NDArray[np.uint8], intrinsics: Intrinsics) -> NDArray[np.uint8]:
+def _checked_image(image: Bytes, intrinsics: Intrinsics) -> Bytes:
     """(H, W, 3) RGB."""
     image = np.asarray(image)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4):

@@ -21,25 +21,24 @@ from burg_drake.cameras.placement.alignment import (
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import (
     ImageContour,
+    ImageWindow,
     PinholeView,
-    Window,
     sample_nearest,
     visible_outline,
     window_slices,
 )
-from burg_drake.core import Array, InvalidInputError, inverse, transform_points
+from burg_drake.core import Array, Booleans, InvalidInputError, Single, inverse, transform_points
 
 MIN_HEIGHT_SIGMAS = 4.0
 """Noise standard deviations above the board at which an object is present."""
 
 
-def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> NDArray[np.float32]:
+def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> Single:
     """(H, W) float32 in metres, 0 where there is nothing.
 
     Raises:
         InvalidInputError: another size than the intrinsics', or another unit.
     """
-    max_median_depth = 20.0  # Metres. Larger medians mean that the unit is wrong.
     depth = np.asarray(depth)
     if depth.ndim != 2 or depth.dtype.kind not in "fui":
         raise InvalidInputError(
@@ -51,7 +50,7 @@ def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> NDArray[np.float
     if not clean.any():
         raise InvalidInputError("the depth image is empty: no pixel has a depth above 0")
     middle = float(np.median(clean[clean > 0]))
-    if middle > max_median_depth:
+    if middle > 20.0:  # Metres. Larger medians mean that the unit is wrong.
         raise InvalidInputError(
             f"the median of the depth image is {middle:g} m; give metres (is it in millimetres?)"
         )
@@ -64,18 +63,16 @@ class DepthAligner:
     Args:
         view: its camera.
         depth: (H, W) without lens distortion [m]; 0 where there is nothing.
+
+    Attributes:
+        noise_sd: standard deviation of the heights of what lies on the board [m].
     """
 
-    def __init__(self, view: PinholeView, depth: NDArray[np.float32]) -> None:
+    def __init__(self, view: PinholeView, depth: Single) -> None:
         min_noise = 5e-4  # Metres.
-        max_residual = 0.005  # Metres. Fits of the right object leave less.
         self.view = view
-        self.convincing_rating, self.required_gain, self.clearly, self.strict = (
-            2.94,
-            0.02,
-            0.03,
-            True,
-        )
+        self.convincing_rating, self.required_gain = 2.94, 0.02
+        self.min_rating_margin, self.checks_depth = 0.03, True
         self._depth = depth.astype(float)
         u, v = np.meshgrid(np.arange(view.size[0]), np.arange(view.size[1]))
         fx, fy, cx, cy = view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]
@@ -86,10 +83,11 @@ class DepthAligner:
         height = self._p_SQ[..., 2]
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
         spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * min_noise
-        self._noise = max(spread, min_noise)
-        self.residual_floor, self.rough = self._noise, max_residual
-        self._stands = self._valid & (height > MIN_HEIGHT_SIGMAS * self._noise)
-        evidence = np.clip(height / (MIN_HEIGHT_SIGMAS * self._noise), 0.0, 1.0) * 2.0 - 1.0
+        self.noise_sd = max(spread, min_noise)
+        # Metres. Fits of the right object leave less.
+        self.residual_floor, self.max_residual = self.noise_sd, 0.005
+        self._stands = self._valid & (height > MIN_HEIGHT_SIGMAS * self.noise_sd)
+        evidence = np.clip(height / (MIN_HEIGHT_SIGMAS * self.noise_sd), 0.0, 1.0) * 2.0 - 1.0
         self.sees_colors, self.smear = False, 0.0
         self.evidence = np.where(self._valid, evidence, 0.0)
 
@@ -99,10 +97,8 @@ class DepthAligner:
         """Aligns an object; see `SilhouetteAligner.align`."""
         # Metres from the surface within which points belong to it, round by round.
         max_distances = (0.03, 0.02, 0.014, 0.01, 0.008, 0.006)
-        max_rounds = 14  # Iterations of matching and solving.
-        min_step = 2e-5  # Metres. Smaller steps end the rounds.
         start, best = q, None
-        for number in range(max_rounds):
+        for number in range(14):  # Iterations of matching and solving.
             limit = max_distances[min(number, len(max_distances) - 1)] if far else max_distances[-1]
             found = _DepthMeasurements(self, shape, q, others, limit)
             solved = found.solve(turn)
@@ -110,7 +106,8 @@ class DepthAligner:
                 return None
             q = q + np.clip(solved.step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
             best = found, solved
-            if limit == max_distances[-1] and np.abs(solved.step[:2]).max() < min_step:
+            # Metres. Smaller steps end the rounds.
+            if limit == max_distances[-1] and np.abs(solved.step[:2]).max() < 2e-5:
                 break
         assert best is not None
         return best[0].result(q, best[1])
@@ -120,7 +117,7 @@ class DepthAligner:
         return 0.0
 
     def misfit(
-        self, shape: TargetShape, q: Array, others: Array, window: Window
+        self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
         """See `SilhouetteAligner.misfit`: distances that the object or the empty board has not."""
         surface_tolerance = 4e-3  # Metres beyond noise within which a pixel belongs to the surface.
@@ -128,29 +125,24 @@ class DepthAligner:
         own = self.view.cast(shape, q, at)
         seen, hides = sample_nearest(self._depth, at, 0.0), sample_nearest(others, at, 0.0)
         covered = np.isfinite(own)
-        off = (
-            np.abs(seen - np.where(covered, own, 0.0))
-            > MIN_HEIGHT_SIGMAS * self._noise + surface_tolerance
-        )
+        tolerance = MIN_HEIGHT_SIGMAS * self.noise_sd + surface_tolerance
+        off = np.abs(seen - np.where(covered, own, 0.0)) > tolerance
         wrong = np.where(covered, off, sample_nearest(self._stands, at, 0.0) > 0.0)
         # nothing can be said where another object is, unless this one stands clearly before it
         free = np.isinf(hides) | (covered & (hides > own + surface_tolerance))
         wrong &= (seen > 0.0) & free
         return float(wrong.sum()), float(covered.sum())
 
-    def points(
-        self, shape: TargetShape, q: Array, others: Array
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def points(self, shape: TargetShape, q: Array, others: Array) -> tuple[Array, Booleans]:
         """Points (N, 3) in S that stand near to a displaced object and belong to no other, and
         which (N,) of them its silhouette covers."""
-        max_points = 4000  # Points that are used, about.
         window = self.view.window(shape, q, 12.0)
         part = window_slices(window)
         free = self._stands[part] & ~(np.abs(others[part] - self._depth[part]) < 0.01)
         free &= ~(others[part] < self._depth[part])
         covered = np.isfinite(self.view.buffer(shape, q, window))
         p_SQ, inside = self._p_SQ[part][free], covered[free]
-        step = max(1, len(p_SQ) // max_points)
+        step = max(1, len(p_SQ) // 4000)  # Points that are used, about.
         return p_SQ[::step], inside[::step]
 
     def expected(self, shape: TargetShape, q: Array, others: Array) -> float:
@@ -160,12 +152,7 @@ class DepthAligner:
         mask = (self.view.buffer(shape, q, window) < others[part]) & self._valid[part]
         return float(self._stands[part][mask].mean()) if mask.any() else 0.0
 
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the heights of what lies on the board [m]."""
-        return self._noise
-
-    def edges(self, contour: ImageContour, others: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def edges(self, contour: ImageContour, others: Array) -> tuple[Array, Booleans]:
         """Where on the normals of an outline (N,) the depth falls off [pixels], and where it does.
 
         Only a fall from the outline's own depth to something clearly farther counts.
@@ -192,8 +179,7 @@ class _DepthMeasurements:
     def __init__(
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array, limit: float
     ) -> None:
-        model_sd = 5e-4  # Metres. Error of a surface point besides noise.
-        self._shape, self._noise = shape, aligner.noise
+        self._shape, self._noise = shape, aligner.noise_sd
         self._share = aligner.expected(shape, q, others)
         X_SS = shape.displacement(q)
         points, covered = aligner.points(shape, q, others)
@@ -216,12 +202,12 @@ class _DepthMeasurements:
         arm = on_surface - shape.p_SR - (q[0], q[1], 0.0)
         turn = arm[:, 0] * n[:, 1] - arm[:, 1] * n[:, 0]
         self._along = np.column_stack([n[:, 0], n[:, 1], turn])
-        ray = (p - aligner.view.X_SC[:3, 3]) / np.maximum(
-            np.linalg.norm(p - aligner.view.X_SC[:3, 3], axis=1), 1e-9
-        )[:, None]
+        ray = p - aligner.view.X_SC[:3, 3]
+        self._camera = np.concatenate([np.cross(ray, n), n], axis=1)
+        ray = ray / np.maximum(np.linalg.norm(ray, axis=1), 1e-9)[:, None]
         slant = np.abs(np.einsum("ni,ni->n", n, ray))
-        self._deviation = np.hypot(model_sd, aligner.noise * slant)
-        self._camera = np.concatenate([np.cross(p - aligner.view.X_SC[:3, 3], n), n], axis=1)
+        # Metres. Error of a surface point besides noise.
+        self._deviation = np.hypot(5e-4, aligner.noise_sd * slant)
         height = np.clip((moved[close][:, 2] / 0.02).astype(int), 0, 20)
         around = np.arctan2(*(moved[close] - shape.p_SR)[:, 1::-1].T) / (2.0 * np.pi) * 24
         self._groups = np.floor(around).astype(np.int64) * 32 + height
@@ -231,7 +217,6 @@ class _DepthMeasurements:
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array
     ) -> None:
         """Measurements of the outline, in metres at the object, after those of the surface."""
-        outline_sd = 0.6  # Pixels. Quantization (0.29) and smeared edges.
         contour = visible_outline(aligner.view, shape, q, others)
         offset, falls = aligner.edges(contour, others)
         p_CQ, _ = aligner.view.project(contour.p_SQ[falls])
@@ -240,7 +225,8 @@ class _DepthMeasurements:
         self._offset = np.concatenate([self._offset, offset[falls] * pixel])
         self._along = np.concatenate([self._along, contour.along[falls] * pixel[:, None]])
         self._camera = np.concatenate([self._camera, -contour.camera[falls] * pixel[:, None]])
-        self._deviation = np.concatenate([self._deviation, outline_sd * pixel])
+        # Pixels. Quantization (0.29) and smeared edges.
+        self._deviation = np.concatenate([self._deviation, 0.6 * pixel])
         self._groups = np.concatenate([self._groups, 100_000 + outline_sectors(contour)[falls]])
 
     def solve(self, turn: bool) -> DisplacementFit | None:
@@ -249,13 +235,9 @@ class _DepthMeasurements:
             return None
         reach = float(np.linalg.norm(np.ptp(self._shape.p_SV[:, :2], axis=0))) / 2
         unit = np.array([1e-3, 1e-3, 1e-3 / reach])
+        symmetric = self._shape.symmetric or not turn
         return fit_displacement(
-            self._along,
-            self._offset,
-            self._deviation,
-            self._groups,
-            self._shape.symmetric or not turn,
-            unit,
+            self._along, self._offset, self._deviation, self._groups, symmetric, unit
         )
 
     def result(self, q: Array, solved: DisplacementFit) -> Alignment:
@@ -270,5 +252,4 @@ class _DepthMeasurements:
             float(share),
             float(share),
             float(np.sqrt(np.mean(left[fits] ** 2))) if fits.any() else float("nan"),
-            int(fits.sum()),
         )

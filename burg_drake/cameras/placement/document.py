@@ -168,20 +168,19 @@ class PlacementCheck:
 
 
 def load_placement(path: str | Path) -> PlacementCheck:
-    """Reads a placement file; see `core.documents.load_document`."""
+    """Reads a placement file; see `load_document`."""
     return load_document(path, PlacementCheck)
 
 
 def save_placement(check: PlacementCheck, path: str | Path) -> None:
-    """Writes a placement file; see `core.documents.save_document`.
+    """Writes a placement file; see `save_document`.
 
     The scene's path in it starts at the file's folder, so that both can move together.
     """
     scene = check.scene
     if scene.path and Path(scene.path).is_absolute():
-        scene = replace(
-            scene, path=_scene_reference(Path(scene.path), Path(path).absolute().parent)
-        )
+        reference = _scene_reference(Path(scene.path), Path(path).absolute().parent)
+        scene = replace(scene, path=reference)
     check = replace(check, scene=scene)
     save_document(check, path, "Placement check: lengths in m, angles in rad, frame S of the board")
 
@@ -249,9 +248,9 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
 
 
 def _combine_placements(placements: list[Placement]) -> Placement:
-    min_visibility = 0.5  # Visible fraction for which an object's absence counts.
     found = _mean_placement(placements)
-    gone = [p for p in placements if p.status == "not_seen" and p.seen >= min_visibility]
+    # Visible fraction for which an object's absence counts.
+    gone = [p for p in placements if p.status == "not_seen" and p.seen >= 0.5]
     if found.status != "measured" or not gone:
         return found
     shown = f"{len(gone)} of {len(placements)} photos show"
@@ -261,7 +260,6 @@ def _combine_placements(placements: list[Placement]) -> Placement:
 
 
 def _mean_placement(placements: list[Placement]) -> Placement:
-    max_sigmas = 4.0  # A photo farther from the mean of all contradicts it.
     measured = [p for p in placements if p.status == "measured"]
     if len(measured) < 2:
         return max(placements, key=_information_rank)
@@ -272,7 +270,8 @@ def _mean_placement(placements: list[Placement]) -> Placement:
     mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
     mean_sd = weight.sum(axis=0) ** -0.5
     off = np.abs(values - mean)
-    contradicts = bool((off > max_sigmas * np.sqrt(np.maximum(sd**2 - mean_sd**2, 1e-18))).any())
+    # A photo farther from the mean of all contradicts it.
+    contradicts = bool((off > 4.0 * np.sqrt(np.maximum(sd**2 - mean_sd**2, 1e-18))).any())
     if contradicts:
         mean_sd = np.maximum(mean_sd, off.max(axis=0))
     best = max(measured, key=_information_rank)
@@ -306,11 +305,8 @@ def _displacement_and_sd(placement: Placement) -> tuple[tuple[float, ...], tuple
     """x, y [m] and angle [rad], and their standard deviations; angle 0 ± 1 where there is none."""
     assert placement.displacement is not None
     assert placement.displacement_sd is not None
-    angle, sd = placement.angle, placement.angle_sd
-    return (
-        (*placement.displacement, angle or 0.0),
-        (*placement.displacement_sd, 1.0 if sd is None else sd),
-    )
+    sd = 1.0 if placement.angle_sd is None else placement.angle_sd
+    return (*placement.displacement, placement.angle or 0.0), (*placement.displacement_sd, sd)
 
 
 def _displaced_pose(placement: Placement, q: Array) -> Pose:
@@ -324,23 +320,19 @@ def _displaced_pose(placement: Placement, q: Array) -> Pose:
 
 def _merge_extra_objects(extra: list[ExtraObject], photos: int) -> tuple[ExtraObject, ...]:
     """Extra objects that half of the photos show, each once."""
-    merge_distance = 0.05  # Metres within which extra objects are one.
     groups: list[list[ExtraObject]] = []
     for one in extra:
-        near = (
-            g
-            for g in groups
-            if np.hypot(*np.subtract(one.position, g[0].position)) < merge_distance
-        )
+        # Metres within which extra objects are one.
+        near = (g for g in groups if np.hypot(*np.subtract(one.position, g[0].position)) < 0.05)
         group = next(near, None)
         if group is None:
             groups.append([one])
         else:
             group.append(one)
-    return tuple(_merge_group(group) for group in groups if 2 * len(group) >= photos)
-
-
-def _merge_group(group: list[ExtraObject]) -> ExtraObject:
-    x, y = np.mean([e.position for e in group], axis=0)
-    position = round(float(x), 4), round(float(y), 4)
-    return ExtraObject(position=position, width=max(e.width for e in group))
+    merged = []
+    for group in groups:
+        if 2 * len(group) >= photos:
+            x, y = np.mean([e.position for e in group], axis=0)
+            position = round(float(x), 4), round(float(y), 4)
+            merged.append(ExtraObject(position=position, width=max(e.width for e in group)))
+    return tuple(merged)

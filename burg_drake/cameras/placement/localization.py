@@ -7,15 +7,19 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement.alignment import Aligner, Alignment, are_different_places
+from burg_drake.cameras.placement.alignment import (
+    Aligner,
+    Alignment,
+    are_different_places,
+    wrap_to_pi,
+)
 from burg_drake.cameras.placement.object_search import (
-    Placed,
     SilhouetteSearch,
     assign_candidates,
     silhouette_support,
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
-from burg_drake.cameras.placement.pinhole_view import PinholeView, Window, window_slices
+from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
 from burg_drake.core import Array
 
 LARGE_TURN = np.deg2rad(40.0)
@@ -25,7 +29,7 @@ MIN_OBJECT_SUPPORT = 0.35
 
 
 @dataclass(frozen=True, eq=False)
-class Located:
+class ObjectLocation:
     """What became of one object.
 
     Attributes:
@@ -47,24 +51,22 @@ class Located:
     likeness: float
 
 
-def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str, Located]:
+def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str, ObjectLocation]:
     """Finds and aligns the objects of a scene.
 
     Args:
         aligner: of the image.
         shapes: the objects by name.
     """
-    min_agreement = 0.7  # Objects with less are searched again once the others are placed.
     q = assign_candidates(aligner, shapes, {})
     aligned: dict[str, Alignment] = {}
     _align_objects(aligner, shapes, q, aligned, list(q), far=True)
     # one that took another's place left that one without, and itself fits badly
-    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < min_agreement]
+    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < 0.7]
     if weak:
         before = {name: (aligned.pop(name), q.pop(name)) for name in weak if name in aligned}
-        found = assign_candidates(
-            aligner, {name: shapes[name] for name in weak}, _placed_shapes(shapes, aligned)
-        )
+        placed = {name: (shapes[name], alignment.q) for name, alignment in aligned.items()}
+        found = assign_candidates(aligner, {name: shapes[name] for name in weak}, placed)
         q |= found
         _align_objects(aligner, shapes, q, aligned, list(found), far=True)
         for name, (alignment, start) in before.items():
@@ -72,12 +74,6 @@ def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str
                 aligned[name], q[name] = alignment, start
     _align_objects(aligner, shapes, q, aligned, list(q), far=False)
     return {name: _build_located(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
-
-
-def _placed_shapes(
-    shapes: dict[str, TargetShape], aligned: dict[str, Alignment]
-) -> dict[str, Placed]:
-    return {name: (shapes[name], alignment.q) for name, alignment in aligned.items()}
 
 
 def _align_objects(
@@ -106,11 +102,10 @@ def _align_objects(
 def _nudged_starts(shape: TargetShape, found: Alignment) -> list[Array]:
     """Where to begin the last alignment: where an object was found, and turned a little from there
     if not all fits, as outlines catch on wrong edges."""
-    good_agreement = 0.93  # With less, the alignment may have caught on a wrong edge.
-    nudge_angle = np.deg2rad(4.0)  # Radians by which the object is turned off a wrong edge.
-    if shape.symmetric or found.agreement > good_agreement:
+    # With less, the alignment may have caught on a wrong edge.
+    if shape.symmetric or found.agreement > 0.93:
         return [found.q]
-    return [found.q + np.array([0.0, 0.0, turn]) for turn in (0.0, nudge_angle, -nudge_angle)]
+    return [found.q + np.array([0.0, 0.0, turn]) for turn in np.deg2rad((0.0, 4.0, -4.0))]
 
 
 def _depth_of_others(
@@ -124,17 +119,16 @@ def best_alignment(
     aligner: Aligner, shape: TargetShape, starts: list[Array], others: Array, far: bool
 ) -> Alignment | None:
     """The alignment that agrees best with the image; if several do, near the target's angle."""
-    max_displacement = 0.06  # Metres from the target.
     rated: list[tuple[float, Alignment]] = []
     for start in starts:
         found = aligner.align(shape, start, others, far=far)
-        if found is None or np.hypot(*found.q[:2]) > max_displacement:
+        if found is None or np.hypot(*found.q[:2]) > 0.06:  # Metres from the target.
             continue
         support, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
         rating = found.agreement + found.coverage + support
         rating += aligner.likeness(shape, found.q, others)
         rating -= _depth_disagreement(aligner, shape, found.q, others)
-        if abs(_wrap_to_pi(found.q[2])) > LARGE_TURN:
+        if abs(wrap_to_pi(found.q[2])) > LARGE_TURN:
             rating -= aligner.required_gain
         rated.append((rating, found))
         if rating > aligner.convincing_rating:
@@ -147,7 +141,7 @@ def best_alignment(
         for rating, found in rated
         if are_different_places(found, best) and not shape.looks_alike(found.q, best.q)
     )
-    ambiguous = max(rivals, default=-np.inf) > score - aligner.clearly
+    ambiguous = max(rivals, default=-np.inf) > score - aligner.min_rating_margin
     return replace(best, q=_least_turned(shape, best.q), ambiguous=ambiguous)
 
 
@@ -155,25 +149,21 @@ def _least_turned(shape: TargetShape, q: Array) -> Array:
     """Of the displacements that look like this one, as a box's does after half a turn, the one
     nearest to the target's angle."""
     alike = [q]
-    for quarter in (1, 2, 3) if abs(_wrap_to_pi(q[2])) > LARGE_TURN else ():
+    for quarter in (1, 2, 3) if abs(wrap_to_pi(q[2])) > LARGE_TURN else ():
         other = q + np.array([0.0, 0.0, quarter * np.pi / 2])
-        other[2] = _wrap_to_pi(other[2])
+        other[2] = wrap_to_pi(other[2])
         if shape.looks_alike(q, other):
             alike.append(other)
-    return min(alike, key=lambda p: abs(_wrap_to_pi(p[2])))
-
-
-def _wrap_to_pi(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    return min(alike, key=lambda p: abs(wrap_to_pi(p[2])))
 
 
 def _depth_disagreement(aligner: Aligner, shape: TargetShape, q: Array, others: Array) -> float:
     """How much of an image of distances disagrees, as a share of the silhouette; 0 for a photo,
     where shadows and other things stand out as well."""
-    rim_share = 0.04  # Width of the compared rim, as a fraction of the image's width.
-    if not aligner.strict:
+    if not aligner.checks_depth:
         return 0.0
-    window = aligner.view.window(shape, q, rim_share * aligner.view.size[0])
+    # Width of the compared rim, as a fraction of the image's width.
+    window = aligner.view.window(shape, q, 0.04 * aligner.view.size[0])
     wrong, area = aligner.misfit(shape, q, others, window)
     return min(wrong / max(area, 1.0), 1.0)
 
@@ -184,7 +174,7 @@ def _build_located(
     q: dict[str, list[Array]],
     name: str,
     alignment: Alignment | None,
-) -> Located:
+) -> ObjectLocation:
     ring_width = 5.0  # Pixels beside the silhouette that should be free.
     view, shape = aligner.view, shapes[name]
     at = np.zeros(3) if alignment is None else alignment.q
@@ -202,7 +192,7 @@ def _build_located(
     around = aligner.evidence[part][ring]
     spill = float(np.maximum(around, 0.0).sum() / max(np.abs(around).sum(), 1.0))
     alike = aligner.likeness(shape, at, others) if aligner.sees_colors else 0.5
-    return Located(alignment, in_image, seen, support, spill, alike)
+    return ObjectLocation(alignment, in_image, seen, support, spill, alike)
 
 
 _POSITIVE_TURNS = np.deg2rad((8.0, 15.0, 25.0, 40.0, 60.0, 85.0, 110.0, 135.0, 160.0))  # Radians.
@@ -225,22 +215,19 @@ def add_rotation_ambiguity(
         found: its alignment.
         others: (H, W) depth of other objects, infinity where there is none.
     """
-    slack_share = 0.01  # Extra disagreement that still fits as well, fraction of the silhouette ...
-    slack_pixels = 12.0  # ... and pixels of an image 640 wide.
-    rough_factor = 2.0  # Multiple of the slack before the exact place is known.
     if shape.symmetric:
         return found
     window = _turning_window(aligner.view, shape, found.q)
     least, area = aligner.misfit(shape, found.q, others, window)
-    slack = slack_share * area + slack_pixels * (aligner.view.size[0] / 640) ** 2 * window.scale**2
-    search = SilhouetteSearch(
-        aligner.view, shape, np.where(np.isfinite(others), 0.0, aligner.evidence)
-    )
+    # Disagreement that still fits as well; 12 pixels of an image 640 wide.
+    slack = 0.01 * area + 12.0 * (aligner.view.size[0] / 640) ** 2 * window.scale**2
+    evidence = np.where(np.isfinite(others), 0.0, aligner.evidence)
+    search = SilhouetteSearch(aligner.view, shape, evidence)
     fitting = []
     for turn in AMBIGUITY_TEST_ANGLES:
         q = search.shifted(found.q + np.array([0.0, 0.0, turn]), TURNING_SHIFT)
         more = aligner.misfit(shape, q, others, window)[0] - least
-        if more > rough_factor * slack:
+        if more > 2.0 * slack:  # Multiple of the slack before the exact place is known.
             continue
         exact = aligner.align(shape, q, others, far=False, turn=False)
         if exact is None:
@@ -253,28 +240,26 @@ def add_rotation_ambiguity(
         return found
     off = np.array(fitting)
     spread = off.T @ off / (len(off) + 1)
-    return replace(found, covariance=found.covariance + spread, turnable=tuple(off[:, 2]))
+    return replace(found, covariance=found.covariance + spread, equivalent_turns=tuple(off[:, 2]))
 
 
 def _fit_loss(found: Alignment, other: Alignment, fine: float) -> float:
     """By how much another alignment fits the image worse; 1 where that is no chance any more."""
-    agreement_step = 0.1  # Loss of agreement that tells two angles apart.
-    residual_step = 0.5  # Relative increase of the residual that tells two angles apart.
     missing = max(found.coverage - other.coverage, found.agreement - other.agreement, 0.0)
     rougher = other.residual / max(found.residual, fine) - 1.0
-    return missing / agreement_step + max(rougher, 0.0) / residual_step
+    # A loss of agreement of 0.1, or residuals larger by half, tell two angles apart.
+    return missing / 0.1 + max(rougher, 0.0) / 0.5
 
 
-def _turning_window(view: PinholeView, shape: TargetShape, q: Array) -> Window:
+def _turning_window(view: PinholeView, shape: TargetShape, q: Array) -> ImageWindow:
     """A raster of all that the object may cover while it is turned."""
-    pixel_count = 2500  # Pixels around the object that are compared, about.
-    reach = (
-        float(np.linalg.norm(shape.p_SV[:, :2] - shape.p_SR[:2], axis=1).max()) + TURNING_SHIFT / 2
-    )
+    distance = np.linalg.norm(shape.p_SV[:, :2] - shape.p_SR[:2], axis=1)
+    reach = float(distance.max()) + TURNING_SHIFT / 2
     top = float(shape.p_SV[:, 2].max())
     corner = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
     box = shape.p_SR + (q[0], q[1], 0.0) + corner * (reach, reach, top)
     _, pixels = view.project(box)
     window = view.window_of(pixels, 1.0)
-    pitch = max(1.0, float(np.sqrt(window.width * window.height / pixel_count)))
+    # Pixels around the object that are compared, about.
+    pitch = max(1.0, float(np.sqrt(window.width * window.height / 2500)))
     return replace(window, scale=1.0 / pitch)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.placement.alignment import Aligner, Alignment
 from burg_drake.cameras.placement.document import ExtraObject
-from burg_drake.cameras.placement.localization import Located, best_alignment
+from burg_drake.cameras.placement.localization import ObjectLocation, best_alignment
 from burg_drake.cameras.placement.object_search import (
     SEARCH_RANGE,
     Placed,
@@ -22,13 +21,17 @@ from burg_drake.cameras.placement.object_search import (
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import PinholeView, sample_nearest, window_slices
-from burg_drake.core import Array, transform_points
+from burg_drake.core import Array, Booleans, transform_points
+
+MIN_EXTRA_EVIDENCE = 0.5  # Evidence at which a pixel shows an object.
+KNOWN_MARGIN = 6e-3  # Metres around known silhouettes that are ignored.
+MIN_EXTRA_WIDTH = 0.012  # Metres. Thinner regions are unexplained edges.
 
 
 def find_exchanged_objects(
     aligner: Aligner,
     shapes: dict[str, TargetShape],
-    located: dict[str, Located],
+    located: dict[str, ObjectLocation],
     doubtful: list[str],
 ) -> tuple[dict[str, tuple[str, Placed]], set[str]]:
     """Which object stands in the place of which, and where exactly.
@@ -44,14 +47,13 @@ def find_exchanged_objects(
         target, and its displacement from there. And the names of places in which their own objects
         do not stand, but others of the scene may that were not found anywhere.
     """
-    min_outline_share = 0.4  # Fraction of the outline that is visible and agrees.
-    min_score_gain = 0.5  # Over the object that belongs there; the score is 3 at most.
     sure = {
         name: (shapes[name], found.alignment.q)
         for name, found in located.items()
         if name not in doubtful and found.alignment is not None
     }
     others = aligner.view.depth(sure.values())
+    evidence = unexplained_evidence(aligner, sure)
     own = {
         name: _score_fit(aligner, shapes[name], located[name].alignment, others)
         for name in doubtful
@@ -62,10 +64,13 @@ def find_exchanged_objects(
             if name == place:
                 continue
             shape = shape_at_place(shapes[name], shapes[place])
-            found = _align_at_place(aligner, shape, sure, others)
+            starts = promising_places(find_candidates(aligner.view, shape, evidence))
+            found = best_alignment(aligner, shape, starts, others, far=True)
             fit = _score_fit(aligner, shape, found, others)
-            clear = fit.total > max(own[place].total, own[name].total) + min_score_gain
-            if found is not None and fit.good and fit.shown > min_outline_share and clear:
+            # Over the object that belongs there; the score is 3 at most.
+            clear = fit.total > max(own[place].total, own[name].total) + 0.5
+            # Fraction of the outline that is visible and agrees.
+            if found is not None and fit.good and fit.shown > 0.4 and clear:
                 rated.append((fit.total, place, name, (shape, found.q)))
     stands: dict[str, tuple[str, Placed]] = {}
     for _, place, name, placed in sorted(rated, key=lambda r: -r[0]):
@@ -82,14 +87,6 @@ def shape_at_place(shape: TargetShape, place: TargetShape) -> TargetShape:
     X_SO = shape.X_SO.copy()
     X_SO[:2, 3] += (place.p_SR - shape.p_SR)[:2]
     return replace(shape, X_SO=X_SO)
-
-
-def _align_at_place(
-    aligner: Aligner, shape: TargetShape, sure: dict[str, Placed], others: Array
-) -> Alignment | None:
-    evidence = unexplained_evidence(aligner, sure)
-    starts = promising_places(find_candidates(aligner.view, shape, evidence))
-    return best_alignment(aligner, shape, starts, others, far=True)
 
 
 @dataclass(frozen=True)
@@ -110,31 +107,18 @@ class _FitScore:
 def _score_fit(
     aligner: Aligner, shape: TargetShape, found: Alignment | None, others: Array
 ) -> _FitScore:
-    min_agreement = 0.7  # Agreement of the visible outline.
-    min_evidence = 0.6  # Mean evidence in the silhouette.
-    min_likeness = 0.4  # Likeness of colours, where they are known.
     if found is None:
         return _FitScore()
     filled, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
     alike = aligner.likeness(shape, found.q, others)
-    colored = alike > min_likeness or not aligner.sees_colors or shape.colors is None
+    # Likeness of colours, where they are known.
+    colored = alike > 0.4 or not aligner.sees_colors or shape.colors is None
     _, seen = aligner.view.seen(shape, found.q, others)
     return _FitScore(
         float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike,
-        found.agreement >= min_agreement and filled >= min_evidence and colored,
+        found.agreement >= 0.7 and filled >= 0.6 and colored,
         found.coverage * seen,
     )
-
-
-class ExtraObjectThresholds:
-    """Extra object thresholds."""
-
-    min_evidence = 0.5  # Evidence at which a pixel shows an object.
-    margin = 6e-3  # Metres around known silhouettes that are ignored.
-    min_width = 0.012  # Metres. Thinner regions are unexplained edges.
-    merge_distance = 0.02  # Metres within which regions are one object.
-    max_hidden_extent = 0.15  # Metres of the board behind an object that are searched.
-    min_area = 5e-4  # Square metres covered on the board.
 
 
 def find_extra_objects(
@@ -149,33 +133,29 @@ def find_extra_objects(
             Nothing there counts, as it may be that one.
     """
     view, placed = aligner.view, list(placed)
-    pitch = _pixels_per_metre(view)
-    stands = aligner.evidence > ExtraObjectThresholds.min_evidence
+    # Pixels per metre of the board, in the middle of the image.
+    pitch = float(_pixel_area(view, _points_on_board(view, np.array([view.size]) / 2.0))[0] ** -0.5)
+    stands = aligner.evidence > MIN_EXTRA_EVIDENCE
     for shape, q in placed:
-        window = view.window(shape, q, ExtraObjectThresholds.margin * pitch + 2.0)
+        window = view.window(shape, q, KNOWN_MARGIN * pitch + 2.0)
         mask = np.isfinite(view.buffer(shape, q, window)).astype(np.uint8)
-        size = 2 * round(ExtraObjectThresholds.margin * pitch) + 1
+        size = 2 * round(KNOWN_MARGIN * pitch) + 1
         stands[window_slices(window)] &= cv2.dilate(mask, np.ones((size, size), np.uint8)) == 0
-    size = max(2 * round(ExtraObjectThresholds.min_width * pitch / 2) + 1, 3)
+    size = max(2 * round(MIN_EXTRA_WIDTH * pitch / 2) + 1, 3)
     disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     stands = cv2.morphologyEx(stands.astype(np.uint8), cv2.MORPH_OPEN, disk)
-    size = 2 * round(ExtraObjectThresholds.merge_distance * pitch / 2) + 1
+    size = 2 * round(0.02 * pitch / 2) + 1  # Metres within which regions are one object.
     count, labels = cv2.connectedComponents(cv2.dilate(stands, np.ones((size, size), np.uint8)))
     hidden = _HiddenBoard(aligner, placed)
     found = [_describe_region(view, (labels == k) & (stands > 0), hidden) for k in range(1, count)]
-    large = [
-        (area, extra)
-        for area, extra in found
-        if area > ExtraObjectThresholds.min_area
-        and not any(_is_near_target(extra, p) for p in p_SR)
-    ]
+    # Square metres covered on the board.
+    large = []
+    for area, extra in found:
+        reach = SEARCH_RANGE + extra.width / 2.0
+        near = any(np.hypot(*(np.array(extra.position) - p[:2])) < reach for p in p_SR)
+        if area > 5e-4 and not near:  # Square metres covered on the board.
+            large.append((area, extra))
     return tuple(extra for _, extra in sorted(large, key=lambda f: -f[0]))
-
-
-def _is_near_target(extra: ExtraObject, p_SR: Array) -> bool:
-    """Whether a thing is where an object is looked for whose place this is."""
-    off = float(np.hypot(*(np.array(extra.position) - p_SR[:2])))
-    return off < SEARCH_RANGE + extra.width / 2.0
 
 
 class _HiddenBoard:
@@ -183,36 +163,26 @@ class _HiddenBoard:
 
     def __init__(self, aligner: Aligner, placed: list[Placed]) -> None:
         self._view = aligner.view
-        self._covered = np.isfinite(self._view.depth(placed)) | (
-            aligner.evidence > ExtraObjectThresholds.min_evidence
-        )
+        stands = aligner.evidence > MIN_EXTRA_EVIDENCE
+        self._covered = np.isfinite(self._view.depth(placed)) | stands
         corners = (transform_points(s.displacement(q), s.p_SV)[:, :2] for s, q in placed)
         self._feet = [cv2.convexHull(p.astype(np.float32)) for p in corners]
 
     def extent(self, start: Array, toward: Array) -> float:
         """How far from a point of the board (2,) the camera does not see the board, nor does an
         object stand there, in a direction (2,) [m]."""
-        p_S = (
-            start
-            + np.arange(
-                ExtraObjectThresholds.margin,
-                ExtraObjectThresholds.max_hidden_extent,
-                ExtraObjectThresholds.margin / 2,
-            )[:, None]
-            * toward
-        )
+        # Metres of the board behind an object that are searched.
+        step = KNOWN_MARGIN / 2
+        distances = np.arange(KNOWN_MARGIN, 0.15, step)  # Metres
+        p_S = start + distances[:, None] * toward
         _, pixels = self._view.project(np.column_stack([p_S, np.zeros(len(p_S))]))
         hidden = sample_nearest(self._covered, pixels, False).astype(bool)
         on_foot = [any(cv2.pointPolygonTest(f, p, False) >= 0 for f in self._feet) for p in p_S]
-        return (
-            ExtraObjectThresholds.margin
-            / 2
-            * int(np.argmin(np.append(hidden & ~np.array(on_foot), False)))
-        )
+        return step * int(np.argmin(np.append(hidden & ~np.array(on_foot), False)))
 
 
 def _describe_region(
-    view: PinholeView, mask: NDArray[np.bool_], hidden: _HiddenBoard
+    view: PinholeView, mask: Booleans, hidden: _HiddenBoard
 ) -> tuple[float, ExtraObject]:
     """The area on the board behind a region of the image [m²], and what stands there.
 
@@ -227,13 +197,13 @@ def _describe_region(
     across = np.array([-away[1], away[0]])
     deep, side = arm @ away, arm @ across
     near = float(np.quantile(deep, 0.02))
-    if near < ExtraObjectThresholds.min_width:  # the camera looks straight down on it
+    if near < MIN_EXTRA_WIDTH:  # the camera looks straight down on it
         return area, _build_extra_object(p_S.mean(axis=0), 2.0 * float(np.sqrt(area / np.pi)))
     # seen from above the camera's foot, the hidden board widens like a shadow
     left, right = np.quantile(side / np.maximum(deep, 1e-3), [0.02, 0.98]).tolist()
     aside = away + (left + right) / 2 * across
     near -= hidden.extent(view.X_SC[:2, 3] + near * aside, -away) / 2.0
-    width = max((right - left) * near, ExtraObjectThresholds.min_width)
+    width = max((right - left) * near, MIN_EXTRA_WIDTH)
     middle = view.X_SC[:2, 3] + (near + width / 2) * aside
     return area, _build_extra_object(middle, width)
 
@@ -254,9 +224,3 @@ def _pixel_area(view: PinholeView, p_S: Array) -> Array:
     """(N,) area of the board that a pixel covers at points (N, 2) [m²]."""
     J = view.jacobian(np.column_stack([p_S, np.zeros(len(p_S))]))[:, :, :2]
     return np.asarray(1.0 / np.maximum(np.abs(np.linalg.det(J)), 1e-9))
-
-
-def _pixels_per_metre(view: PinholeView) -> float:
-    """Of the board, in the middle of the image, the root of both ways."""
-    middle = _points_on_board(view, np.array([view.size]) / 2.0)
-    return float(_pixel_area(view, middle)[0] ** -0.5)

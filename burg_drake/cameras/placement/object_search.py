@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement.alignment import Aligner
+from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
 from burg_drake.cameras.placement.object_shape import TargetShape
-from burg_drake.cameras.placement.pinhole_view import PinholeView, Window, window_slices
+from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
 from burg_drake.core import Array
 
 SEARCH_RANGE = 0.05
@@ -55,9 +55,8 @@ class SilhouetteSearch:
     """Slides one shape over the evidence, at a coarse scale."""
 
     def __init__(self, view: PinholeView, shape: TargetShape, evidence: Array) -> None:
-        search_width = 320  # Columns of the scaled image.
         self._view, self._shape = view, shape
-        self._scale = min(1.0, search_width / view.size[0])
+        self._scale = min(1.0, 320 / view.size[0])  # Columns of the scaled image.
         size = (round(view.size[0] * self._scale), round(view.size[1] * self._scale))
         self._evidence = cv2.resize(evidence.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         top = float(shape.p_SV[:, 2].max())
@@ -65,25 +64,23 @@ class SilhouetteSearch:
 
     def best(self, turns: Array) -> list[SearchResult]:
         """The best places among some angles and those beside the best two."""
-        refined_count = 5  # Best angles that are refined.
-        max_results = 3  # For near and for far angles each.
         rough = sorted((self.slide(float(turn)) for turn in turns), key=lambda f: -f.score)
-        found = [self.slide(f.q[2], f.q) for f in rough[:refined_count]]
+        found = [self.slide(f.q[2], f.q) for f in rough[:5]]  # Best angles that are refined.
         found.sort(key=lambda f: -f.score)
         found += [
             self.slide(f.q[2] + side * FINE_SEARCH_ANGLE, f.q)
             for f in found[:2]
             for side in (-1, 1)
         ]
-        return _drop_duplicates(sorted(found, key=lambda f: -f.score))[:max_results]
+        # For near and for far angles each.
+        return _drop_duplicates(sorted(found, key=lambda f: -f.score))[:3]
 
     def slide(self, turn: float, start: Array | None = None) -> SearchResult:
         """The best translation at an angle: anywhere, or near to where it seems to be, as the
         silhouette changes with its place."""
         near = start if start is not None else np.zeros(2)
-        q, score = self._step(
-            np.array([near[0], near[1], turn]), SEARCH_RANGE if start is None else SEARCH_RANGE / 4
-        )
+        reach = SEARCH_RANGE if start is None else SEARCH_RANGE / 4
+        q, score = self._step(np.array([near[0], near[1], turn]), reach)
         off = np.hypot(q[0], q[1]) / SEARCH_RANGE
         return SearchResult(q, score - DISTANCE_PENALTY * min(off, 2.0) ** 2)
 
@@ -94,8 +91,7 @@ class SilhouetteSearch:
     def _step(self, q: Array, reach: float) -> tuple[Array, float]:
         """One correlation; returns where its peak is, and the mean evidence there."""
         view, scale = self._view, self._scale
-        window = view.window(self._shape, q, 1.0)
-        window = _snap_to_scale(window, scale)
+        window = _snap_to_scale(view.window(self._shape, q, 1.0), scale)
         mask = np.isfinite(view.buffer(self._shape, q, window)).astype(np.float32)
         if mask.sum() < 4:
             return q, -1.0
@@ -117,13 +113,13 @@ class SilhouetteSearch:
         return q + np.append(shift[best], 0.0), float(score[best])
 
 
-def _snap_to_scale(window: Window, scale: float) -> Window:
+def _snap_to_scale(window: ImageWindow, scale: float) -> ImageWindow:
     """A window whose raster of `scale` shares its pixels with the scaled image."""
     n = round(1.0 / scale)
     left, top = window.left // n * n, window.top // n * n
     right = -(-(window.left + window.width) // n) * n
     bottom = -(-(window.top + window.height) // n) * n
-    return Window(left, top, right - left, bottom - top, scale)
+    return ImageWindow(left, top, right - left, bottom - top, scale)
 
 
 def _drop_duplicates(found: list[SearchResult]) -> list[SearchResult]:
@@ -132,16 +128,12 @@ def _drop_duplicates(found: list[SearchResult]) -> list[SearchResult]:
     for f in found:
         near = (
             np.hypot(*(f.q[:2] - k.q[:2])) < 0.01
-            and abs(_wrap_angle(f.q[2] - k.q[2])) < 2 * FINE_SEARCH_ANGLE
+            and abs(wrap_to_pi(f.q[2] - k.q[2])) < 2 * FINE_SEARCH_ANGLE
             for k in kept
         )
         if not any(near):
             kept.append(f)
     return kept
-
-
-def _wrap_angle(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 MIN_CANDIDATE_EVIDENCE = 0.2
@@ -169,7 +161,7 @@ def assign_candidates(
         assigned[name] = promising_places(waiting.pop(name))
         window = _remove_explained(view, shapes[name], assigned[name][0], evidence)
         for other, found in waiting.items():
-            if _windows_overlap(window, view.window(shapes[other], found[0].q, 20.0)):
+            if window.overlaps(view.window(shapes[other], found[0].q, 20.0)):
                 waiting[other] = find_candidates(view, shapes[other], evidence)
     return assigned
 
@@ -184,9 +176,9 @@ def unexplained_evidence(aligner: Aligner, placed: dict[str, Placed]) -> Array:
 
 def promising_places(found: list[SearchResult]) -> list[Array]:
     """The displacements of places that may turn out to be the best, the likeliest first."""
-    max_deficit = 0.12  # Evidence below that of the best place at which a place is still tried.
     best = max(f.score for f in found)
-    return [f.q for i, f in enumerate(found) if i == 0 or f.score > best - max_deficit]
+    # Evidence below that of the best place at which a place is still tried.
+    return [f.q for i, f in enumerate(found) if i == 0 or f.score > best - 0.12]
 
 
 def find_candidates(view: PinholeView, shape: TargetShape, evidence: Array) -> list[SearchResult]:
@@ -201,9 +193,8 @@ def _rate_candidate(
     view: PinholeView, shape: TargetShape, found: list[SearchResult], evidence: Array
 ) -> float:
     """How sure it is that an object is where it was found: its support, more for a large one."""
-    min_area = 30.0  # Pixels with evidence that a silhouette needs.
     support, area = silhouette_support(view, shape, found[0].q, evidence, None)
-    return support if area > min_area else -1.0
+    return support if area > 30.0 else -1.0  # Pixels with evidence that a silhouette needs.
 
 
 def silhouette_support(
@@ -218,7 +209,9 @@ def silhouette_support(
     return float(evidence[part][mask].sum() / max(weight, 1.0)), float(weight)
 
 
-def _remove_explained(view: PinholeView, shape: TargetShape, q: Array, evidence: Array) -> Window:
+def _remove_explained(
+    view: PinholeView, shape: TargetShape, q: Array, evidence: Array
+) -> ImageWindow:
     """Takes away the evidence that an object explains; returns where that was."""
     window = view.window(shape, q, 8.0)
     mask = np.isfinite(view.buffer(shape, q, window)).astype(np.uint8)
@@ -226,8 +219,3 @@ def _remove_explained(view: PinholeView, shape: TargetShape, q: Array, evidence:
     part = evidence[window_slices(window)]
     part[grown] = 0.0
     return window
-
-
-def _windows_overlap(a: Window, b: Window) -> bool:
-    across = a.left < b.left + b.width and b.left < a.left + a.width
-    return across and a.top < b.top + b.height and b.top < a.top + a.height

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
 from burg_drake.cameras.scene_mesh import MeshOutline
-from burg_drake.core import Array, inverse, make_pose, rot_z, srgb_to_linear, transform_points
+from burg_drake.core import (
+    Array,
+    Indices,
+    inverse,
+    make_pose,
+    rot_z,
+    srgb_to_linear,
+    transform_points,
+)
 from burg_drake.geometry import RayCaster
 from burg_drake.objects import sample_surface
 from burg_drake.scene import Scene
@@ -39,7 +47,7 @@ class TargetShape:
     """
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Indices
     X_SO: Array
     p_OR: Array
     symmetric: bool
@@ -82,10 +90,10 @@ class TargetShape:
         """Whether two displacements (3,) look the same: a box turned by half a turn."""
         X_SS = inverse(self.displacement(a)) @ self.displacement(b)
         points, _ = self.surface
-        return self._itself.contains_points(transform_points(X_SS, points[::12]))
+        return self._matcher.contains_points(transform_points(X_SS, points[::12]))
 
     @cached_property
-    def _itself(self) -> _SurfaceMatcher:
+    def _matcher(self) -> _SurfaceMatcher:
         return _SurfaceMatcher(*self.surface)
 
     def displacement(self, q: Array) -> Array:
@@ -166,9 +174,9 @@ def _outline_centroid(points: Array) -> Array:
 def _is_rotationally_symmetric(surface: trimesh.Trimesh) -> bool:
     """Whether a surface looks the same after any turn about the z axis of its frame."""
     points, normals = sample_surface(surface, SURFACE_SAMPLES)
-    itself = _SurfaceMatcher(points, normals)
+    matcher = _SurfaceMatcher(points, normals)
     return all(
-        itself.contains_points(points[::12] @ rot_z(float(angle)).T)
+        matcher.contains_points(points[::12] @ rot_z(float(angle)).T)
         for angle in SYMMETRY_TEST_ANGLES
     )
 
@@ -181,18 +189,18 @@ class _SurfaceMatcher:
     """
 
     def __init__(self, points: Array, normals: Array) -> None:
-        symmetry_tolerance = 0.01  # Fraction of the diagonal; 1.3 mm for a can.
         self._points, self._normals = points, normals
         self._tree = cKDTree(points)
-        self._tolerance = symmetry_tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
+        # Fraction of the diagonal; 1.3 mm for a can.
+        self._tolerance = 0.01 * float(np.linalg.norm(np.ptp(points, axis=0)))
         apart = self._tree.query(points[::12], k=2)[0][:, 1]
         self._beside = 6.0 * float(np.median(apart)) + self._tolerance
 
     def contains_points(self, moved: Array) -> bool:
         """Whether most of some moved points (M, 3) are on the surface."""
-        min_matching_share = 0.98  # Fraction of the surface that must be within the tolerance.
         distance, near = self._tree.query(moved, k=3)
         away = moved[:, None] - self._points[near]
         off = np.abs(np.einsum("nki,nki->nk", self._normals[near], away)).min(axis=1)
         same = (off < self._tolerance) & (distance[:, 0] < self._beside)
-        return bool(same.mean() >= min_matching_share)
+        # Fraction of the surface that must be within the tolerance.
+        return bool(same.mean() >= 0.98)

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from burg_drake.cameras.placement.board_background import EmptyBoard
 from burg_drake.cameras.placement.pinhole_view import ImageContour, sample_nearest
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Single
 
 TONE_WEIGHTS = (np.diag([1.0, 0.5, 0.5]) @ np.linalg.qr(np.ones((3, 1)), "complete")[0].T).astype(
     np.float32
@@ -40,11 +39,11 @@ class StepLines:
     color: Array
     tone: Array
     strip: Array
-    used: NDArray[np.bool_]
+    used: Booleans
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class EdgeSteps:
     """Steps that were fitted.
 
     Attributes:
@@ -62,7 +61,7 @@ class Steps:
     color: Array
 
 
-def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Steps:
+def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> EdgeSteps:
     """Fits all lines by Gauss and Newton.
 
     Args:
@@ -73,23 +72,17 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Step
     """
     # Pixels from the outline between which the light outside is linear.
     knot_distances = (0.0, 1.0, 2.0, 4.0)
-    # Relative change of the light between knots; shadows begin at the object.
-    change_sds = (0.6, 0.35, 0.12)
     max_offset = 2.5  # Pixels of a step from its expected place.
-    gauss_newton_steps = 4  # Iterations.
     t = lines.t
     knots = np.stack(
         [np.interp(t, knot_distances, row) for row in np.eye(len(knot_distances))[:-1]], axis=1
     )
-    rise = np.diff(np.eye(len(knot_distances)), axis=0)[:, :-1] / np.array(change_sds)[:, None]
+    # Relative change of the light between knots; shadows begin at the object.
+    rise = np.diff(np.eye(len(knot_distances)), axis=0)[:, :-1] / [[0.6], [0.35], [0.12]]
     strip = np.isfinite(lines.strip)
-    n = len(knot_distances) + 6
-    at, outer, edge, inner = (
-        0,
-        slice(1, len(knot_distances)),
-        slice(len(knot_distances), n - 3),
-        slice(n - 3, n),
-    )
+    k = len(knot_distances)
+    n = k + 6
+    at, outer, edge, inner = 0, slice(1, k), slice(k, n - 3), slice(n - 3, n)
     prior = np.zeros((len(lines.color), n, n))
     prior[:, at, at] = 0.1
     prior[:, outer, outer] = rise.T @ rise
@@ -102,7 +95,7 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Step
     weight = np.broadcast_to((lines.used / sigma)[..., None], lines.light.shape).astype(np.float32)
     x = np.zeros((len(lines.color), n))
     count = 3 * lines.used.sum(axis=1) + 1e-9
-    for _ in range(gauss_newton_steps):
+    for _ in range(4):  # Iterations.
         away = (x[:, :1] - t) / blur
         covered = ndtr(away)[..., None]
         slope = (np.exp(-0.5 * away**2) / np.sqrt(2.0 * np.pi) / blur)[..., None]
@@ -133,10 +126,10 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Step
     rms = np.sqrt((lines.used[..., None] * left**2).sum(axis=(1, 2)) / count)
     here = int(np.argmin(np.abs(t)))
     contrast = np.linalg.norm(first[:, 0] - lit[:, here], axis=1) / np.sqrt(3.0)
-    return Steps(x[:, at], variance, rms, contrast, first[:, 0])
+    return EdgeSteps(x[:, at], variance, rms, contrast, first[:, 0])
 
 
-def _tone_prior(color: Array, strip: NDArray[np.bool_], paper: float) -> Array:
+def _tone_prior(color: Array, strip: Booleans, paper: float) -> Array:
     """(N, 3, 3) inverse covariance of colors (N, 3), which vary by their brightness more than by
     their tone."""
     surface_sds = (0.15, 0.03)  # Relative brightness and tone of the object at its edge ...
@@ -176,8 +169,8 @@ class PhotoEdges:
     offset: Array
     deviation: Array
     shading: Array
-    found: NDArray[np.bool_]
-    expected: NDArray[np.bool_]
+    found: Booleans
+    expected: Booleans
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,16 +194,16 @@ class NormalProfiles:
     light: Array
     board: Array
     evidence: Array
-    known: NDArray[np.bool_]
-    covered: NDArray[np.bool_]
+    known: Booleans
+    covered: Booleans
     strip: Array
     tone: Array
-    occluded: NDArray[np.bool_]
+    occluded: Booleans
 
 
 def sample_normal_profiles(
     contour: ImageContour,
-    light: NDArray[np.float32],
+    light: Single,
     picture: EmptyBoard,
     others: Array,
     reach: float,
@@ -228,7 +221,7 @@ def sample_normal_profiles(
     points = contour.points(t)
     at = points.astype(np.float32)
 
-    def sampled(values: NDArray[np.float32]) -> Array:
+    def sampled(values: Single) -> Array:
         found = cv2.remap(
             values, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
@@ -252,7 +245,7 @@ def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     the sheet, by colors beyond it."""
     t, reach = on.t, float(on.t[-1])
     far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
-    usable: NDArray[np.bool_] = np.asarray((on.covered & far_in).any(axis=1))
+    usable: Booleans = np.asarray((on.covered & far_in).any(axis=1))
     usable &= ~(on.occluded & (t > -1.0)).any(axis=1)
     tolerance = 2.0 * MIN_EDGE_CONTRAST * picture.contrast
     inner = _mean_of_samples(on.light, on.covered & far_in)
@@ -279,26 +272,21 @@ def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     and the offset's standard deviation says so, as g is solved for with it. An outline that has the
     board on both sides is a shadow's, and no edge.
     """
-    pixel_blur = 0.4  # Pixels. Standard deviation from pixel area and interpolation.
-    clear_sigmas = 1.75  # Blur standard deviations from an edge at which it is no longer seen.
     inner_width = 0.6  # Pixels over which the object's colour is sampled; many objects have a rim.
-    model_sd = 0.08  # Pixels at the contrast of paper and ink; grows as the contrast falls.
     outer_width = 3.0  # Pixels over which the light outside is sampled.
     max_rms_share = 0.2  # Residual of a good edge, as a fraction of the contrast of paper and ink.
-    strip_depth = 2.5  # Pixels. Thickest strip of another material along an outline.
-    max_board_evidence = -0.4  # Evidence inside the outline below which the board is seen there.
-    max_edge_sd = 1.5  # Pixels. Edges with a larger standard deviation are dropped.
     t = on.t
-    blur = float(np.hypot(picture.blur, pixel_blur))
-    clear = max(clear_sigmas * blur, 0.9)
+    # Pixels. Standard deviation from pixel area and interpolation.
+    blur = float(np.hypot(picture.blur, 0.4))
+    # Blur standard deviations from an edge at which it is no longer seen.
+    clear = max(1.75 * blur, 0.9)
     core = on.covered & np.roll(on.covered, round(clear / PROFILE_STEP_PX), axis=1)
-    strip = np.where(on.strip > -clear - inner_width - strip_depth, on.strip, -np.inf)
+    # Pixels. Thickest strip of another material along an outline.
+    strip = np.where(on.strip > -clear - inner_width - 2.5, on.strip, -np.inf)
     # the object's color, from beyond a strip of another material if there is one
     start = -clear + np.where(np.isfinite(strip), strip, 0.0)[:, None]
     inner = core & (t <= start) & (t >= start - inner_width)
-    outer = (
-        np.broadcast_to((t >= clear) & (t <= clear + outer_width), on.covered.shape) & ~on.covered
-    )
+    outer = (t >= clear) & (t <= clear + outer_width) & ~on.covered
     usable = inner.any(axis=1) & outer.any(axis=1) & ~(on.covered & (t > 0.7)).any(axis=1)
     mixed = (on.occluded & (t > 0.0)).any(axis=1) & ~(on.occluded | (t < 0.0)).all(axis=1)
     usable &= ~mixed & ~(on.occluded & (t < 0.0) & (t > -2.0) & ~on.covered).any(axis=1)
@@ -311,27 +299,27 @@ def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
         t[seen], on.light[:, seen], behind[:, seen], color, on.tone, strip, used[:, seen]
     )
     fit = fit_steps(lines, blur, picture.noise, paper)
-    variance = fit.variance + (model_sd * paper / np.maximum(fit.contrast, 1e-4)) ** 2
-    known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
-    board_inside = known & (
-        _mean_of_samples(on.evidence[..., None], inner)[:, 0] < max_board_evidence
-    )
+    # Pixels at the contrast of paper and ink; grows as the contrast falls.
+    variance = fit.variance + (0.08 * paper / np.maximum(fit.contrast, 1e-4)) ** 2
+    known: Booleans = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
+    # Evidence inside the outline below which the board is seen there.
+    board_inside = known & (_mean_of_samples(on.evidence[..., None], inner)[:, 0] < -0.4)
     explained = ~known | (left_outside < max_rms_share * paper)
-    expected = usable & (explained | board_inside) & (variance < max_edge_sd**2)
+    # Pixels. Edges with a larger standard deviation are dropped.
+    expected = usable & (explained | board_inside) & (variance < 1.5**2)
     expected &= fit.contrast > MIN_EDGE_CONTRAST * paper
-    found = (
-        expected & (np.abs(fit.offset) < 2.4) & ~board_inside & (fit.rms < max_rms_share * paper)
-    )
+    found = expected & ~board_inside
+    found &= (np.abs(fit.offset) < 2.4) & (fit.rms < max_rms_share * paper)
     across = fit.color - behind[:, t == 0.0].mean(axis=1)
     shading = (fit.color * across).sum(axis=1) / np.maximum((across**2).sum(axis=1), 1e-4)
     return PhotoEdges(fit.offset, np.sqrt(variance), shading, found, expected)
 
 
-def _background_light(on: NormalProfiles, outer: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _background_light(on: NormalProfiles, outer: Booleans) -> tuple[Array, Array]:
     """(N, T, 3) what is behind the object, and (N,) root mean square of what
     that leaves outside. Where the board is not known, it is the mean of what is outside.
     """
-    known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, on.t >= 0.0], axis=1))
+    known: Booleans = np.asarray(np.all(on.known[:, on.t >= 0.0], axis=1))
     B = np.where(outer[..., None], on.board, 0.0)
     level = (B * on.light).sum(axis=(1, 2)) / ((B * B).sum(axis=(1, 2)) + 1e-9)
     model = on.board * level[:, None, None]
@@ -341,7 +329,7 @@ def _background_light(on: NormalProfiles, outer: NDArray[np.bool_]) -> tuple[Arr
     return model, np.sqrt(left / np.maximum(outer.sum(axis=1), 1))
 
 
-def _mean_of_samples(values: Array, where: NDArray[np.bool_]) -> Array:
+def _mean_of_samples(values: Array, where: Booleans) -> Array:
     """(N, C) mean of (N, T, C) at some samples (N, T) of each line; 0 where there is none."""
     count = np.maximum(where.sum(axis=1), 1)
     return (values * where[..., None]).sum(axis=1) / count[:, None]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.placement.object_shape import TargetShape
-from burg_drake.core import Array, inverse, transform_points
+from burg_drake.core import Array, Booleans, Indices, inverse, transform_points
 
 
 @dataclass(frozen=True)
-class Window:
+class ImageWindow:
     """A part of an image, seen by a finer or coarser raster; pixel centres at integers.
 
     Attributes:
@@ -35,9 +35,14 @@ class Window:
         """Rows and columns of the raster."""
         return round(self.height * self.scale), round(self.width * self.scale)
 
-    def scaled(self, scale: float) -> Window:
+    def scaled(self, scale: float) -> ImageWindow:
         """The same part, seen by a raster of another scale."""
         return replace(self, scale=scale)
+
+    def overlaps(self, other: ImageWindow) -> bool:
+        """Whether both show a part of the same image points."""
+        across = self.left < other.left + other.width and other.left < self.left + self.width
+        return across and self.top < other.top + other.height and other.top < self.top + self.height
 
     def pixels(self) -> Array:
         """(H, W, 2) image points of the raster's pixels."""
@@ -53,7 +58,7 @@ class Window:
         return (raster + 0.5) / self.scale + (self.left - 0.5, self.top - 0.5)
 
 
-def window_around(pixels: Array, margin: float, size: tuple[int, int], scale: float) -> Window:
+def window_around(pixels: Array, margin: float, size: tuple[int, int], scale: float) -> ImageWindow:
     """The window of an image around some of its points; empty if all are outside.
 
     Args:
@@ -66,7 +71,7 @@ def window_around(pixels: Array, margin: float, size: tuple[int, int], scale: fl
     high = np.ceil(pixels.max(axis=0) + margin).astype(int) + 1
     low, high = np.clip(low, 0, size), np.clip(high, 0, size)
     width, height = np.maximum(high - low, 0)
-    return Window(int(low[0]), int(low[1]), int(width), int(height), scale)
+    return ImageWindow(int(low[0]), int(low[1]), int(width), int(height), scale)
 
 
 MIN_POINT_DEPTH = 1e-3
@@ -87,7 +92,7 @@ class PinholeView:
     K: Array
     size: tuple[int, int]
     X_SC: Array
-    blind: NDArray[np.bool_] | None = None
+    blind: Booleans | None = None
 
     @cached_property
     def X_CS(self) -> Array:
@@ -114,7 +119,7 @@ class PinholeView:
         """(...,) depth of a displaced shape at image points; see `hits`."""
         return self.hits(shape, q, pixels)[1]
 
-    def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[NDArray[np.int64], Array]:
+    def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[Indices, Array]:
         """What of a displaced shape is seen at image points.
 
         Args:
@@ -145,16 +150,16 @@ class PinholeView:
         X_SC = inverse(shape.displacement(q)) @ self.X_SC
         return np.asarray(transform_points(X_SC, p_CQ.reshape(-1, 3)).reshape(p_CQ.shape))
 
-    def buffer(self, shape: TargetShape, q: Array, window: Window) -> Array:
+    def buffer(self, shape: TargetShape, q: Array, window: ImageWindow) -> Array:
         """Depth of a displaced shape at the pixels of a window's raster; see `cast`."""
         return self.cast(shape, q, window.pixels())
 
-    def window(self, shape: TargetShape, q: Array, margin: float) -> Window:
+    def window(self, shape: TargetShape, q: Array, margin: float) -> ImageWindow:
         """The part of the image around a displaced shape."""
         _, pixels = self.project(transform_points(shape.displacement(q), shape.p_SV))
         return self.window_of(pixels, margin)
 
-    def window_of(self, pixels: Array, margin: float) -> Window:
+    def window_of(self, pixels: Array, margin: float) -> ImageWindow:
         """The part of the image around some of its points (N, 2)."""
         return window_around(pixels, margin, self.size, 1.0)
 
@@ -187,7 +192,7 @@ class PinholeView:
         low = np.floor(pixels.min(axis=0)).astype(int) - 1
         extent = np.ceil(pixels.max(axis=0)).astype(int) + 2 - low
         scale = min(1.0, 200.0 / extent.max())
-        whole = Window(int(low[0]), int(low[1]), int(extent[0]), int(extent[1]), scale)
+        whole = ImageWindow(int(low[0]), int(low[1]), int(extent[0]), int(extent[1]), scale)
         depth = self.buffer(shape, q, whole)
         rows, columns = np.nonzero(np.isfinite(depth))
         at = np.round(whole.image(np.stack([columns, rows], axis=-1))).astype(int)
@@ -198,7 +203,7 @@ class PinholeView:
         return float(inside.sum() / total), float(free.sum() / total)
 
 
-def window_slices(window: Window) -> tuple[slice, slice]:
+def window_slices(window: ImageWindow) -> tuple[slice, slice]:
     """The window's part of an image."""
     rows = slice(window.top, window.top + window.height)
     return rows, slice(window.left, window.left + window.width)
@@ -249,7 +254,7 @@ class ImageContour:
         """(N, T, 2) points on the normals, at distances (T,) from the outline [pixels]."""
         return self.pixels[:, None] + offsets[:, None] * self.normals[:, None]
 
-    def inside(self, pixels: Array, t: Array) -> tuple[NDArray[np.bool_], Array, Array]:
+    def inside(self, pixels: Array, t: Array) -> tuple[Booleans, Array, Array]:
         """What the object covers of points (N, T, 2) on the normals.
 
         Args:
@@ -261,26 +266,25 @@ class ImageContour:
             outline ends inwards, -infinity if it does not: at a bend, another material, or where
             it hides another part; and (N, 3) its reflectance over that of what begins there.
         """
-        min_normal_cosine = 0.82  # Points whose normals differ more get different light.
-        rim_depth = 0.25  # Pixels inside the outline from which normals are compared ...
-        max_crease_depth = 2.5  # ... and to which, in pixels.
-        material_step = 0.08  # Difference of reflectance between two materials.
         face, depth = self.view.hits(self.shape, self.q, pixels)
         covered = np.isfinite(depth)
         normal, colors = self.shape.normals[face], self.shape.colors
         color = np.full((*face.shape, 3), 0.5) if colors is None else colors[face]
         both = covered[:, 1:] & covered[:, :-1] & (t[1:] <= 0.0)
         middle = (t[1:] + t[:-1]) / 2
-        other = np.abs(np.diff(color, axis=1)).max(axis=-1) > material_step
+        # Difference of reflectance between two materials.
+        other = np.abs(np.diff(color, axis=1)).max(axis=-1) > 0.08
         p = self.view.points(self.shape, self.q, pixels, np.where(covered, depth, 1.0))
         away = np.diff(p, axis=1)
         here, before = (np.einsum("nti,nti->nt", n, away) for n in (normal[:, 1:], normal[:, :-1]))
         other |= np.minimum(np.abs(here), np.abs(before)) > 2.0 * OCCLUSION_DEPTH_STEP
         strip = np.where(other & both, middle, -np.inf).max(axis=1)
-        last = np.argmax(np.where(covered & (t <= -rim_depth), t, -np.inf), axis=1)
+        last = np.argmax(np.where(covered & (t <= -0.25), t, -np.inf), axis=1)
         begin = normal[np.arange(len(last)), last]
-        turned = np.einsum("nti,ni->nt", normal[:, :-1], begin) < min_normal_cosine
-        turned &= both & (middle > -max_crease_depth)
+        # Points whose normals differ more get different light.
+        turned = np.einsum("nti,ni->nt", normal[:, :-1], begin) < 0.82
+        # Normals are compared from a quarter of a pixel inside the outline to 2.5 pixels.
+        turned &= both & (middle > -2.5)
         bend = np.where(turned, middle, -np.inf).max(axis=1)
         strip = np.where(np.isfinite(strip), strip, bend)
         line = np.arange(len(strip))
@@ -330,7 +334,7 @@ def visible_outline(view: PinholeView, shape: TargetShape, q: Array, others: Arr
     return ImageContour(pixels, normal, p_SQ, along, moved, view, shape, q)
 
 
-def _sample_segments(view: PinholeView, ends: Array) -> tuple[Array, NDArray[np.int64]]:
+def _sample_segments(view: PinholeView, ends: Array) -> tuple[Array, Indices]:
     """Points (N, 3) spaced evenly over segments (E, 2, 3) as the image has them; whose they are."""
     spacing = 2.0  # Pixels between points along the outline.
     _, pixels = view.project(ends.reshape(-1, 3))

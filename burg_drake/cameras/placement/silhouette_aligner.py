@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.placement.alignment import (
     Alignment,
@@ -15,6 +14,7 @@ from burg_drake.cameras.placement.board_background import EmptyBoard
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.photo_edges import (
     FINE_SEARCH_PX,
+    NormalProfiles,
     PhotoEdges,
     find_far_edges,
     find_near_edges,
@@ -22,12 +22,12 @@ from burg_drake.cameras.placement.photo_edges import (
 )
 from burg_drake.cameras.placement.pinhole_view import (
     ImageContour,
+    ImageWindow,
     PinholeView,
-    Window,
     sample_nearest,
     visible_outline,
 )
-from burg_drake.core import Array, srgb_to_linear
+from burg_drake.core import Array, Booleans, Bytes, Single, srgb_to_linear
 
 MIN_RESIDUAL_PX = 0.1
 """Smaller residuals of an outline are treated as this one, in pixels."""
@@ -43,18 +43,14 @@ class SilhouetteAligner:
         picture: the board without objects.
     """
 
-    def __init__(self, view: PinholeView, image: NDArray[np.uint8], picture: EmptyBoard) -> None:
-        max_residual = 0.8  # Pixels per pixel of blur. Fits of the right object leave less.
+    def __init__(self, view: PinholeView, image: Bytes, picture: EmptyBoard) -> None:
         self.view = view
-        self.convincing_rating, self.required_gain, self.clearly, self.strict = (
-            3.4,
-            0.15,
-            0.08,
-            False,
-        )
+        self.convincing_rating, self.required_gain = 3.4, 0.15
+        self.min_rating_margin, self.checks_depth = 0.08, False
         self.sees_colors, self.smear = True, picture.smear
         self.evidence = picture.evidence
-        self.rough = max_residual * max(1.0, picture.blur)
+        # Pixels per pixel of blur. Fits of the right object leave less.
+        self.max_residual = 0.8 * max(1.0, picture.blur)
         self.residual_floor = MIN_RESIDUAL_PX
         self._light = srgb_to_linear(image)
         self._balanced = self._light / picture.paper
@@ -75,20 +71,18 @@ class SilhouetteAligner:
         Returns:
             None if the photo does not determine where it is.
         """
-        full_rounds = 6  # Rounds of edge measurement for an exact alignment.
-        few_rounds = 3  # Rounds for a place that is only compared.
         near = self._coarse_fit(shape, q, others) if far else q
         if near is None:
             return None
-        rounds = few_rounds if far or not turn else full_rounds
+        rounds = 3 if far or not turn else 6  # A place that is only compared needs fewer.
         return self._fine_fit(shape, near, others, turn, rounds)
 
     def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """How alike the tones of a displaced object and of its mesh are; see `appearance`."""
+        """How alike the tones of a displaced object and of its mesh are; see `color_likeness`."""
         return color_likeness(self.view, shape, q, others, self._balanced)
 
     def misfit(
-        self, shape: TargetShape, q: Array, others: Array, window: Window
+        self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
         """What of a raster disagrees with a displaced object, but for where others are.
 
@@ -104,41 +98,39 @@ class SilhouetteAligner:
     def _coarse_fit(self, shape: TargetShape, q: Array, others: Array) -> Array | None:
         """The displacement to a pixel or so, from many away; None without an outline."""
         # Search distance of each round, as a fraction of the image's width.
-        search_shares = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
-        for share in search_shares:
+        for share in (1 / 45, 1 / 45, 1 / 80, 1 / 110):
             contour = visible_outline(self.view, shape, q, others)
             if len(contour) < MIN_OUTLINE_EDGES:
                 return None
-            on = sample_normal_profiles(
-                contour, self._light, self._picture, others, share * self.view.size[0]
-            )
+            on = self._sample_normals(contour, others, share * self.view.size[0])
             solved = _solve_displacement(shape, contour, find_far_edges(on, self._picture))
             if solved is None:
                 break
             q = q + _limit_step(solved.step)
         return q
 
+    def _sample_normals(self, contour: ImageContour, others: Array, reach: float) -> NormalProfiles:
+        return sample_normal_profiles(contour, self._light, self._picture, others, reach)
+
     def _fine_fit(
         self, shape: TargetShape, q: Array, others: Array, turn: bool, rounds: int
     ) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
-        min_step = 0.04  # Pixels. Smaller motions of the outline end the rounds.
-        max_drift = 0.03  # Metres from the start; beyond, the alignment has failed.
         start, result = q, None
         for _ in range(rounds):
             contour = visible_outline(self.view, shape, q, others)
             if len(contour) < MIN_OUTLINE_EDGES:
                 return None
-            edges = find_near_edges(
-                sample_normal_profiles(contour, self._light, self._picture, others, FINE_SEARCH_PX),
-                self._picture,
-            )
+            on = self._sample_normals(contour, others, FINE_SEARCH_PX)
+            edges = find_near_edges(on, self._picture)
             solved = _solve_displacement(shape, contour, edges, turn)
-            if solved is None or np.linalg.norm(q[:2] - start[:2]) > max_drift:
+            # Metres from the start; beyond, the alignment has failed.
+            if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.03:
                 return None
             q = q + _limit_step(solved.step)
             result = _build_alignment(q, contour, edges, solved)
-            if np.abs(contour.along @ solved.step).max() < min_step:
+            # Pixels. Smaller motions of the outline end the rounds.
+            if np.abs(contour.along @ solved.step).max() < 0.04:
                 break
         return result
 
@@ -146,15 +138,17 @@ class SilhouetteAligner:
 def _solve_displacement(
     shape: TargetShape, contour: ImageContour, edges: PhotoEdges, turn: bool = True
 ) -> DisplacementFit | None:
-    shading_sd = 0.15  # Relative darkening of an object at its edge, standard deviation.
-    growth_sd = 0.2  # Pixels by which the outline may look larger, standard deviation.
-    ground_growth_sd = 0.6  # Pixels, where the outline meets the board and its shadow.
-    clear_height = 4e-3  # Metres above the board at which the shadow ends.
     used = edges.found
     if used.sum() < MIN_OUTLINE_EDGES:
         return None
     reach = float(np.linalg.norm(np.ptp(shape.p_SV[:, :2], axis=0))) / 2
     unit = np.array([1e-3, 1e-3, 1e-3 / reach])
+    # What else moves edges, by standard deviations: objects are darker at their edges by 15 %,
+    # outlines look larger by 0.2 pixels, and by 0.6 where they meet the board and its shadow, which
+    # ends 4 mm above it.
+    height = np.maximum(contour.p_SQ[used, 2], 0.0)
+    growth = np.full(used.sum(), 0.2)
+    nuisance = np.column_stack([-0.15 * edges.shading[used], growth, 0.6 * np.exp(-height / 4e-3)])
     return fit_displacement(
         contour.along[used],
         edges.offset[used],
@@ -162,13 +156,7 @@ def _solve_displacement(
         outline_sectors(contour)[used],
         shape.symmetric or not turn,
         unit,
-        np.column_stack(
-            [
-                -shading_sd * edges.shading[used],
-                np.full(used.sum(), growth_sd),
-                ground_growth_sd * np.exp(-np.maximum(contour.p_SQ[used, 2], 0.0) / clear_height),
-            ]
-        ),
+        nuisance,
     )
 
 
@@ -181,28 +169,19 @@ def _build_alignment(
     q: Array, contour: ImageContour, edges: PhotoEdges, solved: DisplacementFit
 ) -> Alignment:
     agreement_limit = 1.5  # Pixels between an edge and the outline.
-    shift_sd = 0.4  # Unexplained shift of the outline, in residuals, standard deviation.
-    twist_sd = 0.35  # The same of its two ends against each other.
-    squeeze_sd = 0.6  # The same of its sides against its ends.
-    used: NDArray[np.bool_] = edges.found
+    used: Booleans = edges.found
     left = edges.offset[used] - contour.along[used] @ solved.step
     agrees = (np.abs(left) < agreement_limit) & (solved.weights > 0.0)
     residual = _weighted_rms(left[agrees], edges.deviation[used][agrees])
     normals = contour.normals[used]
     rough = max(residual, MIN_RESIDUAL_PX) if np.isfinite(residual) else agreement_limit
-    shifted = shift_sd * rough * solved.sensitivity @ normals
-    twisted = (
-        twist_sd
-        * rough
-        * solved.sensitivity
-        @ (normals * _end_signs(contour.pixels[used])[:, None])
-    )
-    squeezed = (
-        squeeze_sd
-        * rough
-        * solved.sensitivity
-        @ _side_weights(contour.pixels[used], normals)[:, None]
-    )
+    ends, sides = _ends_and_sides(contour.pixels[used], normals)
+    # Unexplained shift of the outline, in residuals, standard deviation.
+    shifted = 0.4 * rough * solved.sensitivity @ normals
+    # The same of its two ends against each other.
+    twisted = 0.35 * rough * solved.sensitivity @ (normals * ends[:, None])
+    # The same of its sides against its ends.
+    squeezed = 0.6 * rough * solved.sensitivity @ sides[:, None]
     return Alignment(
         q,
         solved.covariance + sum(s @ s.T for s in (shifted, twisted, squeezed)),
@@ -210,22 +189,16 @@ def _build_alignment(
         float(agrees.sum() / max(edges.expected.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
         residual,
-        int(agrees.sum()),
     )
 
 
-def _end_signs(pixels: Array) -> Array:
-    """(N,) 1 or -1, to which end of its longest extent each point of an outline belongs."""
+def _ends_and_sides(pixels: Array, normals: Array) -> tuple[Array, Array]:
+    """(N,) 1 or -1, to which end of its longest extent each point of an outline belongs; and (N,)
+    from 1 to -1, whether it is at its side or its end."""
     away = pixels - pixels.mean(axis=0)
     _, axes = np.linalg.eigh(away.T @ away)
-    return np.where(away @ axes[:, 1] > 0.0, 1.0, -1.0)
-
-
-def _side_weights(pixels: Array, normals: Array) -> Array:
-    """(N,) from 1 to -1, whether each point of an outline is at its side or its end."""
-    away = pixels - pixels.mean(axis=0)
-    _, axes = np.linalg.eigh(away.T @ away)
-    return np.asarray(2.0 * (normals @ axes[:, 0]) ** 2 - 1.0)
+    ends = np.where(away @ axes[:, 1] > 0.0, 1.0, -1.0)
+    return ends, np.asarray(2.0 * (normals @ axes[:, 0]) ** 2 - 1.0)
 
 
 def _weighted_rms(left: Array, deviation: Array) -> float:
@@ -235,7 +208,7 @@ def _weighted_rms(left: Array, deviation: Array) -> float:
 
 
 def color_likeness(
-    view: PinholeView, shape: TargetShape, q: Array, others: Array, light: NDArray[np.float32]
+    view: PinholeView, shape: TargetShape, q: Array, others: Array, light: Single
 ) -> float:
     """How alike the tones of a displaced object and of its mesh are, from 0 to 1.
 
@@ -249,13 +222,11 @@ def color_likeness(
     Returns:
         A mean over what is seen of it; 0.5 if its mesh has no colors, or nothing is seen.
     """
-    pixel_count = 1200  # Pixels of an object that are compared, about.
-    half_tone = 0.08  # Difference of chromaticity at which two colours are half alike.
-    dark_light = 0.03  # Fraction of paper's light below which a tone says little.
     if shape.colors is None:
         return 0.5
     window = view.window(shape, q, 0.0)
-    pitch = max(1.0, float(np.sqrt(window.width * window.height / pixel_count)))
+    # Pixels of an object that are compared, about.
+    pitch = max(1.0, float(np.sqrt(window.width * window.height / 1200)))
     at = window.scaled(1.0 / pitch).pixels()
     face, depth = view.hits(shape, q, at)
     seen = np.isfinite(depth) & (depth < sample_nearest(others, at, np.inf))
@@ -267,5 +238,7 @@ def color_likeness(
     known = shape.colors[face[seen]]
     total, expected = r.sum(axis=1, keepdims=True), known.sum(axis=1, keepdims=True)
     off = np.linalg.norm(r / np.maximum(total, 1e-3) - known / np.maximum(expected, 1e-3), axis=1)
-    weight = np.clip(np.minimum(total, expected)[:, 0] / (3 * dark_light), 0.05, 1.0)
-    return float((weight / (1.0 + (off / half_tone) ** 2)).sum() / weight.sum())
+    # Fraction of paper's light below which a tone says little.
+    weight = np.clip(np.minimum(total, expected)[:, 0] / (3 * 0.03), 0.05, 1.0)
+    # Difference of chromaticity at which two colours are half alike.
+    return float((weight / (1.0 + (off / 0.08) ** 2)).sum() / weight.sum())

@@ -1,4 +1,5 @@
-"""Where a camera is over the printed board, by the edges of all markers.
+"""Pose of a camera over the printed board, by the edges of all markers.
 
-Read `estimator` first; it goes from `detection` over `coarse` to `refinement`, and
-`camera_location` averages over images."""
+Read `board_pose` first. It goes from `marker_detection` over `coarse_pose` to `edge_refinement`;
+`board_estimate` averages over images.
+"""

@@ -13,10 +13,6 @@ from burg_drake.core import Array, InvalidInputError, Pose, make_pose, rotation_
 from burg_drake.station import Camera, StationLike, as_station
 
 
-def _unknown_pose() -> Array:
-    return np.full((4, 4), np.nan)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BoardEstimate:
     """The pose of a camera over the board, from one image.
@@ -36,7 +32,7 @@ class BoardEstimate:
             depth, or a camera whose place is known); NaN otherwise.
     """
 
-    X_SC: Array = field(default_factory=_unknown_pose)
+    X_SC: Array = field(default_factory=lambda: np.full((4, 4), np.nan))
     valid: bool = False
     reason: str = ""
     reprojection_error: float = float("nan")

@@ -8,18 +8,18 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
 from burg_drake.cameras.pose.coarse_pose import CoarsePose, estimate_coarse_pose
-from burg_drake.cameras.pose.edge_measurement import marker_edges
+from burg_drake.cameras.pose.edge_measurement import marker_edges, pose_difference
 from burg_drake.cameras.pose.edge_refinement import EdgeRefinement, EdgeRound, RefinedPose
 from burg_drake.cameras.pose.marker_detection import (
     MIN_FOREIGN_MARKERS,
     Detection,
     MarkerDetector,
     find_foreign_markers,
+    format_ids,
 )
 from burg_drake.cameras.pose.sheet_deviations import (
     MIN_SCALE_DEVIATION,
@@ -30,7 +30,15 @@ from burg_drake.cameras.pose.sheet_deviations import (
     wrong_marker_size,
 )
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
-from burg_drake.core import Array, InvalidInputError, rotation_angle, srgb_to_linear
+from burg_drake.core import (
+    Array,
+    Bytes,
+    Indices,
+    InvalidInputError,
+    Single,
+    rotation_angle,
+    srgb_to_linear,
+)
 from burg_drake.scene import Board
 
 
@@ -59,11 +67,11 @@ class BoardPose:
         self._detector = MarkerDetector(self._layout)
         self._edges = marker_edges(self._layout, scale)
         self._refinement = EdgeRefinement(self._edges, self._p_SQ, intrinsics)
-        self._other_board = WrongBoardCheck(board, intrinsics, scale)
+        self._wrong_board = WrongBoardCheck(board, intrinsics, scale)
 
     def estimate(
         self,
-        image: NDArray[np.uint8],
+        image: Bytes,
         *,
         depth: NDArray[np.floating[Any]] | None = None,
         X_SC_known: Array | None = None,
@@ -92,16 +100,16 @@ class BoardPose:
 
     def _estimate_coarse_to_fine(
         self,
-        grey: NDArray[np.uint8],
-        light: NDArray[np.float32],
+        grey: Bytes,
+        light: Single,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
         """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
-        if len(seen.twice) >= MIN_FOREIGN_MARKERS:
+        if len(seen.duplicated) >= MIN_FOREIGN_MARKERS:
             return BoardEstimate(
-                reason=_two_copies_reason(f"{len(seen.twice)} markers appear twice")
+                reason=_two_copies_reason(f"{len(seen.duplicated)} markers appear twice")
             )
         if not len(seen.index):
             reason = self._mirrored_reason(grey, seen) or self._no_markers_reason(grey, seen)
@@ -121,70 +129,68 @@ class BoardPose:
 
     def _refine(
         self,
-        light: NDArray[np.float32],
+        light: Single,
         poses: list[Array],
-        found: NDArray[np.intp],
+        found: Indices,
         corners: Array,
     ) -> tuple[RefinedPose | None, str]:
         """The pose that fits the edges best, or why there is none."""
-        # Radians. Poses that differ by less are merged with a larger covariance.
-        max_joint_turn = 0.03
-        min_edge_share = 0.3  # Fraction of the read markers' edges that must be seen.
         max_same_turn = 0.01  # Radians. Poses that differ by less are the same.
-        max_position_sd = 0.05  # Fraction of the camera's distance from the board.
         attempts = [self._refinement.refine(light, X_SC, found, corners) for X_SC in poses]
-        rounds = sorted((r for r in attempts if r is not None), key=lambda r: self._off(r, found))
+        rounds = sorted((r for r in attempts if r), key=lambda r: self._median_residual(r, found))
         if not rounds:
-            return (
-                None,
-                "the edges of the markers are not clear enough; improve focus, contrast or light",
+            return None, (
+                "the edges of the markers are not clear enough; improve focus, contrast or light"
             )
         best = self._refinement.with_disturbance(light, rounds[0])
-        turn = _rotation_angle(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
-        if turn > max_same_turn and not self._decided(rounds[0], rounds[1], found):
-            if turn > max_joint_turn:
+        turn = 0.0
+        if len(rounds) > 1:
+            one, other = (r.X_SC[:3, :3] for r in rounds[:2])
+            turn = float(rotation_angle(one.T @ other))
+        if turn > max_same_turn and not self._is_clearly_better(rounds[0], rounds[1], found):
+            # Radians. Poses that differ by less are merged with a larger covariance.
+            if turn > 0.03:
                 return None, (
-                    f"{_format_marker_count(len(found))} in sight: two poses fit equally well; move closer or"
-                    " show more of the board"
+                    f"{_format_marker_count(len(found))} in sight: two poses fit equally well; move"
+                    " closer or show more of the board"
                 )
-            best = replace(best, covariance=_joint_covariance(best, rounds[1]))
+            apart = pose_difference(best.X_SC, rounds[1].X_SC)
+            best = replace(best, covariance=best.covariance + np.outer(apart, apart))
         known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
-        if known > max_position_sd * np.linalg.norm(
-            best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))
-        ):
+        # Fraction of the camera's distance from the board.
+        if known > 0.05 * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
             return None, (
-                f"{_format_marker_count(len(found))} in sight: the position of the camera is only known to"
-                f" {1e3 * known:.0f} mm; move closer or show more of the board"
+                f"{_format_marker_count(len(found))} in sight: the position of the camera is only"
+                f" known to {1e3 * known:.0f} mm; move closer or show more of the board"
             )
         own = np.isin(self._edges.marker[best.views.which], found)
-        if (best.weight[own] > 0.0).mean() < min_edge_share:
+        # Fraction of the read markers' edges that must be seen.
+        if (best.weight[own] > 0.0).mean() < 0.3:
             return None, "the cells of the markers do not match their corners: is it another board?"
         return best, ""
 
-    def _decided(self, best: EdgeRound, second: EdgeRound, found: NDArray[np.intp]) -> bool:
+    def _is_clearly_better(self, best: EdgeRound, second: EdgeRound, found: Indices) -> bool:
         """Whether the edges of the markers that were read are clearly nearer to where the first
         pose puts them than to where the second one does."""
         # For one marker. Wrong poses fitted up to 0.6 worse in 92 test images.
-        min_error_ratio = 0.7
-        return self._off(second, found) > (1.0 + min_error_ratio / len(found)) * self._off(
-            best, found
-        )
+        ratio = 1.0 + 0.7 / len(found)
+        return self._median_residual(second, found) > ratio * self._median_residual(best, found)
 
-    def _off(self, last: EdgeRound, found: NDArray[np.intp]) -> float:
+    def _median_residual(self, last: EdgeRound, found: Indices) -> float:
         """How far the edges of the markers that were read are off, the median [pixels]."""
         own = np.isin(self._edges.marker[last.views.which], found)
         return float(np.median(np.abs(last.residual[own])))
 
     def _estimate(
         self,
-        grey: NDArray[np.uint8],
-        light: NDArray[np.float32],
+        grey: Bytes,
+        light: Single,
         refined: RefinedPose,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
         """What to tell about a pose."""
-        wrong = self._other_board.beyond(grey, light, refined.X_SC)
+        wrong = self._wrong_board.describe_foreign_markers(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
         used, corners, error = self._seen_corners(refined)
@@ -195,8 +201,15 @@ class BoardPose:
         if X_SC_known is not None:
             scale = scale_by_height(refined.X_SC, X_SC_known)
         if abs(scale - 1.0) > MIN_SCALE_DEVIATION:
-            return BoardEstimate(reason=_scale_doubt(scale), scale=scale)
-        blank = self._other_board.blank(light, refined.X_SC, used) if len(used) else ""
+            # Distances by such a print are false by as much.
+            reason = (
+                f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give the"
+                " measured lengths of its rulers"
+            )
+            return BoardEstimate(reason=reason, scale=scale)
+        blank = ""
+        if len(used):
+            blank = self._wrong_board.describe_blank_line(light, refined.X_SC, used)
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,
@@ -208,10 +221,9 @@ class BoardPose:
             scale=scale,
         )
 
-    def _seen_corners(self, refined: RefinedPose) -> tuple[NDArray[np.intp], Array, float]:
+    def _seen_corners(self, refined: RefinedPose) -> tuple[Indices, Array, float]:
         """Markers that were used, their corners (N, 4, 2) as their edges put them, and how far that
         is from where the pose puts them, root mean square [pixels]."""
-        min_edges = 6  # Visible edges of a marker that counts as used.
         marker = self._edges.marker[refined.views.which]
         weight = refined.weight / refined.sd**2
         normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
@@ -221,13 +233,14 @@ class BoardPose:
         np.add.at(total, marker, outer)
         toward = np.zeros((len(self._p_SQ), 2))
         np.add.at(toward, marker, (weight * refined.residual)[:, None] * normal)
-        used = np.flatnonzero((count >= min_edges) & (np.linalg.cond(total) < 1e3))
+        # Visible edges of a marker that counts as used.
+        used = np.flatnonzero((count >= 6) & (np.linalg.cond(total) < 1e3))
         shift = np.linalg.solve(total[used], toward[used][..., None])[..., 0]
         p_C = (self._p_SQ[used] - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3]
         error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
         return used, self.intrinsics.project(p_C) + shift[:, None], error
 
-    def _no_markers_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+    def _no_markers_reason(self, grey: Bytes, seen: Detection) -> str:
         """Why no marker of the board was found."""
         layout = self._layout
         other = find_foreign_markers(grey, layout) if seen.candidates else None
@@ -235,20 +248,19 @@ class BoardPose:
             return "no marker of the board in sight"
         start = f"another board: {_format_marker_count(len(other.ids))} of {other.dictionary}"
         if other.dictionary == layout.dictionary:
-            listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
             return (
-                f"{start} with ids {listed} in sight, but this one has {layout.ids[0]} to"
-                f" {layout.ids[-1]}; is first_id right?"
+                f"{start} with ids {format_ids(other.ids)} in sight, but this one has"
+                f" {layout.ids[0]} to {layout.ids[-1]}; is first_id right?"
             )
         return f"{start} in sight, but this one has {layout.dictionary}"
 
-    def _mirrored_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+    def _mirrored_reason(self, grey: Bytes, seen: Detection) -> str:
         """That more markers can be read in the mirrored image, if so."""
-        min_mirrored = 4  # Markers in the mirrored image; two may be read by chance.
         if seen.candidates < MIN_FOREIGN_MARKERS:
             return ""
         mirrored = self._detector.detect(np.ascontiguousarray(grey[:, ::-1]))
-        if mirrored.count < max(min_mirrored, len(seen.index) + 1):
+        # Markers in the mirrored image; two may be read by chance.
+        if mirrored.count < max(4, len(seen.index) + 1):
             return ""
         return (
             f"the image is mirrored: {mirrored.count} markers of the board can be read in the"
@@ -278,7 +290,7 @@ class BoardPose:
             f"{_format_marker_count(len(at))} belong to a second print next to it"
         )
 
-    def _continue_rows(self, index: NDArray[np.intp], at: Array) -> bool:
+    def _continue_rows(self, index: Indices, at: Array) -> bool:
         """Whether markers stand where the board's rows would have them if they went on past its
         columns, as on a board with another first id.
 
@@ -286,21 +298,19 @@ class BoardPose:
             index: (N,) of the markers.
             at: (N, 2) where they are on the sheet [m].
         """
-        max_grid_offset = 0.2  # Marker pitches along both axes.
         middles = self._p_SQ.mean(axis=1)[:, :2]
         columns = len(np.unique(np.round(middles[:, 0], 9)))
         pitch = (self._layout.side + self.board.markers.spacing) * np.array(self.scale)
         column, row = ((at - middles[0]) / pitch * [1.0, -1.0]).T
         off = np.abs(column - np.round(column)) + np.abs(row - np.round(row))
         follows = np.round(row) * columns + np.round(column) == index
-        return bool(follows.all() and off.max() < max_grid_offset)
+        return bool(follows.all() and off.max() < 0.2)  # Marker pitches along both axes.
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
-        scale_limits = 0.05, 1.5  # Fraction and pixels; overexposure shifts sides by a pixel.
-        share, pixels = scale_limits
         off = abs(coarse.marker_scale - 1.0)
-        if off > share and off * _median_side(seen.corners) / 2.0 > pixels:
+        # Overexposure shifts sides by a pixel.
+        if off > 0.05 and off * _median_side(seen.corners) / 2.0 > 1.5:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
@@ -326,7 +336,7 @@ class BoardPose:
 
 
 def estimate_board(
-    image: NDArray[np.uint8],
+    image: Bytes,
     intrinsics: Intrinsics,
     board: Board,
     *,
@@ -337,7 +347,7 @@ def estimate_board(
     return BoardPose(board, intrinsics).estimate(image, depth=depth, X_SC_known=X_SC_known)
 
 
-def _untinted_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _untinted_light(image: Bytes) -> Single:
     """(H, W) linear light of the lightest channel: the tints of a height map, which is printed
     below the markers, look as white in it as paper does."""
     image = np.asarray(image)
@@ -347,7 +357,7 @@ def _untinted_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     return srgb_to_linear(cv2.max(red, cv2.max(green, blue)))
 
 
-def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def grey_image(image: Bytes) -> Bytes:
     """(H, W) brightness of an image (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
 
     Raises:
@@ -372,30 +382,9 @@ def _median_side(corners: Array) -> float:
     return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
-def _rotation_angle(one: EdgeRound, other: EdgeRound) -> float:
-    """Angle between two poses [rad]."""
-    return float(rotation_angle(one.X_SC[:3, :3].T @ other.X_SC[:3, :3]))
-
-
-def _joint_covariance(one: RefinedPose, other: EdgeRound) -> Array:
-    """(6, 6) covariance of a pose if another one is as likely."""
-    turn = Rotation.from_matrix(other.X_SC[:3, :3] @ one.X_SC[:3, :3].T).as_rotvec()
-    apart = np.r_[turn, other.X_SC[:3, 3] - one.X_SC[:3, 3]]
-    return np.asarray(one.covariance + np.outer(apart, apart))
-
-
-def _scale_doubt(scale: float) -> str:
-    """What is wrong with a print of another size: distances by it are false by as much."""
-    return (
-        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give the measured"
-        " lengths of its rulers"
-    )
-
-
 def _residual_doubt(error: float) -> str:
     """What is doubtful about residuals; empty if nothing is."""
-    max_residual = 0.3  # Pixels. With more, intrinsics are wrong or the board is not flat.
-    if error > max_residual:
+    if error > 0.3:  # Pixels. With more, intrinsics are wrong or the board is not flat.
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"
             " board is flat"
@@ -406,8 +395,8 @@ def _residual_doubt(error: float) -> str:
 def _misplaced_reason(count: int, fit: int) -> str:
     """That markers stand as another board has them."""
     return (
-        f"another board: only {fit} of {_format_marker_count(count)} in sight are where this one has them;"
-        " are columns, rows and first_id right?"
+        f"another board: only {fit} of {_format_marker_count(count)} in sight are where this one"
+        " has them; are columns, rows and first_id right?"
     )
 
 

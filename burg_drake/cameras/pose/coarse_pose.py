@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.edge_measurement import cross_product, project_with_derivatives
-from burg_drake.core import Array, inverse
+from burg_drake.cameras.pose.marker_detection import side_lengths
+from burg_drake.core import Array, Booleans, inverse
 
 CORNER_TOLERANCE = 3.0, 0.1
 """Pixels, or fraction of a marker's side if larger, of a corner from its place."""
@@ -26,7 +27,7 @@ class CoarsePose:
     """
 
     X_SC: list[Array]
-    inliers: NDArray[np.bool_]
+    inliers: Booleans
     marker_scale: float
 
 
@@ -38,23 +39,18 @@ def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) ->
         corners: (N, 4, 2) corners in the image [pixels].
         intrinsics: of the camera.
     """
-    # Factor and pixels: the second pose is kept up to this reprojection error.
-    rival_limit = (3.0, 0.5)
     straight = intrinsics.undistort(corners)
     inliers = np.ones(len(p_SQ), dtype=bool)
     poses, errors = _planar_poses(p_SQ, straight, intrinsics.K)
     misplaced = max(
-        CORNER_TOLERANCE[0], CORNER_TOLERANCE[1] * float(np.median(_mean_side_lengths(corners)))
+        CORNER_TOLERANCE[0], CORNER_TOLERANCE[1] * float(np.median(side_lengths(corners)))
     )
     if len(p_SQ) > 1 and (not errors or errors[0] > 0.5 * misplaced):
-        inliers = _consistent_markers(p_SQ, straight, misplaced)
+        inliers = consistent_markers(p_SQ, straight, misplaced)
         if inliers.any():
             poses, errors = _planar_poses(p_SQ[inliers], straight[inliers], intrinsics.K)
-    rivals = [
-        X
-        for X, e in zip(poses, errors, strict=True)
-        if e <= rival_limit[0] * errors[0] + rival_limit[1]
-    ]
+    # The second pose is kept up to this reprojection error [pixels].
+    rivals = [X for X, e in zip(poses, errors, strict=True) if e <= 3.0 * errors[0] + 0.5]
     marker_scale = 1.0
     if not rivals or 2 * inliers.sum() < len(p_SQ):
         marker_scale = _marker_scale_by_centers(p_SQ, straight)
@@ -65,15 +61,12 @@ def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) ->
 
 def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], list[float]]:
     """Poses and their root mean square errors [pixels], the best first."""
-    unrefined_limit = (10.0, 5.0)  # Factor and pixels, before the second pose is refined.
-    same_pose = 1e-3  # Poses with smaller differences are one.
-    import cv2
 
     p, q = p_SQ.reshape(-1, 3), np.ascontiguousarray(straight.reshape(-1, 2))
     _, rotations, translations, errors = cv2.solvePnPGeneric(p, q, K, None, flags=cv2.SOLVEPNP_IPPE)
     found: list[tuple[float, Array]] = []
     for rotation, translation, rough in zip(rotations, translations, errors.ravel(), strict=True):
-        if found and rough > unrefined_limit[0] * found[0][0] + unrefined_limit[1]:
+        if found and rough > 10.0 * found[0][0] + 5.0:
             continue  # no refinement makes it a rival
         rotation, translation = cv2.solvePnPRefineLM(p, q, K, None, rotation, translation)
         X_CS = np.eye(4)
@@ -85,19 +78,19 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
             error = float(np.sqrt(((seen - q) ** 2).sum(axis=1).mean()))
             found.append((error, inverse(X_CS)))
     found.sort(key=lambda one: one[0])
-    if len(found) == 2 and np.allclose(found[0][1], found[1][1], atol=same_pose):
+    # Poses with smaller differences are one.
+    if len(found) == 2 and np.allclose(found[0][1], found[1][1], atol=1e-3):
         found.pop()
     return [X for _, X in found], [error for error, _ in found]
 
 
-def _consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> NDArray[np.bool_]:
+def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Booleans:
     """Markers whose corners fit the homography that most corners agree on, up to a distance
     [pixels]."""
-    import cv2
 
     cv2.setRNGSeed(0)
     _, fits = cv2.findHomography(
-        p_SQ.reshape(-1, 3)[:, :2], straight.reshape(-1, 2), cv2.RANSAC, misplaced
+        p_SQ[..., :2].reshape(-1, 2), straight.reshape(-1, 2), cv2.RANSAC, misplaced
     )
     if fits is None:
         return np.zeros(len(p_SQ), dtype=bool)
@@ -107,7 +100,6 @@ def _consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> NDArr
 def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
     """Size of the markers on a plane on which their centres stand as they should; 1 if there is no
     such."""
-    import cv2
 
     if len(p_SQ) <= 4:
         return 1.0
@@ -116,24 +108,14 @@ def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
     if H is None:
         return 1.0
     on_board = cv2.perspectiveTransform(straight.reshape(-1, 1, 2), H).reshape(-1, 4, 2)
-    sides, side = _mean_side_lengths(on_board), float(_mean_side_lengths(p_SQ).mean())
+    sides, side = side_lengths(on_board), float(side_lengths(p_SQ).mean())
     off = np.linalg.norm(on_board.mean(axis=1) - centers, axis=1)
     return float(np.median(sides)) / side if off.max() < 0.1 * side else 1.0
 
 
-def _mean_side_lengths(corners: Array) -> Array:
-    """Mean length of the sides of squares (N, 4, 2 or 3)."""
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1))
-
-
 def _marker_scale(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -> float:
     """Size of the markers, fitted together with the pose: linear least squares of small changes."""
-    pinhole = Intrinsics(
-        width=intrinsics.width,
-        height=intrinsics.height,
-        focal=intrinsics.focal,
-        center=intrinsics.center,
-    )
+    pinhole = replace(intrinsics, model="perspective", distortion=())
     q_S = p_SQ.reshape(-1, 3) - X_SC[:3, 3]
     at, by_C = project_with_derivatives(pinhole, q_S @ X_SC[:3, :3])
     by_S = by_C @ X_SC[:3, :3].T

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices, Single
 from burg_drake.scene import MarkerLayout
 
 NEIGHBOUR_EDGES = 2
@@ -29,17 +29,18 @@ class MarkerEdges:
     Attributes:
         p_SE: (N, 3) middles of the edges [m].
         axis: (N,) 0 if u runs along x, 1 if along y.
-        steps: (N, 3, 2 REACH + 1) change of color at u = -REACH ... REACH: 1 from black to white,
-            -1 from white to black, 0 none, in the rows of cells around v = -1, 0, 1.
+        steps: (N, 3, 2 n + 1) change of color at u = -n ... n, where n is `NEIGHBOUR_EDGES`: 1 from
+            black to white, -1 from white to black, 0 none, in the rows of cells around v = -1, 0
+            and 1.
         marker: (N,) which of the layout's markers each belongs to.
         from_center: (N, 3) from the middle of its marker [m].
         cell: (2,) size of a cell along x and y [m].
     """
 
     p_SE: Array
-    axis: NDArray[np.intp]
-    steps: NDArray[np.float32]
-    marker: NDArray[np.intp]
+    axis: Indices
+    steps: Single
+    marker: Indices
     from_center: Array
     cell: Array
 
@@ -69,7 +70,7 @@ def marker_edges(layout: MarkerLayout, scale: tuple[float, float] = (1.0, 1.0)) 
     return MarkerEdges(p_SE[order], axis[order], steps, marker[order], from_center[order], cell)
 
 
-def _edges_along_axis(layout: MarkerLayout, axis: int) -> tuple[Array, Array, NDArray[np.intp]]:
+def _edges_along_axis(layout: MarkerLayout, axis: int) -> tuple[Array, Array, Indices]:
     """Middles, steps and markers of the edges across one axis."""
     pad = NEIGHBOUR_EDGES + 2
     white = np.pad(~layout.black, ((0, 0), (pad, pad), (pad, pad)), constant_values=True)
@@ -112,7 +113,7 @@ class EdgeViews:
         bloom: (N,) the same if light spreads, so that white grows by a pixel on all sides: 1 or -1.
     """
 
-    which: NDArray[np.intp]
+    which: Indices
     at: Array
     across: Array
     along: Array
@@ -123,7 +124,7 @@ class EdgeViews:
 
 def project_edges(
     edges: MarkerEdges,
-    which: NDArray[np.intp],
+    which: Indices,
     intrinsics: Intrinsics,
     X_SC: Array,
     bloom: float = 0.0,
@@ -214,6 +215,12 @@ def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array
     return X
 
 
+def pose_difference(X_SC: Array, X_SC_new: Array) -> Array:
+    """(6,) small rotation [rad] and translation [m] in S from one pose to another."""
+    turn = Rotation.from_matrix(X_SC_new[:3, :3] @ X_SC[:3, :3].T).as_rotvec()
+    return np.asarray(np.r_[turn, X_SC_new[:3, 3] - X_SC[:3, 3]])
+
+
 def project_with_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
     """Image points (N, 2) and their derivatives (N, 2, 3) by the points in the camera's frame."""
     step = 1e-4  # Finite difference for the derivatives of the distortion.
@@ -238,9 +245,7 @@ def cross_product(a: Array, b: Array) -> Array:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def _cell_gradients(
-    edges: MarkerEdges, which: NDArray[np.intp], by_S: Array
-) -> tuple[Array, Array]:
+def _cell_gradients(edges: MarkerEdges, which: Indices, by_S: Array) -> tuple[Array, Array]:
     """Gradients of u and v [cells per pixel]: the inverse of the sheet's affine map to pixels."""
     cell = by_S[:, :, :2] * edges.cell
     det = cell[:, 0, 0] * cell[:, 1, 1] - cell[:, 0, 1] * cell[:, 1, 0]
@@ -279,9 +284,7 @@ class EdgeFits:
     widening: Array
 
 
-def fit_edges(
-    light: NDArray[np.float32], edges: MarkerEdges, views: EdgeViews, blur: Array
-) -> EdgeFits:
+def fit_edges(light: Single, edges: MarkerEdges, views: EdgeViews, blur: Array) -> EdgeFits:
     """Fits brightness, contrast and offset of each edge.
 
     Args:
@@ -292,7 +295,6 @@ def fit_edges(
             (N, 2, 2) of each.
     """
     blurred_variance = 1.2  # Square pixels; from there on the window is twice as wide.
-    wide_cell = 2.2  # Pixels. Larger cells keep what is two cells away out of the window.
     sigma_u, sigma_v = (_blur_width(blur, gradient) for gradient in (views.across, views.along))
     normal = np.sqrt((views.across**2).sum(axis=1, keepdims=True))
     sigma = sigma_u / normal  # across the edge [pixels]
@@ -306,12 +308,11 @@ def fit_edges(
     u = (views.across[:, :1] * dx + views.across[:, 1:] * dy).astype(np.float32)
     v = (views.along[:, :1] * dx + views.along[:, 1:] * dy).astype(np.float32)
 
-    before, behind = (
-        _normal_cdf_and_density((-0.5 - v) / sigma_v)[0],
-        _normal_cdf_and_density((v - 0.5) / sigma_v)[0],
-    )
+    before, _ = _normal_cdf_and_density((-0.5 - v) / sigma_v)
+    behind, _ = _normal_cdf_and_density((v - 0.5) / sigma_v)
     share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of the rows of cells
-    wide = bool((normal * wide_cell < 1.0).all() and (sigma**2 < blurred_variance).all())
+    # Pixels. Larger cells keep what is two cells away out of the window.
+    wide = bool((normal * 2.2 < 1.0).all() and (sigma**2 < blurred_variance).all())
     reach = 1 if wide else NEIGHBOUR_EDGES
     near = slice(NEIGHBOUR_EDGES - reach, NEIGHBOUR_EDGES + reach + 1)
     steps = share @ edges.steps[views.which][:, :, near]
@@ -324,31 +325,29 @@ def fit_edges(
     return _fit_profiles(light[rows, columns].astype(float), shape, slope, bend)
 
 
-def has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
+def has_expected_profile(fits: EdgeFits) -> Booleans:
     """Edges with the right colors, enough contrast, and a profile that fits."""
-    min_contrast_share = 0.25  # Fraction of the upper quartile of all edges.
-    max_residual_share = 0.15  # Fraction of the contrast, besides the image's noise.
     right = fits.contrast > 0.0
     if not right.any():
         return right
     usual = np.quantile(fits.contrast[right], 0.75)
     noise = np.median(fits.noise[right])
     return np.asarray(
-        (fits.contrast > min_contrast_share * usual)
-        & (fits.noise < max_residual_share * fits.contrast + 2.0 * noise)
+        (fits.contrast > 0.25 * usual)
+        & (fits.noise < 0.15 * fits.contrast + 2.0 * noise)  # 0.15 besides the image's noise
         & (np.abs(fits.offset) < MAX_EDGE_OFFSET_PX)
         & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
     )
 
 
-def offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
+def offset_variance(fits: EdgeFits, good: Booleans) -> Array:
     """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
     contrast = np.maximum(np.abs(fits.contrast), 4e-6)
     noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
     return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
 
 
-def _blur_width(blur: Array, gradient: Array) -> NDArray[np.float32]:
+def _blur_width(blur: Array, gradient: Array) -> Single:
     """(N, 1) standard deviation of a blur along gradients (N, 2), in their units."""
     variance = ((gradient[:, None] @ blur)[:, 0] * gradient).sum(axis=1, keepdims=True)
     return np.asarray(np.sqrt(variance), dtype=np.float32)

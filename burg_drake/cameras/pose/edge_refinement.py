@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.edge_measurement import (
@@ -28,7 +27,7 @@ from burg_drake.cameras.pose.sheet_deviations import (
     SheetModes,
     residuals_within_markers,
 )
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices, Single
 
 INITIAL_BLURS = np.array(
     [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
@@ -36,23 +35,11 @@ INITIAL_BLURS = np.array(
        for c, s in ((1.0, 0.0), (0.7071, 0.7071), (0.0, 1.0), (0.7071, -0.7071))]
 )  # fmt: skip
 """Initial covariances of the blur in square pixels: sharp, and motion of 7 pixels."""
-
-
-class EdgeRefinementSettings:
-    """Edge refinement settings."""
-
-    first_edges = 160  # Edges of the first rounds, in which the pose is coarse.
-    unread_edges = 320  # Edges of markers that were not read.
-    last_edges = 800  # Edges of the last rounds.
-    min_motion = 0.05  # Pixels, root mean square. Smaller motions of edges end the rounds.
-    max_full_rounds = 3  # Rounds with all edges.
-    long_motion = 0.3  # Pixels. A first step that moves an edge farther is repeated.
-    unread_share = 0.25  # Unread over read markers above which unread ones are added.
-    model_sd = 0.01  # Pixels. Error of an offset in images without noise.
-    weight_rounds = 3  # Rounds of robust weights in a step.
-    min_edges = 24  # Edges of a refined pose.
-    unused_share = 0.05  # Fraction of read markers above which misplaced markers are searched.
-    marker_rounds = 2  # Rounds of that search.
+FIRST_EDGES = 160  # Edges of the first rounds, in which the pose is coarse.
+LAST_EDGES = 800  # Edges of the last rounds.
+MIN_EDGES = 24  # Edges of a refined pose.
+OFFSET_MODEL_SD_PX = 0.01  # Error of an offset in images without noise.
+WEIGHT_ROUNDS = 3  # Rounds of robust weights in a step.
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +73,7 @@ class EdgeRound:
         residual: (N,) of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
         spread: of the light.
-        moved: edges by the round, root mean square [pixels].
+        rms_motion: of the edges by the round, root mean square [pixels].
     """
 
     X_SC: Array
@@ -97,7 +84,7 @@ class EdgeRound:
     residual: Array
     sd: Array
     spread: LightSpread
-    moved: float
+    rms_motion: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +111,9 @@ class EdgeRefinement:
 
     def refine(
         self,
-        light: NDArray[np.float32],
+        light: Single,
         X_SC: Array,
-        markers: NDArray[np.intp],
+        markers: Indices,
         corners: Array,
     ) -> EdgeRound | None:
         """Refines a pose.
@@ -143,61 +130,49 @@ class EdgeRefinement:
         read = np.zeros(len(self._corners), dtype=bool)
         read[markers] = True
         found = np.flatnonzero(read[self._edges.marker])
-        spread = self._first_spread(light, X_SC, found[: EdgeRefinementSettings.first_edges])
-        result = self._iterate(light, X_SC, found[: EdgeRefinementSettings.first_edges], spread)
-        if (
-            result
-            and np.abs(result.fits.offset - result.residual).max()
-            > EdgeRefinementSettings.long_motion
-        ):
-            result = self._iterate(
-                light, result.X_SC, found[: EdgeRefinementSettings.first_edges], result.spread
-            )
+        first, last = found[:FIRST_EDGES], found[:LAST_EDGES]
+        result = self._iterate(light, X_SC, first, self._first_spread(light, X_SC, first))
+        # Pixels. A first step that moves an edge farther is repeated.
+        if result and np.abs(result.fits.offset - result.residual).max() > 0.3:
+            result = self._iterate(light, result.X_SC, first, result.spread)
         others = self._missed_markers(result, read) if result else read
-        if result and others.sum() > EdgeRefinementSettings.unread_share * read.sum():
+        # Unread over read markers above which unread ones are added.
+        if result and others.sum() > 0.25 * read.sum():
             unread = np.flatnonzero(others[self._edges.marker])
-            which = np.concatenate(
-                [
-                    found[: EdgeRefinementSettings.first_edges],
-                    unread[: EdgeRefinementSettings.unread_edges],
-                ]
-            )
+            which = np.concatenate([first, unread[:320]])
             result = self._iterate(light, result.X_SC, which, result.spread)
-            found = found if result is None else self._seen(result, found)
-        for _ in range(EdgeRefinementSettings.max_full_rounds):
-            result = result and self._iterate(
-                light, result.X_SC, found[: EdgeRefinementSettings.last_edges], result.spread
-            )
-            if result is None or result.moved < EdgeRefinementSettings.min_motion:
+            if result is not None:
+                last = self._edges_in_sight(result, found)[:LAST_EDGES]
+        for _ in range(3):  # Rounds with all edges.
+            result = result and self._iterate(light, result.X_SC, last, result.spread)
+            # Pixels, root mean square. Smaller motions of edges end the rounds.
+            if result is None or result.rms_motion < 0.05:
                 break
         if result is None:
             return None
         shift = np.zeros((len(self._corners), 2))
         p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
         shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
-        if self._beside(result, shift) > max(
-            2.0, EdgeRefinementSettings.unused_share * len(markers)
-        ):
-            for _ in range(EdgeRefinementSettings.marker_rounds):
-                result, shift = self._iterate_by_marker(
-                    light, result, found[: EdgeRefinementSettings.last_edges], shift
-                )
+        # Fraction of read markers above which misplaced markers are searched.
+        if self._count_misplaced_markers(result, shift) > max(2.0, 0.05 * len(markers)):
+            for _ in range(2):  # Rounds of that search.
+                result, shift = self._iterate_by_marker(light, result, last, shift)
         return result
 
-    def _beside(self, result: EdgeRound, shift: Array) -> int:
+    def _count_misplaced_markers(self, result: EdgeRound, shift: Array) -> int:
         """Markers of which most edges are not where the pose puts them, nor the corners that were
         read: edges of small or half hidden markers are unclear without being elsewhere."""
-        min_shift = 1.0  # Pixels. Half of the edges of a marker shifted so far lose their profile.
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         unused = used < 0.5 * np.bincount(marker, minlength=n)
-        return int((unused & (np.linalg.norm(shift, axis=1) > min_shift)).sum())
+        # Pixels. Half of the edges of a marker shifted so far lose their profile.
+        return int((unused & (np.linalg.norm(shift, axis=1) > 1.0)).sum())
 
     def _iterate_by_marker(
         self,
-        light: NDArray[np.float32],
+        light: Single,
         last: EdgeRound,
-        which: NDArray[np.intp],
+        which: Indices,
         shift: Array,
         step: bool = True,
     ) -> tuple[EdgeRound, Array]:
@@ -223,11 +198,11 @@ class EdgeRefinement:
         looked_at = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
         good = has_expected_profile(fits)
-        if good.sum() < EdgeRefinementSettings.min_edges:
+        if good.sum() < MIN_EDGES:
             return last, shift
-        sd = np.sqrt(offset_variance(fits, good) + EdgeRefinementSettings.model_sd**2)
+        sd = np.sqrt(offset_variance(fits, good) + OFFSET_MODEL_SD_PX**2)
         weight = good.astype(float)
-        for _ in range(EdgeRefinementSettings.weight_rounds):
+        for _ in range(WEIGHT_ROUNDS):
             information = weight / sd**2
             rest = (
                 residuals_within_markers(normal, views.print, fits.offset, information, marker) / sd
@@ -235,19 +210,17 @@ class EdgeRefinement:
             weight = good * _tukey_weight(rest, good)
         offset = fits.offset + (normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
-        motion = np.zeros(7)
-        if step:
-            motion = _weighted_step(J / sd[:, None], offset / sd, weight)
+        motion = _weighted_step(J / sd[:, None], offset / sd, weight) if step else np.zeros(7)
         middle = self._edges.p_SE[views.which].mean(axis=0)
-        changed = {
-            "X_SC": perturbed_pose(last.X_SC, motion[:6], middle),
-            "views": views,
-            "fits": fits,
-            "weight": weight,
-            "residual": offset - J @ motion,
-            "sd": sd,
-        }
-        found = replace(last, **changed)
+        found = replace(
+            last,
+            X_SC=perturbed_pose(last.X_SC, motion[:6], middle),
+            views=views,
+            fits=fits,
+            weight=weight,
+            residual=offset - J @ motion,
+            sd=sd,
+        )
         return found, self._shifts_by_marker(found, found.residual)
 
     def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
@@ -263,7 +236,7 @@ class EdgeRefinement:
         G += np.eye(2) / MAX_EDGE_OFFSET_PX**2
         return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
-    def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
+    def with_disturbance(self, light: Single, last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
         found = self._disturbance(last)
         if replace(found.shifts, size=0.0) != MarkerShifts():
@@ -272,22 +245,17 @@ class EdgeRefinement:
             last = self._fit_shifted(light, last, found)
             found = self._disturbance(last)
             good = has_expected_profile(last.fits)
-            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
+            last = replace(last, weight=good * _tukey_weight(found.residual / last.sd, good))
             found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
         covariance[3:, 3:] += found.mean_square_aspect * self._unknown_size(X_SC[:3, 3])
-        changed = {
-            "X_SC": X_SC,
-            "covariance": covariance,
-            "residual": last.residual - last.views.motion @ found.step,
-        }
-        return RefinedPose(**(vars(last) | changed), disturbance=found)
+        residual = last.residual - last.views.motion @ found.step
+        last = replace(last, X_SC=X_SC, covariance=covariance, residual=residual)
+        return RefinedPose(**vars(last), disturbance=found)
 
-    def _fit_shifted(
-        self, light: NDArray[np.float32], last: EdgeRound, found: Disturbance
-    ) -> EdgeRound:
+    def _fit_shifted(self, light: Single, last: EdgeRound, found: Disturbance) -> EdgeRound:
         """A round that looks for the edges where shifts put their markers."""
         rest = last.residual - last.views.motion @ found.step
         there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
@@ -314,20 +282,15 @@ class EdgeRefinement:
 
     def _shift_by_blur(self, last: EdgeRound) -> Array:
         """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
-        sharp_variance = 0.5  # Square pixels of lens and pixel in a sharp image.
-        # Shift by motion or defocus, as a fraction of the blur's standard deviation.
-        asymmetry = 0.04
         sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
-        beyond = max(last.spread.variance - sharp_variance, 0.0)
-        return np.asarray(asymmetry**2 * beyond * sideways @ sideways.T)
+        # Square pixels of lens and pixel in a sharp image.
+        beyond = max(last.spread.variance - 0.5, 0.0)
+        # Shift by motion or defocus, as a fraction of the blur's standard deviation.
+        return np.asarray(0.04**2 * beyond * sideways @ sideways.T)
 
-    def _first_spread(
-        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
-    ) -> LightSpread:
+    def _first_spread(self, light: Single, X_SC: Array, which: Indices) -> LightSpread:
         """The blur with which edges are most like what they should be."""
-        tried = np.tile(
-            which[: EdgeRefinementSettings.first_edges // len(INITIAL_BLURS)], len(INITIAL_BLURS)
-        )
+        tried = np.tile(which[: FIRST_EDGES // len(INITIAL_BLURS)], len(INITIAL_BLURS))
         views = project_edges(self._edges, tried, self._intrinsics, X_SC)
         if len(views.which) == 0:
             return LightSpread(INITIAL_BLURS[0])
@@ -335,40 +298,37 @@ class EdgeRefinement:
         unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(INITIAL_BLURS), -1)
         return LightSpread(INITIAL_BLURS[int(np.argmin(np.median(unlike, axis=1)))])
 
-    def _missed_markers(self, result: EdgeRound, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _missed_markers(self, result: EdgeRound, read: Booleans) -> Booleans:
         """(N,) other markers that the image may show, whose place the pose tells well enough."""
-        max_prediction_sd = 0.5  # Pixels.
         at, variance = predict_pixels(
             self._corners, self._intrinsics, result.X_SC, result.covariance
         )
         size = [self._intrinsics.width, self._intrinsics.height]
         in_image = np.asarray(((at > 0.0) & (at < size)).all(axis=2)).any(axis=1)
-        return np.asarray(~read & in_image & (variance < max_prediction_sd**2).all(axis=1))
+        return np.asarray(~read & in_image & (variance < 0.5**2).all(axis=1))  # Pixels.
 
-    def _seen(self, result: EdgeRound, found: NDArray[np.intp]) -> NDArray[np.intp]:
+    def _edges_in_sight(self, result: EdgeRound, found: Indices) -> Indices:
         """Edges of the markers of which a part is in sight, and of those that were found."""
-        min_edge_share = 0.2  # Fraction of a marker's edges that must have the expected profile.
-        sure_markers = 3  # With fewer read markers, half of a marker's edges must fit.
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         read = np.unique(self._edges.marker[found])
-        share = min_edge_share if len(read) >= sure_markers else 0.5
+        share = 0.2 if len(read) >= 3 else 0.5  # of a marker's edges must have their profile
         seen = np.asarray(good > share * np.maximum(np.bincount(marker, minlength=n), 1))
         seen[read] = True
         return np.flatnonzero(seen[self._edges.marker])
 
     def _iterate(
-        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp], spread: LightSpread
+        self, light: Single, X_SC: Array, which: Indices, spread: LightSpread
     ) -> EdgeRound | None:
         max_bloom = 4.0  # Pixels; with more, no cell can be read.
         views = project_edges(self._edges, which, self._intrinsics, X_SC, spread.bloom)
-        if len(views.which) < EdgeRefinementSettings.min_edges:
+        if len(views.which) < MIN_EDGES:
             return None
         fits = fit_edges(light, self._edges, views, spread.blur)
         good = has_expected_profile(fits)
-        if good.sum() < EdgeRefinementSettings.min_edges:
+        if good.sum() < MIN_EDGES:
             return None
-        sd = np.sqrt(offset_variance(fits, good) + EdgeRefinementSettings.model_sd**2)
+        sd = np.sqrt(offset_variance(fits, good) + OFFSET_MODEL_SD_PX**2)
         J = np.column_stack([views.motion, views.bloom])
         step, weight = _robust_step(J, fits.offset, sd, good)
         residual = fits.offset - J @ step
@@ -393,11 +353,11 @@ class EdgeRefinement:
         What the model errs by is alike within a marker, so that it counts once a marker, not once
         an edge.
         """
-        marker_sd = 0.006  # Pixels. Part of the error that edges of one marker share.
         total = weight.sum()
         markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
         scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
-        alike = max(total / max(markers, 1) - 1.0, 0.0) * marker_sd**2
+        # Pixels. Part of the error that edges of one marker share.
+        alike = max(total / max(markers, 1) - 1.0, 0.0) * 0.006**2
         J = np.column_stack([views.motion, views.bloom])
         J = J * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
         covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
@@ -406,16 +366,13 @@ class EdgeRefinement:
 
 def _bloom_prior() -> Array:
     """(7, 7) information about a step that is known before."""
-    bloom_sd = 1.0  # Pixels by which white may look larger on all sides.
     prior = np.zeros((7, 7))
-    prior[6, 6] = 1.0 / bloom_sd**2
+    prior[6, 6] = 1.0  # White may look larger on all sides, by about a pixel.
     return prior
 
 
-def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
+def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: Booleans) -> Array:
     """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
-    min_variance = 0.08  # Square pixels.
-    max_variance = 16.0  # Square pixels.
     n = views.across[good]
     n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
     across, information = widening[good].T
@@ -429,28 +386,26 @@ def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[n
     share, axes = np.linalg.eigh(relative)
     better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
     variance, axes = np.linalg.eigh(better)
-    return np.asarray((axes * np.clip(variance, min_variance, max_variance)) @ axes.T)
+    return np.asarray((axes * np.clip(variance, 0.08, 16.0)) @ axes.T)
 
 
-def _robust_step(
-    motion: Array, offset: Array, sd: Array, good: NDArray[np.bool_]
-) -> tuple[Array, Array]:
+def _robust_step(motion: Array, offset: Array, sd: Array, good: Booleans) -> tuple[Array, Array]:
     """Least squares with Tukey's weights: step (7,), pose and bloom, and weights (N,)."""
     J, e = motion / sd[:, None], offset / sd
     weight = good.astype(float)
     step = _weighted_step(J, e, weight)
-    for _ in range(EdgeRefinementSettings.weight_rounds):
+    for _ in range(WEIGHT_ROUNDS):
         rest = e - J @ step
         weight = good * _tukey_weight(rest, good)
         step = _weighted_step(J, e, weight)
     return step, weight
 
 
-def _tukey_weight(rest: Array, good: NDArray[np.bool_]) -> Array:
+def _tukey_weight(rest: Array, good: Booleans) -> Array:
     """(N,) weights of residuals (N,) by the spread of the good ones."""
-    tukey_limit = 4.685  # 95 % efficiency on normal residuals.
     scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
-    return np.asarray(np.maximum(1.0 - (rest / (tukey_limit * scale)) ** 2, 0.0) ** 2)
+    # 95 % efficiency on normal residuals.
+    return np.asarray(np.maximum(1.0 - (rest / (4.685 * scale)) ** 2, 0.0) ** 2)
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:

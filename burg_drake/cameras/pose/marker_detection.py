@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, linear_levels, srgb_to_linear
+from burg_drake.core import Array, Booleans, Bytes, Indices, Single, linear_levels, srgb_to_linear
 from burg_drake.scene import MarkerLayout, marker_dictionary
 
 MIN_CELL_CONTRAST = 10.0
 """Between black and white cells of a marker, in 8-bit levels."""
 
 
-def find_dark_quadrilaterals(
-    grey: NDArray[np.uint8], window: int, constant: float, perimeter: float
-) -> Array:
+def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimeter: float) -> Array:
     """(N, 4, 2) corners of what is darker than its surroundings and has four sides, clockwise in
     the image [pixels].
 
@@ -27,10 +26,7 @@ def find_dark_quadrilaterals(
         constant: by which it is darker than their mean [8-bit levels].
         perimeter: least length of a contour [pixels].
     """
-    polygon_tolerance = 0.03  # Fraction of the contour's length: OpenCV's value.
-    min_side = 0.05  # Fraction of the contour's length: OpenCV's value.
     border = 3  # Pixels between corners and the image's border: OpenCV's value.
-    import cv2
 
     dark = cv2.adaptiveThreshold(
         grey, 255.0, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, constant
@@ -42,7 +38,8 @@ def find_dark_quadrilaterals(
             continue
         length = cv2.arcLength(contour, True)
         if length >= perimeter:
-            polygon = cv2.approxPolyDP(contour, polygon_tolerance * length, True)
+            # Fraction of the contour's length: OpenCV's value.
+            polygon = cv2.approxPolyDP(contour, 0.03 * length, True)
             if len(polygon) == 4:
                 found.append(polygon)
                 lengths.append(length)
@@ -56,13 +53,12 @@ def find_dark_quadrilaterals(
     limit = np.array([grey.shape[1], grey.shape[0]]) - 1 - border
     inside = ((corners >= border) & (corners <= limit)).all(axis=(1, 2))
     corners[turn[:, 0] < 0.0] = corners[turn[:, 0] < 0.0, ::-1]
-    chosen: Array = corners[convex & inside & (shortest >= min_side * np.array(lengths))]
+    # Fraction of the contour's length: OpenCV's value.
+    chosen: Array = corners[convex & inside & (shortest >= 0.05 * np.array(lengths))]
     return chosen
 
 
-def read_cells(
-    grey: NDArray[np.uint8], corners: Array, cells: int
-) -> tuple[NDArray[np.bool_], Array]:
+def read_cells(grey: Bytes, corners: Array, cells: int) -> tuple[Booleans, Array]:
     """Which cells of quadrilaterals are black, in rows from the first corner toward the second.
 
     Args:
@@ -74,7 +70,6 @@ def read_cells(
         (N, cells, cells), and contrasts (N,) of black and white [8-bit levels].
     """
     sample_offsets = (-0.2, 0.2)  # Cells from the middle of a cell, along both axes.
-    import cv2
 
     at = (np.arange(cells)[:, None] + 0.5 + sample_offsets).ravel() / cells
     x, y = np.meshgrid(at, at)
@@ -86,9 +81,7 @@ def read_cells(
     return _otsu_split(means.reshape(len(corners), -1), means.shape)
 
 
-def _from_unit_square(
-    corners: Array, x: Array, y: Array
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _from_unit_square(corners: Array, x: Array, y: Array) -> tuple[Single, Single]:
     """(N, M) columns and rows of points of the unit square under the homographies that take its
     corners to those of quadrilaterals (Heckbert, Fundamentals of Texture Mapping, 1989, section
     2.2)."""
@@ -103,7 +96,7 @@ def _from_unit_square(
     return (u / w).astype(np.float32), (v / w).astype(np.float32)
 
 
-def _otsu_split(means: Array, shape: tuple[int, ...]) -> tuple[NDArray[np.bool_], Array]:
+def _otsu_split(means: Array, shape: tuple[int, ...]) -> tuple[Booleans, Array]:
     """Splits each row of brightnesses where the variance between both parts is largest (Otsu, A
     Threshold Selection Method from Gray-Level Histograms, 1979)."""
     ordered = np.sort(means, axis=1)
@@ -139,25 +132,24 @@ class Detection:
         index: (N,) which of the layout's markers each is.
         corners: (N, 4, 2) their corners, in the order of the layout's [pixels].
         candidates: number of other squares that may be markers, but not of this board.
-        twice: (M,) markers of the layout that are seen at two places or more; not in `index`.
+        duplicated: (M,) markers of the layout that are seen at two places or more; not in `index`.
     """
 
-    index: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    index: Indices = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     corners: Array = field(default_factory=lambda: np.empty((0, 4, 2)))
     candidates: int = 0
-    twice: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    duplicated: Indices = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
     @property
     def count(self) -> int:
         """Markers of the board that were read."""
-        return len(self.index) + len(self.twice)
+        return len(self.index) + len(self.duplicated)
 
 
 class MarkerDetector:
     """Finds the markers of one board."""
 
     def __init__(self, layout: MarkerLayout) -> None:
-        sufficient_markers = 3  # The first search suffices with as many.
         turned = [np.rot90(layout.black, -turns, axes=(1, 2)) for turns in range(4)]
         self._cells = layout.cells
         self._border = np.pad(np.zeros((layout.cells - 2,) * 2, bool), 1, constant_values=True)
@@ -165,9 +157,9 @@ class MarkerDetector:
         self._patterns = _pack_bits(np.concatenate(turned)[:, ~self._border])
         correctable = marker_dictionary(layout.dictionary).maxCorrectionBits
         self._tolerance = int(MAX_BIT_CORRECTION * correctable)
-        self._enough = min(sufficient_markers, len(layout.ids))
+        self._enough = min(3, len(layout.ids))  # The first search suffices with as many.
 
-    def detect(self, grey: NDArray[np.uint8]) -> Detection:
+    def detect(self, grey: Bytes) -> Detection:
         """Finds markers in an image (H, W). One that is seen twice counts as not seen."""
         found = Detection()
         for encoded, (windows, constant) in SEARCHES:
@@ -179,9 +171,7 @@ class MarkerDetector:
                 break
         return found
 
-    def _search(
-        self, grey: NDArray[np.uint8], windows: tuple[int, ...], constant: float
-    ) -> Detection:
+    def _search(self, grey: Bytes, windows: tuple[int, ...], constant: float) -> Detection:
         perimeter = MIN_PERIMETER * max(grey.shape)
         squares = np.concatenate(
             [find_dark_quadrilaterals(grey, window, constant, perimeter) for window in windows]
@@ -203,11 +193,8 @@ class MarkerDetector:
         index, corners, twice = _remove_duplicates(index, corners)
         return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()), twice)
 
-    def _refined_corners(self, grey: NDArray[np.uint8], corners: Array) -> Array:
+    def _refined_corners(self, grey: Bytes, corners: Array) -> Array:
         """Corners where the lines of both of their sides meet."""
-        # Half window: fraction of a cell, and its limits in pixels (OpenCV's values).
-        window_limits = (0.3, 1, 5)
-        import cv2
 
         if not len(corners):
             return corners
@@ -216,15 +203,14 @@ class MarkerDetector:
         direction = side / np.sqrt((side**2).sum(axis=2, keepdims=True))
         corners = corners + 0.5 * (direction - np.roll(direction, -1, axis=1))
         cell = side_lengths(corners).min() / self._cells
-        share, least, most = window_limits
-        half = int(np.clip(np.rint(share * cell), least, most))
+        half = int(np.clip(np.rint(0.3 * cell), 1, 5))  # OpenCV's values
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.1)  # OpenCV's values
         flat = np.ascontiguousarray(corners.reshape(-1, 1, 2), dtype=np.float32)
         exact = cv2.cornerSubPix(grey, flat, (half, half), (-1, -1), criteria)
         return np.asarray(exact, dtype=float).reshape(-1, 4, 2)
 
 
-def _pack_bits(cells: NDArray[np.bool_]) -> NDArray[np.uint64]:
+def _pack_bits(cells: Booleans) -> NDArray[np.uint64]:
     """(N,) cells (N, K) as the bits of a number; dictionaries have 49 at most."""
     bits = np.uint64(1) << np.arange(cells.shape[1], dtype=np.uint64)
     return np.asarray(np.where(cells, bits, np.uint64(0)).sum(axis=1, dtype=np.uint64))
@@ -236,18 +222,16 @@ def side_lengths(corners: Array) -> Array:
     return np.asarray(np.sqrt((side**2).sum(axis=2)).mean(axis=1))
 
 
-def _remove_duplicates(
-    index: NDArray[np.intp], corners: Array
-) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+def _remove_duplicates(index: Indices, corners: Array) -> tuple[Indices, Array, Indices]:
     """Markers that are seen at one place, by the largest quadrilateral there, and those that are
     seen at several."""
-    duplicate_distance = 0.5  # Fraction of a side; nearer quadrilaterals are one marker.
     side, middle = side_lengths(corners), corners.mean(axis=1)
     order = np.lexsort((-side, index))
     index, corners, side, middle = index[order], corners[order], side[order], middle[order]
     values, first, which = np.unique(index, return_index=True, return_inverse=True)
     largest = first[which]
-    elsewhere = np.abs(middle - middle[largest]).max(axis=1) > duplicate_distance * side[largest]
+    # Quadrilaterals within half a side of each other are one marker.
+    elsewhere = np.abs(middle - middle[largest]).max(axis=1) > 0.5 * side[largest]
     once = ~np.isin(values, index[elsewhere])
     return values[once], corners[first[once]], values[~once]
 
@@ -265,27 +249,25 @@ class ForeignMarkers:
     ids: tuple[int, ...]
 
 
-def find_foreign_markers(grey: NDArray[np.uint8], layout: MarkerLayout) -> ForeignMarkers | None:
+def format_ids(ids: tuple[int, ...] | list[int]) -> str:
+    """The first ids as text."""
+    return ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
+
+
+def find_foreign_markers(grey: Bytes, layout: MarkerLayout) -> ForeignMarkers | None:
     """Looks for markers that a board does not have: of its dictionary, and of common others.
 
     Takes as long as eight detections.
 
     Returns:
-        Those of the dictionary of which there are most; None if there are fewer than `MIN_FOREIGN_MARKERS`
-        of each.
+        Those of the dictionary of which there are most; None if there are fewer than
+        `MIN_FOREIGN_MARKERS` of each.
     """
     # Dictionaries of other boards.
-    common_dictionaries = (
-        "ARUCO_MIP_36h12",
-        "4X4_250",
-        "5X5_250",
-        "6X6_250",
-        "7X7_250",
-        "APRILTAG_36h11",
-        "ARUCO_ORIGINAL",
-    )
+    others = ["ARUCO_MIP_36h12", "4X4_250", "5X5_250", "6X6_250", "7X7_250", "APRILTAG_36h11"]
+    others += ["ARUCO_ORIGINAL", layout.dictionary]
     best: ForeignMarkers | None = None
-    names = {name.lower(): name for name in (*common_dictionaries, layout.dictionary)}
+    names = {name.lower(): name for name in others}
     for name in names.values():
         ids = _opencv_detector(marker_dictionary(name)).detectMarkers(grey)[1]
         found = tuple(sorted({int(i) for i in np.ravel([] if ids is None else ids)}))
@@ -295,7 +277,6 @@ def find_foreign_markers(grey: NDArray[np.uint8], layout: MarkerLayout) -> Forei
 
 
 def _opencv_detector(dictionary: Any) -> Any:
-    import cv2
 
     parameters = cv2.aruco.DetectorParameters()
     (window,), constant = FIRST_SEARCH

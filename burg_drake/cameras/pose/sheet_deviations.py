@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.edge_measurement import MIN_VISIBLE_DEPTH, EdgeViews
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 
 MARKER_SIGMAS_PX = 0.006, 0.02, 0.06, 0.2
 """Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
@@ -37,7 +37,7 @@ class MarkerShifts:
     """Standard deviations of shifts; 0 for those that are not.
 
     Attributes:
-        alone: of single markers [pixels].
+        marker: of single markers [pixels].
         in_plane: along the sheet [m].
         out_of_plane: of the sheet's height [m].
         rows: while the rows of the image are exposed [pixels].
@@ -45,7 +45,7 @@ class MarkerShifts:
         size: of the markers for their distances [-].
     """
 
-    alone: float = MARKER_SIGMAS_PX[0]
+    marker: float = MARKER_SIGMAS_PX[0]
     in_plane: float = 0.0
     out_of_plane: float = 0.0
     rows: float = 0.0
@@ -70,7 +70,7 @@ class Disturbance:
         size: by how much the markers are larger for their distances [-].
         mean_square_aspect: of how much longer the print may be along y than along x, by
             probability, whether told or not [-].
-        rest: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
+        residual: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
     """
 
     step: Array
@@ -82,7 +82,7 @@ class Disturbance:
     aspect: float
     size: float
     mean_square_aspect: float
-    rest: Array
+    residual: Array
 
 
 class SheetModes:
@@ -100,22 +100,21 @@ class SheetModes:
 
     def __init__(self, p_SQ: Array, p_SE: Array) -> None:
         """Takes the markers' corners (M, 4, 3) and the edges' middles (N, 3) [m]."""
-        # Metres within which shifts along the sheet are correlated: half an A4 page.
-        page_length = 0.15
-        bulge_length = 0.14  # Metres within which heights are correlated.
         center = p_SQ.mean(axis=1)
         n = len(center)
         self.middle = center[:, :2].mean(axis=0)
         x, y = (center[:, :2] - self.middle).T
         one, zero = np.ones(n), np.zeros(n)
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
-        alike, between = _correlated_covariance(center, p_SE, page_length)
+        # Metres within which shifts along the sheet are correlated: half an A4 page.
+        alike, between = _correlated_covariance(center, p_SE, 0.15)
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _covariance_modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
         # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
         corners = p_SQ.reshape(-1, 3)
-        alike, between = _correlated_covariance(corners, p_SE, bulge_length)
+        # Metres within which heights are correlated.
+        alike, between = _correlated_covariance(corners, p_SE, 0.14)
         plane = np.column_stack([np.ones(len(corners)), corners[:, :2] - self.middle])
         self.out_of_plane = between @ _covariance_modes(alike, plane)
 
@@ -133,11 +132,11 @@ def _correlated_covariance(points: Array, p_SE: Array, within: float) -> tuple[A
 
 def _covariance_modes(covariance: Array, whole: Array) -> Array:
     """(N, K) independent patterns of a covariance (N, N) without what moves all (N, 3)."""
-    max_modes = 40  # Patterns of each kind of shift.
     Q, _ = np.linalg.qr(whole)
     rest = np.eye(len(covariance)) - Q @ Q.T
     variance, patterns = np.linalg.eigh(rest @ covariance @ rest)
-    kept = np.flatnonzero(variance > MIN_MODE_VARIANCE * variance[-1])[-max_modes:]
+    # Patterns of each kind of shift.
+    kept = np.flatnonzero(variance > MIN_MODE_VARIANCE * variance[-1])[-40:]
     return np.asarray(patterns[:, kept] * np.sqrt(variance[kept]))
 
 
@@ -156,7 +155,7 @@ class _ShiftSolution:
     shifts: MarkerShifts
     x: Array
     covariance: Array
-    columns: NDArray[np.intp]
+    columns: Indices
 
 
 class DisturbanceFit:
@@ -177,7 +176,7 @@ class DisturbanceFit:
         views: EdgeViews,
         offset: Array,
         information: Array,
-        marker: NDArray[np.intp],
+        marker: Indices,
         modes: SheetModes,
         height: int,
     ) -> None:
@@ -210,7 +209,7 @@ class DisturbanceFit:
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
         self._J = np.column_stack(list(parts.values()))
         self._add_up()
-        self._equations = {alone: self._normal_equations(alone) for alone in MARKER_SIGMAS_PX}
+        self._equations = {sd: self._normal_equations(sd) for sd in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
         """The most probable shifts, and the step of the pose with them.
@@ -220,11 +219,11 @@ class DisturbanceFit:
             center: standard deviation of the camera's principal point along u and v [pixels].
         """
         solved = {s: self._solve(s, prior) for s in map(MarkerShifts, MARKER_SIGMAS_PX)}
-        best = max(solved.values(), key=_log_probability)
+        best = max(solved.values(), key=lambda s: s.logarithm)
         for _ in range(len(SHIFT_SIGMAS)):
             others = [s for s in _neighbouring_shifts(best.shifts) if s not in solved]
             solved |= {s: self._solve(s, prior) for s in others}
-            better = max(solved.values(), key=_log_probability)
+            better = max(solved.values(), key=lambda s: s.logarithm)
             if better is best:
                 break
             best = better
@@ -237,17 +236,16 @@ class DisturbanceFit:
 
     def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
         """Variance of offsets within markers over that by the image's noise."""
-        min_freedom = 5  # Degrees of freedom from which on the spread is known.
-        min_spread = 1e-3  # Relative to noise; keeps probabilities finite.
         alike = np.column_stack([views.motion, views.bloom, views.print])
         rest = residuals_within_markers(
             self._normal, alike, self._offset, information, self._marker
         )
         markers = len(np.unique(self._marker[self._kept]))
         freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
-        if freedom < min_freedom:
+        if freedom < 5:  # Degrees of freedom from which on the spread is known.
             return 1.0
-        return float(max((information * rest**2).sum() / freedom, min_spread))
+        # Relative to noise; keeps probabilities finite.
+        return float(max((information * rest**2).sum() / freedom, 1e-3))
 
     def _add_up(self) -> None:
         """Sums over all edges, and those by marker, of the columns and of what is seen."""
@@ -259,25 +257,24 @@ class DisturbanceFit:
         seen = np.column_stack([self._J, self._offset])
         self._squares = (seen * weight[:, None]).T @ seen
 
-    def _normal_equations(self, alone: float) -> tuple[Array, Array, float]:
+    def _normal_equations(self, marker_sd: float) -> tuple[Array, Array, float]:
         """(K, K) and (K,) normal equations of all columns if single markers are shifted as well,
         and what that leaves of the logarithm of the probability."""
-        inner = self._G + np.eye(2) / alone**2
+        inner = self._G + np.eye(2) / marker_sd**2
         a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
         det = a * c - b * b
         inverse = np.stack([c, -b, -b, a], axis=-1).reshape(-1, 2, 2) / det[:, None, None]
         shares = self._shares.reshape(-1, self._shares.shape[2])
         left = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
-        volume = float(np.log(det * alone**4).sum())
+        volume = float(np.log(det * marker_sd**4).sum())
         return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
 
     def _solve(self, shifts: MarkerShifts, prior: Array) -> _ShiftSolution:
-        log_prior_penalty = 6.0  # For each kind of shift; twice for its largest size.
         pose = self._columns["pose"]
         sds = {kind: getattr(shifts, kind) for kind in SHIFT_SIGMAS if getattr(shifts, kind)}
         columns = np.concatenate([pose, *(self._columns[kind] for kind in sds)])
         known = np.repeat(np.array(list(sds.values())), [len(self._columns[kind]) for kind in sds])
-        A, b, logarithm = self._equations[shifts.alone]
+        A, b, logarithm = self._equations[shifts.marker]
         A, b = A[np.ix_(columns, columns)], b[columns]
         A[: len(pose), : len(pose)] += prior
         A[range(len(pose), len(A)), range(len(pose), len(A))] += known**-2.0
@@ -288,7 +285,8 @@ class DisturbanceFit:
             1 + (sds[k] == SHIFT_SIGMAS[k][-1] and len(SHIFT_SIGMAS[k]) > 1)
             for k in _present_kinds(shifts)
         )
-        logarithm -= float(np.log(known).sum()) + log_prior_penalty * rare
+        # For each kind of shift; twice for its largest size.
+        logarithm -= float(np.log(known).sum()) + 6.0 * rare
         return _ShiftSolution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(
@@ -296,19 +294,19 @@ class DisturbanceFit:
     ) -> Disturbance:
         """What the best solution says, its step and covariance those of all, by probability. The
         step takes the principal point as it is known, so that the pose fits the image with it."""
-        report_threshold = 8.0  # Gain of log probability from which on a kind of shift is reported.
-        temperature = 4.0  # Divides log probabilities: the patterns only approximate a real sheet.
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
         chosen = _present_kinds(best.shifts)
         for kind in SHIFT_SIGMAS:
             without = (s for s in solved if not _present_kinds(s.shifts) - (chosen - {kind}))
-            if best.logarithm - max(map(_log_probability, without)) < report_threshold:
+            # Gain of log probability from which on a kind of shift is reported.
+            if best.logarithm - max(s.logarithm for s in without) < 8.0:
                 x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (
             x[self._columns[kind]] for kind in SHIFT_SIGMAS
         )
-        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / temperature)
+        # Divides log probabilities: the patterns only approximate a real sheet.
+        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / 4.0)
         weight /= weight.sum()
         aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
         steps = np.array([s.x[:6] for s in solved])
@@ -316,7 +314,7 @@ class DisturbanceFit:
         apart = steps - step
         covariance = np.einsum("s,sij->ij", weight, [s.covariance[:6, :6] for s in solved])
         covariance += (apart * weight[:, None]).T @ apart
-        A, _, _ = self._equations[best.shifts.alone]
+        A, _, _ = self._equations[best.shifts.marker]
         by_center = (best.covariance @ A[np.ix_(best.columns, self._columns["center"])])[:6]
         covariance += center**2 * by_center @ by_center.T
         return Disturbance(
@@ -334,7 +332,7 @@ class DisturbanceFit:
 
 
 def residuals_within_markers(
-    normal: Array, alike: Array, offset: Array, information: Array, marker: NDArray[np.intp]
+    normal: Array, alike: Array, offset: Array, information: Array, marker: Indices
 ) -> Array:
     """(N,) offsets of edges without what a shift of each marker explains, and changes that are
     alike for all markers [pixels].
@@ -359,35 +357,16 @@ def residuals_within_markers(
     return np.asarray(seen[:, -1] - seen[:, :-1] @ factors)
 
 
-def _log_probability(solution: _ShiftSolution) -> float:
-    return solution.logarithm
-
-
 def _present_kinds(shifts: MarkerShifts) -> set[str]:
     return {kind for kind in SHIFT_SIGMAS if getattr(shifts, kind)}
 
 
 def _neighbouring_shifts(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
     """Shifts that differ from some in one kind, and in those of single markers."""
-    for alone in {shifts.alone, MARKER_SIGMAS_PX[0]}:
+    for marker_sd in {shifts.marker, MARKER_SIGMAS_PX[0]}:
         for kind, values in SHIFT_SIGMAS.items():
             for value in values:
-                yield replace(shifts, alone=alone, **{kind: value})
-
-
-class PrintTolerances:
-    """Print tolerances."""
-
-    aspect = 0.003, 0.05  # Unequal scale that is reported, and that means another board.
-    # Relative marker size error that is reported, and that means another board.
-    marker_size = 0.01, 0.015
-    bloom = 0.5  # Pixels. Shift of a marker's outline that overexposure may cause.
-    row_motion = 0.5  # Pixels between first and last row that are reported.
-    max_row_motion = 10.0  # Pixels; with more, no pose is given.
-    max_page_shift = 5e-3  # Metres; with more, no pose is given.
-    max_bulge_height = 8e-3  # Metres; with more, no pose is given.
-    page_shift = 2e-4  # Metres that are reported.
-    bulge_height = 5e-4  # Metres that are reported.
+                yield replace(shifts, marker=marker_sd, **{kind: value})
 
 
 MIN_SCALE_DEVIATION = 0.01
@@ -402,25 +381,19 @@ def wrong_marker_size(found: Disturbance, side: float) -> float:
         found: in the image.
         side: of a marker in the image [pixels].
     """
-    other = (
-        abs(found.size) > PrintTolerances.marker_size[1]
-        and abs(found.size) * side / 2.0 > PrintTolerances.bloom
-    )
+    # Pixels. Shift of a marker's outline that overexposure may cause.
+    other = abs(found.size) > 0.015 and abs(found.size) * side / 2.0 > 0.5
     return 1.0 + found.size if other else 1.0
 
 
 def implausible_reason(found: Disturbance) -> str:
     """Why no print of a board looks like that; empty if one may."""
-    if abs(found.aspect) > PrintTolerances.aspect[1]:
+    if abs(found.aspect) > 0.05:
         return (
             f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
             " along y as along x"
         )
-    if (
-        found.rows > PrintTolerances.max_row_motion
-        or found.in_plane > PrintTolerances.max_page_shift
-        or found.out_of_plane > PrintTolerances.max_bulge_height
-    ):
+    if found.rows > 10.0 or found.in_plane > 5e-3 or found.out_of_plane > 8e-3:  # Pixels, metres
         return (
             "markers are not where a flat board at rest has them: check the intrinsics and the"
             " light, and that the board is one sheet"
@@ -430,28 +403,28 @@ def implausible_reason(found: Disturbance) -> str:
 
 def print_doubt(found: Disturbance) -> str:
     """What is doubtful about a print, how it lies, or the camera's motion; empty if all is well."""
-    if abs(found.aspect) > PrintTolerances.aspect[0]:
+    if abs(found.aspect) > 0.003:
         return (
             f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"
             " measure its rulers and print it again with the measured lengths, or check the"
             " intrinsics"
         )
-    if abs(found.size) > PrintTolerances.marker_size[0]:
+    if abs(found.size) > 0.01:
         return (
             f"the scale is uncertain: markers look {1.0 + found.size:.3f} times as large, relative"
             " to their spacing: too much light, or another board?"
         )
-    if found.rows > PrintTolerances.row_motion:
+    if found.rows > 0.5:  # Pixels between first and last row that are reported.
         return (
             f"the camera moved by {found.rows:.1f} pixels during its rolling shutter: hold it"
             " still, or add light"
         )
-    if found.in_plane > PrintTolerances.page_shift:
+    if found.in_plane > 2e-4:  # Metres that are reported.
         return (
             f"markers are up to {1e3 * found.in_plane:.1f} mm from their positions in the plane:"
             " check the intrinsics, and that pages are glued exactly"
         )
-    if found.out_of_plane > PrintTolerances.bulge_height:
+    if found.out_of_plane > 5e-4:  # Metres that are reported.
         return (
             f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm out of its plane: check the"
             " intrinsics, and that it lies flat"
@@ -470,7 +443,6 @@ def scale_by_depth(
         X_SC: (4, 4) pose that the image gives with the document's size.
         depth: (H, W) distance along the optical axis [m]; 0, NaN or infinite where unknown.
     """
-    min_depths = 12  # Corners with a depth.
     p_C = (p_SQ.reshape(-1, 3) - X_SC[:3, 3]) @ X_SC[:3, :3]
     p_C = p_C[p_C[:, 2] > MIN_VISIBLE_DEPTH]
     columns, rows = np.rint(intrinsics.project(p_C)).astype(np.intp).reshape(-1, 2).T
@@ -478,7 +450,7 @@ def scale_by_depth(
     measured = np.asarray(depth, dtype=float)[rows[inside], columns[inside]]
     ratio = measured / p_C[inside, 2]
     ratio = ratio[np.isfinite(ratio) & (measured > 0.0)]
-    return float(np.median(ratio)) if len(ratio) >= min_depths else float("nan")
+    return float(np.median(ratio)) if len(ratio) >= 12 else float("nan")  # Corners with a depth.
 
 
 def scale_by_height(X_SC: Array, X_SC_known: Array) -> float:

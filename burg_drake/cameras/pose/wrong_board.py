@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.pose.edge_measurement import MIN_VISIBLE_DEPTH
 from burg_drake.cameras.pose.marker_detection import (
     MAX_BIT_CORRECTION,
     MAX_BORDER_ERRORS,
+    format_ids,
     read_cells,
 )
-from burg_drake.core import Array
+from burg_drake.core import Array, Bytes, Indices, Single
 from burg_drake.scene import Board, marker_dictionary
 
 SIDE_DIRECTIONS = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
@@ -33,9 +34,6 @@ class WrongBoardCheck:
     """
 
     def __init__(self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float]) -> None:
-        # Points of a place that must be blank; the outer ones are on its border.
-        points_per_axis = 4
-        field_margin = 1.02  # Slopes of used rays over those of the image's corners.
         layout = board.layout
         self._layout, self._intrinsics = layout, intrinsics
         self._columns = len(np.unique(np.round(layout.p_SQ[:, 0, 0], 9)))
@@ -47,21 +45,21 @@ class WrongBoardCheck:
         first = layout.p_SQ[0].mean(axis=0)[:2]
         self._around = (first + pitch * np.stack([column, -row], axis=-1)[ring]) * scale
         self._inside = layout.p_SQ.mean(axis=1)[:, :2] * scale
-        corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * [
-            intrinsics.width - 1,
-            intrinsics.height - 1,
-        ]
+        last_pixel = intrinsics.width - 1, intrinsics.height - 1
+        corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * last_pixel
         slopes = (intrinsics.undistort(corners) - intrinsics.center) / intrinsics.focal
-        self._steepest = field_margin * float(np.linalg.norm(slopes, axis=1).max())
+        # Slopes of used rays over those of the image's corners.
+        self._steepest = 1.02 * float(np.linalg.norm(slopes, axis=1).max())
         cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
         # Middles of the border's cells, and the white beside them, in half sides.
         self._frame = np.concatenate(
             [(1.0 - cell) * SIDE_DIRECTIONS, (1.0 + min(cell, gap)) * SIDE_DIRECTIONS]
         )
-        middles = np.linspace(cell - 1.0, 1.0 - cell, points_per_axis)
+        # Points of a place that must be blank; the outer ones are on its border.
+        middles = np.linspace(cell - 1.0, 1.0 - cell, 4)
         self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
-    def beyond(self, grey: NDArray[np.uint8], light: NDArray[np.float32], X_SC: Array) -> str:
+    def describe_foreign_markers(self, grey: Bytes, light: Single, X_SC: Array) -> str:
         """Which markers stand around the grid, where the document has none.
 
         Args:
@@ -72,30 +70,29 @@ class WrongBoardCheck:
         Returns:
             What is wrong; empty if nothing is.
         """
-        min_frame_contrast = 0.4  # Fraction of the light of the white frame.
-        min_frame_sides = 3  # Sides of four that must look like a marker's border.
         min_foreign = 2  # Markers beyond the document's that show another board.
         at, seen = self._places(X_SC, self._around, self._frame)
         if not seen.any():
             return ""
         values = _sample_light(light, at[seen])
-        darker = (values[:, :4] < (1.0 - min_frame_contrast) * values[:, 4:]).sum(axis=1)
-        suspects = self._around[seen][darker >= min_frame_sides]
+        # Fraction of the light of the white frame.
+        darker = (values[:, :4] < 0.6 * values[:, 4:]).sum(axis=1)
+        # Sides of four that must look like a marker's border.
+        suspects = self._around[seen][darker >= 3]
         ids = self._read(grey, X_SC, suspects) if len(suspects) >= min_foreign else []
         if len(ids) < min_foreign:
             return ""
-        listed = ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
         return (
-            f"another board: markers with ids {listed} lie next to those of the document, which"
-            f" has {self._columns} x {self._rows} from {self._layout.ids[0]} to"
+            f"another board: markers with ids {format_ids(ids)} lie next to those of the document,"
+            f" which has {self._columns} x {self._rows} from {self._layout.ids[0]} to"
             f" {self._layout.ids[-1]}; are count and first_id right?"
         )
 
-    def blank(self, light: NDArray[np.float32], X_SC: Array, used: NDArray[np.intp]) -> str:
+    def describe_blank_line(self, light: Single, X_SC: Array, used: Indices) -> str:
         """Which row or column next to those in sight is blank paper.
 
         Args:
-            light, X_SC: see `beyond`.
+            light, X_SC: see `describe_foreign_markers`.
             used: markers that were seen, as indices of the layout's.
 
         Returns:
@@ -110,19 +107,18 @@ class WrongBoardCheck:
 
     def _is_blank(
         self,
-        light: NDArray[np.float32],
+        light: Single,
         X_SC: Array,
-        used: NDArray[np.intp],
+        used: Indices,
         across: bool,
         line: int,
     ) -> bool:
         """All places of a row or column that are in the image are as light as paper all over."""
-        min_blank_places = 3  # Visible places of a row or column, or all of them.
         max_difference = 0.35  # Fraction of the light of paper nearby.
         every = np.arange(len(self._inside)).reshape(self._rows, self._columns)
         which = every[line] if across else every[:, line]
         at, seen = self._places(X_SC, self._inside[which], self._looks)
-        if seen.sum() < min(min_blank_places, len(which)):
+        if seen.sum() < min(3, len(which)):  # Visible places of a row or column, or all of them.
             return False
         values = _sample_light(light, at[seen])
         if (np.ptp(values, axis=1) > 2.0 * max_difference * values.max(axis=1)).any():
@@ -170,7 +166,7 @@ class WrongBoardCheck:
         seen &= ((at >= 0.0) & (at <= limit)).all(axis=2)
         return at, seen.all(axis=1)
 
-    def _read(self, grey: NDArray[np.uint8], X_SC: Array, middles: Array) -> list[int]:
+    def _read(self, grey: Bytes, X_SC: Array, middles: Array) -> list[int]:
         """Numbers of markers that stand upright at places (N, 2), each once."""
         at, _ = self._places(X_SC, middles, CORNER_DIRECTIONS)
         black, _ = read_cells(grey, at, self._layout.cells)
@@ -185,9 +181,8 @@ class WrongBoardCheck:
         return sorted(ids)
 
 
-def _sample_light(light: NDArray[np.float32], at: Array) -> Array:
+def _sample_light(light: Single, at: Array) -> Array:
     """(N, M) light at pixels (N, M, 2), bilinear."""
-    import cv2
 
     u, v = np.moveaxis(at.astype(np.float32), 2, 0)
     return np.asarray(cv2.remap(light, u, v, cv2.INTER_LINEAR), dtype=float)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class BundleFiles:
-    """Bundle files."""
+    """Names of the files at the top of a bundle."""
 
     places = "places.json"  # Where the model files lie in the bundle.
     scene = "scene.yaml"  # Scene document.
@@ -73,30 +73,25 @@ def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundl
         InvalidInputError: a file cannot be read.
         UnknownNameError: a model names a package that is nowhere.
     """
-    # No package name has a dot, so these folders do not collide with one.
-    library_folder = "library.d"
-    hand_folder = "hand.d"
-    arm_folder = "arm.d"
     used = {i.object: None for i in (*scene.instances.values(), *scene.background.values())}
     entries = {name: scene.library.entry(name) for name in used}
     root = Path(os.path.abspath(scene.library.root))
     own = [root / file for entry in entries.values() for file in entry.files]
     models = [root / entry.sdf for entry in entries.values()]
     packages = station.packages
-    library = _BundleTree.of(library_folder, root, models, own, packages)
-    hand = _BundleTree.of(hand_folder, station.hand_model, [station.hand_model], [], packages)
-    trees = [library, hand]
-    if station.arm_model is not None:
-        trees.append(
-            _BundleTree.of(arm_folder, station.arm_model, [station.arm_model], [], packages)
-        )
+    # No package name has a dot, so none is that of one of these folders.
+    trees = [_BundleTree.of("library.d", root, models, own, packages)]
+    for folder, model in (("hand.d", station.hand_model), ("arm.d", station.arm_model)):
+        if model is not None:
+            trees.append(_BundleTree.of(folder, model, [model], [], packages))
     if looks:
         trees = [tree.with_looks() for tree in trees]
     folders = {name: folder for tree in trees for name, folder in tree.packages.items()}
+    library, hand, *arm = (tree.anchor for tree in trees)
     places = {
-        "library": library.anchor,
-        "hand_model": hand.anchor,
-        "arm_model": trees[2].anchor if station.arm_model is not None else None,
+        "library": library,
+        "hand_model": hand,
+        "arm_model": arm[0] if arm else None,
         "packages": sorted(folders),
     }
     contents = {f"{n}/package.xml": _manifest_bytes(n, folder) for n, folder in folders.items()}
@@ -107,7 +102,7 @@ def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundl
         BundleFiles.scene: dump_document(replace(scene.document, origin=None, library="")).encode(),
         BundleFiles.station: dump_document(replace(station.document, packages={})).encode(),
         BundleFiles.hand: dump_document(station.hand).encode(),
-        f"{library.anchor}/{LIBRARY_FILE}": dump_document(objects).encode(),
+        f"{library}/{LIBRARY_FILE}": dump_document(objects).encode(),
     }
     data = _zip_contents(contents)
     return Bundle(
@@ -214,10 +209,8 @@ class _BundleTree:
 
         def name(path: Path) -> str:
             package = _package_of(path, folders)
-            if package is None:
-                return (PurePosixPath(top) / path.relative_to(base).as_posix()).as_posix()
-            inside = path.relative_to(folders[package])
-            return (PurePosixPath(package) / inside.as_posix()).as_posix()
+            folder, start = (top, base) if package is None else (package, folders[package])
+            return (PurePosixPath(folder) / path.relative_to(start)).as_posix()
 
         return cls(name(anchor), {name(file): file for file in files}, folders)
 

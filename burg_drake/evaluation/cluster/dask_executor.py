@@ -17,55 +17,16 @@ from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.bundle import Bundle
 from burg_drake.evaluation.cluster.document import (
     Cluster,
-    TlsFiles,
     read_cluster,
     require_safe_address,
+    start_jobqueue,
 )
+from burg_drake.evaluation.cluster.node import LocalNodes
 from burg_drake.evaluation.executor import Job, OnFailure, WorkerLimits
-
-
-def connection_failure_reason(where: object, error: BaseException) -> str:
-    """A reason in one line.
-
-    Args:
-        where: the address that was tried; of anything else no more is known than the error says.
-        error: of Dask.
-    """
-    connect_timeout = 2.0  # Seconds.
-    words = _innermost_error(error)
-    if not isinstance(where, str):
-        return words
-    parts = urlsplit(where)
-    try:
-        socket.create_connection(
-            (parts.hostname or "", parts.port or 0), timeout=connect_timeout
-        ).close()
-    except ConnectionRefusedError:
-        return "nobody listens there (connection refused)"
-    except socket.gaierror:
-        return f"there is no machine with the name {parts.hostname}"
-    except TimeoutError:
-        return "the machine does not answer; is it off, or does a firewall block the connection?"
-    except OSError as refused:
-        return refused.strerror or words
-    return (
-        "something listens there, but does not answer like a scheduler with "
-        f"{parts.scheme}:// ({words})"
-    )
-
-
-def _innermost_error(error: BaseException) -> str:
-    """Of an error and its causes the innermost one that has words."""
-    words = type(error).__name__
-    cause: BaseException | None = error
-    while cause is not None:
-        words = " ".join(str(cause).split()) or words
-        cause = cause.__cause__
-    return words
-
 
 SCHEDULER_TIMEOUT = 5.0
 """Seconds in which a scheduler has to answer."""
+
 Work = TypeVar("Work")
 Result = TypeVar("Result")
 
@@ -83,7 +44,7 @@ class DaskExecutor:
         self,
         client: Any,
         limits: WorkerLimits | None = None,
-        maintain: Callable[[], None] = lambda: None,
+        maintain: Callable[[], None] | None = None,
     ) -> None:
         """Uses a cluster that one is connected to.
 
@@ -91,7 +52,8 @@ class DaskExecutor:
             client: a `distributed.Client`; what it is connected to has to be safe, see
                 `require_safe_address`.
             limits: the usual ones if None.
-            maintain: called from time to time while grasps are judged, such as to restart workers.
+            maintain: called from time to time while grasps are judged, such as to restart workers;
+                may be None.
 
         Raises:
             ClusterError: the connection is not encrypted and goes beyond this machine.
@@ -104,7 +66,7 @@ class DaskExecutor:
             require_safe_address(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
-        self.maintain = maintain
+        self.maintain = maintain or (lambda: None)
 
     @property
     def workers(self) -> int:
@@ -152,7 +114,7 @@ def map_on_cluster(
     """
     from burg_drake.evaluation.cluster.cluster_map import ClusterMap
 
-    yield from ClusterMap(executor.client, function, bundle, pack).run(work, executor.maintain)
+    yield from ClusterMap(executor.client, function, bundle, pack, executor.maintain).run(work)
 
 
 @contextlib.contextmanager
@@ -179,18 +141,14 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
         ) from error
     quiet = dask.config.set({"distributed.comm.timeouts.connect": f"{SCHEDULER_TIMEOUT:g}s"})
     with quiet, _silence_dask_log(), contextlib.ExitStack() as stack:
-        maintain: Callable[[], None] = lambda: None  # noqa: E731
+        maintain: Callable[[], None] | None = None
         where: Any
         security = _tls_security(distributed, asked)
         if asked.local:
-            from burg_drake.evaluation.cluster.node import LocalNodes
-
             nodes = LocalNodes(asked.local)
             stack.callback(nodes.close)
             where, maintain = nodes.address, nodes.restart_workers
         elif asked.document is not None and asked.document.jobqueue is not None:
-            from burg_drake.evaluation.cluster.document import start_jobqueue
-
             where = stack.enter_context(start_jobqueue(asked, security))
             security = where.security
         else:
@@ -202,8 +160,8 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
 
 
 def _make_client(distributed: Any, where: Any, security: Any) -> Any:
-    """A client of the scheduler. Dask's own time-out does not cover what a listener that stays
-    silent never answers, hence a thread that is left behind then."""
+    """A client of the scheduler. It is made in a thread, as Dask's own time-out does not cover a
+    listener that stays silent; the thread is then left behind."""
     timeout_factor = 3  # A connection takes several steps, each of which keeps to the timeout.
     made: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
@@ -222,11 +180,50 @@ def _make_client(distributed: Any, where: Any, security: Any) -> Any:
     if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
             f"no Dask scheduler answered at {where} within {SCHEDULER_TIMEOUT:.0f} s: "
-            f"{connection_failure_reason(where, found)}"
+            f"{_connection_failure_reason(where, found)}"
         ) from found
     if isinstance(found, BaseException):
         raise found
     return found
+
+
+def _connection_failure_reason(where: object, error: BaseException) -> str:
+    """The reason why a client was not connected, in one line.
+
+    Args:
+        where: the address that was tried, or an object of Dask.
+        error: of Dask.
+    """
+    connect_timeout = 2.0  # Seconds.
+    words = _innermost_error(error)
+    if not isinstance(where, str):
+        return words
+    parts = urlsplit(where)
+    place = (parts.hostname or "", parts.port or 0)
+    try:
+        socket.create_connection(place, timeout=connect_timeout).close()
+    except ConnectionRefusedError:
+        return "nobody listens there (connection refused)"
+    except socket.gaierror:
+        return f"there is no machine with the name {parts.hostname}"
+    except TimeoutError:
+        return "the machine does not answer; is it off, or does a firewall block the connection?"
+    except OSError as refused:
+        return refused.strerror or words
+    return (
+        "something listens there, but does not answer like a scheduler with "
+        f"{parts.scheme}:// ({words})"
+    )
+
+
+def _innermost_error(error: BaseException) -> str:
+    """Message of the innermost cause of an error that has one."""
+    words = type(error).__name__
+    cause: BaseException | None = error
+    while cause is not None:
+        words = " ".join(str(cause).split()) or words
+        cause = cause.__cause__
+    return words
 
 
 def _close_client(client: Any) -> None:
@@ -240,7 +237,12 @@ def _tls_security(distributed: Any, cluster: Cluster) -> Any:
     if document is None or (document.jobqueue is not None and files is None):
         return None
     if files is not None:
-        return _security_from_files(distributed, files)
+        parts = {
+            f"tls_{role}_{part}": getattr(files, part)
+            for role in ("client", "scheduler", "worker")
+            for part in ("cert", "key")
+        }
+        return distributed.Security(tls_ca_file=files.ca, require_encryption=True, **parts)
     if document.address.startswith("tls://"):
         security = distributed.Security(require_encryption=True)
         if security.tls_ca_file is None:
@@ -253,23 +255,10 @@ def _tls_security(distributed: Any, cluster: Cluster) -> Any:
     return None
 
 
-def _security_from_files(distributed: Any, files: TlsFiles) -> Any:
-    return distributed.Security(
-        tls_ca_file=files.ca,
-        tls_client_cert=files.cert,
-        tls_client_key=files.key,
-        tls_scheduler_cert=files.cert,
-        tls_scheduler_key=files.key,
-        tls_worker_cert=files.cert,
-        tls_worker_key=files.key,
-        require_encryption=True,
-    )
-
-
 @contextlib.contextmanager
 def _silence_dask_log() -> Iterator[None]:
-    """What Dask would say of lost connections is said by our errors, in one line."""
-    # Dask's configuration gives the second one a level of its own
+    """Silences Dask's log of lost connections, which our errors report in one line."""
+    # Dask's configuration gives the second log a level of its own
     logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [log.level for log in logs]
     for log in logs:

@@ -8,7 +8,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from distributed import KilledWorker
 
@@ -30,6 +30,7 @@ from burg_drake.evaluation.cluster.members import (
     ClusterWorkers,
     SentChunk,
     SentJob,
+    SentTask,
     WorkerWait,
     lost_scheduler_error,
     scheduler_errors,
@@ -44,80 +45,24 @@ from burg_drake.evaluation.cluster.worker_tasks import (
 from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, WorkerLimits
 
 DELIVERY_ATTEMPTS = 3
-"""Number of times that a worker is sent what it needs to begin."""
-
-
-def register_plugin(client: Any, cluster: ClusterWorkers, plugin: Any) -> None:
-    """Has the workers, and those that join later, begin a run. A worker that dies meanwhile is no
-    reason to stop.
-
-    Args:
-        client: of Dask.
-        cluster: the workers; looked at before anything is registered where others would not know
-            it.
-        plugin: of Dask's workers, with the `name` of the run.
-
-    Raises:
-        ClusterError: as `ClusterWorkers.update`.
-    """
-    retry_interval = 1.0  # Seconds between attempts.
-    for attempt in range(1, DELIVERY_ATTEMPTS + 1):
-        cluster.update()
-        try:
-            client.register_plugin(plugin, name=plugin.name)
-            return
-        except CONNECTION_ERRORS as error:
-            if client.status != "running" or attempt == DELIVERY_ATTEMPTS:
-                raise lost_scheduler_error(client) from error
-            time.sleep(retry_interval)
-
-
-def end_run(client: Any, name: str, futures: Sequence[Any]) -> None:
-    """Gives up what is under way, and ends the children of a run.
-
-    Args:
-        client: of Dask.
-        name: of the run's plugin.
-        futures: of Dask.
-    """
-    if client.status != "running":
-        return
-    try:
-        client.cancel(list(futures), force=True)
-        client.unregister_worker_plugin(name)
-    except CONNECTION_ERRORS:
-        pass  # the scheduler is lost, and its workers end with it
-
-
-def deliver_bundle(client: Any, job: SentJob, addresses: Sequence[str]) -> None:
-    """Sends it; a worker that lacks it nonetheless, after some attempts, is told of.
-
-    Args:
-        client: of Dask.
-        job: has a bundle.
-        addresses: of the workers.
-
-    Raises:
-        ClusterError: a worker cannot unpack it, or does not keep it; or the scheduler is lost.
-    """
-    assert job.bundle is not None
-    send_bundle(client, job.bundle, f"the scene {job.job.key!r}", job.deliveries, addresses)
+"""Number of times that a worker is sent a plugin or a bundle."""
 
 
 def send_bundle(
     client: Any, bundle: Bundle, what: str, deliveries: Counter[str], addresses: Sequence[str]
 ) -> None:
-    """Sends a bundle; a worker that lacks it nonetheless, after some attempts, is told of.
+    """Sends a bundle to workers.
 
     Args:
         client: of Dask.
         bundle: with its data.
-        what: it is, for people.
-        deliveries: how often it was sent, by the worker's address; counted on.
+        what: the bundle is for, as messages name it.
+        deliveries: number of times that it was sent, by the worker's address; counted on.
         addresses: of the workers.
 
     Raises:
-        ClusterError: as `deliver_bundle`.
+        ClusterError: a worker cannot unpack it, or lacks it after several attempts; or the
+            scheduler is lost.
     """
     if not addresses:
         return
@@ -135,7 +80,7 @@ def send_bundle(
         )
     for address, error in errors.items():
         if isinstance(error, CONNECTION_ERRORS) and deliveries[address] < DELIVERY_ATTEMPTS:
-            continue  # a look will tell whether the worker is lost
+            continue  # the next check of the workers shows whether this one is lost
         if isinstance(error, BaseException):
             why = str(error) if isinstance(error, BurgError) else one_line(error)
             raise refusal(address, why)
@@ -143,46 +88,173 @@ def send_bundle(
 
 WORKER_POLL_INTERVAL = 1.0
 """Seconds between checks for new and lost workers."""
+SentT = TypeVar("SentT", bound=SentTask)
 
 
-class Dispatch:
-    """Jobs under way on a cluster.
+class ClusterRun(Generic[SentT]):
+    """Tasks of one run under way on a cluster.
 
     Attributes:
         client: of Dask.
-        limits: of the workers' children.
         cluster: the workers.
+        name: of the plugin that runs tasks on a worker.
+        sent: tasks that workers have, by the key of their future.
+    """
+
+    def __init__(self, client: Any, maintain: Callable[[], None]) -> None:
+        self.client = client
+        self.cluster = ClusterWorkers(client)
+        self.name = f"burg-drake-{uuid.uuid4().hex}"
+        self.sent: dict[str, SentT] = {}
+        self._maintain = maintain
+        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._last_poll = -WORKER_POLL_INTERVAL
+        self._waiting = WorkerWait(client)
+
+    def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Any]:
+        """Takes back the tasks of a lost worker, and yields the results of those given up."""
+        raise NotImplementedError
+
+    def begin(self, plugin: Any) -> None:
+        """Registers the plugin of the run on all workers and on those that join later. A worker
+        that dies meanwhile is no reason to stop.
+
+        Raises:
+            ClusterError: as `ClusterWorkers.update`.
+        """
+        retry_interval = 1.0  # Seconds between attempts.
+        for attempt in range(1, DELIVERY_ATTEMPTS + 1):
+            self.cluster.update()  # refuses workers that do not know the plugin
+            try:
+                self.client.register_plugin(plugin, name=self.name)
+                return
+            except CONNECTION_ERRORS as error:
+                if self.client.status != "running" or attempt == DELIVERY_ATTEMPTS:
+                    raise lost_scheduler_error(self.client) from error
+                time.sleep(retry_interval)
+
+    def end(self) -> None:
+        """Cancels the tasks that are under way, and ends the children of the run."""
+        self._waiting.end()
+        if self.client.status != "running":
+            return
+        try:
+            self.client.cancel([sent.future for sent in self.sent.values()], force=True)
+            self.client.unregister_worker_plugin(self.name)
+        except CONNECTION_ERRORS:
+            pass  # the scheduler is lost, and its workers end with it
+
+    def poll_is_due(self) -> bool:
+        """Whether it is time to check for new and lost workers."""
+        return time.monotonic() > self._last_poll + WORKER_POLL_INTERVAL
+
+    def poll_soon(self) -> None:
+        """Makes the next check for new and lost workers due."""
+        self._last_poll = -WORKER_POLL_INTERVAL
+
+    def update_workers(self) -> Iterator[Any]:
+        """Takes on new workers, and yields the results that `handle_lost_worker` gives."""
+        self._maintain()
+        for worker in self.cluster.update():
+            yield from self.handle_lost_worker(worker)
+        self._last_poll = time.monotonic()
+        if self.cluster.workers:
+            self._waiting.end()
+        else:
+            self._waiting.go_on()
+
+    def submit(
+        self, function: Callable[[Any], Any], argument: Any, sent: SentT, worker: ClusterWorker
+    ) -> None:
+        """Has a worker call a function."""
+        with scheduler_errors(self.client):
+            future = self.client.submit(
+                function,
+                argument,
+                key=f"{type(argument).__name__}-{uuid.uuid4().hex}",
+                pure=False,
+                retries=0,
+                workers=[worker.address],
+                allow_other_workers=False,
+            )
+        sent.worker, sent.future = worker, future
+        self.sent[future.key] = sent
+
+        def finish(future: Any) -> None:  # in another thread
+            sent.done = True
+            self._ended.put(future)
+
+        future.add_done_callback(finish)
+
+    def wait_for_tasks(self) -> list[SentT]:
+        """Waits a while for a task that ends, and returns all that have ended."""
+        try:
+            futures = [self._ended.get(timeout=WORKER_POLL_INTERVAL)]
+        except queue.Empty:
+            return []
+        while not self._ended.empty():
+            futures.append(self._ended.get())
+        return [self.sent[f.key] for f in futures if f.key in self.sent]
+
+    def read_answer(self, sent: SentT, timeout: float) -> Any:
+        """The answer of a task that has ended; None if it was cancelled.
+
+        Raises:
+            KilledWorker: its worker was lost.
+            OSError: it does not come within the time-out [s]; see `retry_answer`.
+            ClusterError: the task failed.
+        """
+        try:
+            return sent.future.result(timeout=timeout)
+        except (KilledWorker, OSError):
+            raise
+        except CancelledError:  # by the loss of the scheduler, or by somebody else
+            return None
+        except Exception as error:
+            raise ClusterError(f"worker {sent.worker.address}: {one_line(error)}") from error
+
+    def retry_answer(self, sent: SentT) -> None:
+        """Reads an answer again later: its worker is busy, or the next check shows its loss.
+
+        Raises:
+            ClusterError: the scheduler is lost.
+        """
+        if self.client.status != "running":
+            raise lost_scheduler_error(self.client)
+        if sent.worker.address in self.cluster.workers:
+            self._ended.put(sent.future)
+        self.poll_soon()
+
+
+class Dispatch(ClusterRun[SentChunk]):
+    """Jobs under way on a cluster.
+
+    Attributes:
+        limits: of the workers' children.
         jobs: those under way.
     """
 
     def __init__(self, client: Any, limits: WorkerLimits, maintain: Callable[[], None]) -> None:
-        self.client = client
+        super().__init__(client, maintain)
         self.limits = limits
-        self._maintain = maintain
-        self.cluster = ClusterWorkers(client)
         self.jobs: list[SentJob] = []
-        self._name = f"burg-drake-{uuid.uuid4().hex}"
-        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._sent: dict[Any, tuple[SentChunk, ClusterWorker]] = {}
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
         self._exhausted = False
-        self._seen = -WORKER_POLL_INTERVAL
-        self._waiting = WorkerWait(client)
 
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None
     ) -> Generator[Answer, None, None]:
         """See `executor.Executor.judge`."""
         self._coming, self._on_failure = iter(jobs), on_failure
-        register_plugin(self.client, self.cluster, Supervisor(self._name))
+        self.begin(Supervisor(self.name))
         try:
             while True:
-                if time.monotonic() > self._seen + WORKER_POLL_INTERVAL:
+                if self.poll_is_due():
                     yield from self.update_workers()
                 self.hand_out()
-                if not self._sent and not any(job.left for job in self.jobs):
-                    if self.take_up() is not None:
+                if not self.sent and not any(job.left for job in self.jobs):
+                    if self.open_next_job() is not None:
                         continue
                     if self._exhausted:
                         return
@@ -190,19 +262,8 @@ class Dispatch:
         finally:
             self.end()
 
-    def update_workers(self) -> Iterator[Answer]:
-        """Sees who is there."""
-        self._maintain()
-        for worker in self.cluster.update():
-            yield from self.lose(worker)
-        self._seen = time.monotonic()
-        if self.cluster.workers:
-            self._waiting.end()
-        else:
-            self._waiting.go_on()
-
     def hand_out(self) -> None:
-        """Gives every worker what it has room for; those with the least come first."""
+        """Gives every worker as many chunks as it has room for; those with the least come first."""
         while True:
             workers = [worker for worker in self.cluster.workers.values() if worker.room > 0]
             for worker in workers:
@@ -213,20 +274,20 @@ class Dispatch:
             least = min(worker.load for worker in workers)
             for worker in workers:
                 if worker.load <= least and worker.job is not None and worker.job.left:
-                    self.send(worker.job.cut(max(1, self.cluster.threads)), worker)
+                    self.send(worker.job.take_chunk(max(1, self.cluster.threads)), worker)
 
     def choose(self, worker: ClusterWorker) -> SentJob | None:
-        """What a worker is to work on: its job, or the next one, or one that others are at."""
+        """The job that a worker goes on with: its own, the next one, or one that others work on."""
         if worker.job is not None and worker.job.left:
             return worker.job
-        job = self.take_up()
+        job = self.open_next_job()
         if job is not None:
             return job
         self.jobs = [job for job in self.jobs if job.left or job.sent]
         open_jobs = [job for job in self.jobs if job.left]
         return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
 
-    def take_up(self) -> SentJob | None:
+    def open_next_job(self) -> SentJob | None:
         """The next job, if one is ready."""
         for job in self._coming:
             if job is None:  # none is ready yet
@@ -243,71 +304,44 @@ class Dispatch:
 
     def send(self, chunk: SentChunk, worker: ClusterWorker) -> None:
         """Sends a chunk to a worker."""
-        packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
-        with scheduler_errors(self.client):
-            future = self.client.submit(
-                judge_chunk,
-                packed,
-                key=f"grasps-{uuid.uuid4().hex}",
-                pure=False,
-                retries=0,
-                workers=[worker.address],
-                allow_other_workers=False,
-            )
-        chunk.future = future
+        packed = Chunk(self.name, chunk.job.recipe, chunk.grasps, self.limits)
+        self.submit(judge_chunk, packed, chunk, worker)
         chunk.job.sent += 1
         worker.chunks.append(chunk)
-        self._sent[future.key] = (chunk, worker)
-
-        def finished(future: Any) -> None:  # in another thread
-            chunk.done = True
-            self._done.put(future)
-
-        future.add_done_callback(finished)
 
     def collect(self) -> Iterator[Answer]:
-        """Waits a while for what comes, and takes all that has come."""
+        """Waits a while for answers, and passes on all that have come."""
         result_timeout = 3.0  # Seconds; the worker may be lost by now.
-        try:
-            futures = [self._done.get(timeout=WORKER_POLL_INTERVAL)]
-        except queue.Empty:
-            return
-        while not self._done.empty():
-            futures.append(self._done.get())
         missing: dict[str, tuple[SentJob, list[str]]] = {}
-        for future in futures:
-            if future.key not in self._sent:
-                continue  # was taken back
-            chunk, worker = self._sent[future.key]
+        for chunk in self.wait_for_tasks():
             try:
-                answers: ChunkAnswers = future.result(timeout=result_timeout)
+                answers: ChunkAnswers = self.read_answer(chunk, result_timeout) or ChunkAnswers(
+                    ended=True
+                )
             except KilledWorker:
-                self.forget(chunk, worker)
-                yield from self.doubt(chunk)
+                self.forget(chunk)
+                yield from self.suspect_grasps(chunk)
                 continue
             except OSError:
-                self._refetch(future, worker)
+                self.retry_answer(chunk)
                 continue
-            except CancelledError:  # by the loss of the scheduler, or by somebody else
-                answers = ChunkAnswers(ended=True)
-            except Exception as error:
-                raise ClusterError(f"worker {worker.address}: {one_line(error)}") from error
-            self.forget(chunk, worker)
+            self.forget(chunk)
             if answers.ended:
                 chunk.take_back()
-                self._seen = -WORKER_POLL_INTERVAL
+                self.poll_soon()
             elif answers.missing:
                 chunk.take_back()
-                missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))[1].append(
-                    worker.address
-                )
+                place = missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))
+                place[1].append(chunk.worker.address)
             elif not chunk.job.failed:
-                yield from self.take(chunk, answers)
+                yield from self.handle_answers(chunk, answers)
         for job, addresses in missing.values():
             there = [a for a in dict.fromkeys(addresses) if a in self.cluster.workers]
-            deliver_bundle(self.client, job, there)
+            assert job.bundle is not None
+            what = f"the scene {job.job.key!r}"
+            send_bundle(self.client, job.bundle, what, job.deliveries, there)
 
-    def take(self, chunk: SentChunk, answers: ChunkAnswers) -> Iterator[Answer]:
+    def handle_answers(self, chunk: SentChunk, answers: ChunkAnswers) -> Iterator[Answer]:
         """Passes the verdicts of a chunk on."""
         job = chunk.job
         judged = set()
@@ -315,7 +349,7 @@ class Dispatch:
             judged.add(place)
             yield job.job, chunk.grasps[place], verdict
             job.crashes_in_a_row = job.crashes_in_a_row + 1 if place in answers.crashing else 0
-            if job.crashes_in_a_row >= self.limits.hopeless and not job.failed:
+            if job.crashes_in_a_row >= self.limits.hopeless:
                 self.fail(
                     job,
                     SimulationError(
@@ -326,51 +360,48 @@ class Dispatch:
         if answers.error is not None:
             self.fail(job, answers.error)
         open_ones = [grasp for k, grasp in enumerate(chunk.grasps) if k not in judged]
-        yield from self.doubt(chunk, open_ones, "gave no answer about it")
+        yield from self.suspect_grasps(chunk, open_ones, "gave no answer about it")
 
-    def lose(self, worker: ClusterWorker) -> Iterator[Answer]:
-        """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
+    def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Answer]:
+        """Takes back the chunks of a lost worker; the grasps of those under way are sent alone."""
         suspects = [chunk for chunk in worker.chunks if not chunk.done][: worker.threads]
         for chunk in list(worker.chunks):
-            self.forget(chunk, worker)
+            self.forget(chunk)
             chunk.future.cancel()
             if chunk in suspects:
-                yield from self.doubt(chunk)
+                yield from self.suspect_grasps(chunk)
             else:
                 chunk.take_back()
 
-    def doubt(
+    def suspect_grasps(
         self,
         chunk: SentChunk,
         grasps: Sequence[Candidate] | None = None,
         what: str = "were lost while working on it",
     ) -> Iterator[Answer]:
-        """Deals with grasps at which a worker was lost, or which it has not answered.
+        """Sends grasps again that a lost worker had or that it left out, or gives them up.
 
         Args:
             chunk: that it had.
             grasps: those of the chunk; all if None.
-            what: the last worker did, for people.
+            what: the last workers did, for the verdict's reason.
         """
         for grasp in chunk.suspect(chunk.grasps if grasps is None else grasps):
             reason = (
                 f"{ChunkSettings.max_losses} workers of the cluster {what}, one after the other"
             )
             failed = Outcome.SIMULATION_FAILED
-            yield (
-                chunk.job.job,
-                grasp,
-                Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True),
-            )
+            verdict = Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True)
+            yield chunk.job.job, grasp, verdict
 
-    def forget(self, chunk: SentChunk, worker: ClusterWorker) -> None:
-        """A worker does not have a chunk any more."""
-        del self._sent[chunk.future.key]
-        worker.chunks.remove(chunk)
+    def forget(self, chunk: SentChunk) -> None:
+        """Notes that no worker has a chunk any more."""
+        del self.sent[chunk.future.key]
+        chunk.worker.chunks.remove(chunk)
         chunk.job.sent -= 1
 
     def fail(self, job: SentJob, error: BurgError) -> None:
-        """Gives a job up, and tells of it once."""
+        """Gives a job up, and reports that once."""
         if not job.failed:
             job.give_up()
             self._report_failure(JobFailed(job.job, error))
@@ -379,18 +410,3 @@ class Dispatch:
         if self._on_failure is None:
             raise failure.error
         self._on_failure(failure)
-
-    def _refetch(self, future: Any, worker: ClusterWorker) -> None:
-        """A result did not come: the worker is lost, which a look will tell, or is busy."""
-        if self.client.status != "running":
-            raise lost_scheduler_error(self.client)
-        if worker.address in self.cluster.workers:
-            self._done.put(future)
-        self._seen = -WORKER_POLL_INTERVAL
-
-    def end(self) -> None:
-        """Ends the children of this run."""
-        futures = [chunk.future for chunk, _ in self._sent.values()]
-        self._sent.clear()
-        self._waiting.end()
-        end_run(self.client, self._name, futures)

@@ -40,7 +40,7 @@ class TlsFiles:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Adapt:
+class AdaptiveJobs:
     """Smallest and largest number of jobs. Jobs start and end with the amount of work.
 
     Attributes:
@@ -117,7 +117,7 @@ class ClusterDocument:
     tls: TlsFiles | None = None
     jobqueue: JobQueue | None = None
     scale: int | None = None
-    adapt: Adapt | None = None
+    adapt: AdaptiveJobs | None = None
 
     def __post_init__(self) -> None:
         if bool(self.address) == (self.jobqueue is not None):
@@ -179,11 +179,10 @@ def read_cluster(text: str) -> Cluster:
     document = load_document(path, ClusterDocument)
     tls = document.tls
     if tls is not None:
-        found_files = {}
-        for name in ("ca", "cert", "key"):
-            file = resolve_reference(getattr(tls, name), base=path.parent)
-            found_files[name] = str(file)
-        tls = TlsFiles(**found_files)
+        ca, cert, key = (
+            str(resolve_reference(file, base=path.parent)) for file in (tls.ca, tls.cert, tls.key)
+        )
+        tls = TlsFiles(ca=ca, cert=cert, key=key)
     return Cluster(document=document, tls=tls)
 
 
@@ -192,8 +191,8 @@ def require_safe_address(address: str, prefix: str = "") -> None:
 
     Args:
         address: where a scheduler or a worker listens.
-        prefix: put before the address in messages, of what is connected; that is safe in this
-            process, too, which nobody can ask for.
+        prefix: names the connected scheduler or worker in messages; an `inproc://` address is
+            accepted with it.
 
     Raises:
         InvalidInputError: it is not an address.
@@ -237,14 +236,14 @@ def start_jobqueue(cluster: Cluster, security: Any) -> Any:
 
     Args:
         cluster: with a `jobqueue`.
-        security: of the document's TLS files; None for certificates of passing use.
+        security: of the document's TLS files; None for temporary certificates.
 
     Returns:
         The cluster of dask-jobqueue.
 
     Raises:
-        MissingDependencyError: dask-jobqueue is not installed, or what makes certificates.
-        ClusterError: it refuses the parameters, or the batch system is not there.
+        MissingDependencyError: dask-jobqueue or cryptography is not installed.
+        ClusterError: dask-jobqueue refuses the parameters, or there is no batch system.
     """
     # Class of dask-jobqueue for each batch system.
     classes = {

@@ -20,6 +20,7 @@ from burg_drake.core import (
     BurgError,
     ClusterError,
     content_hash,
+    one_line,
     software_versions,
 )
 from burg_drake.evaluation.candidates import Candidate
@@ -30,7 +31,7 @@ from burg_drake.station import ENGINES
 
 
 class ChunkSettings:
-    """Chunk settings."""
+    """How many grasps travel together, and how often a grasp is sent."""
 
     max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
     per_thread = 2  # Chunks that a worker's thread has: one under way and one that waits.
@@ -44,10 +45,9 @@ class SentJob:
     Attributes:
         job: the job.
         waiting: grasps that no worker has.
-        suspects: those among them at which a worker was lost, with the number of workers; each of
-            them travels alone.
+        suspects: grasps at which a worker was lost, with the number of workers; each of them is
+            sent alone.
         sent: number of chunks that workers have.
-        false_starts: of children in a row that died while they built the judge.
         crashes_in_a_row: grasps that ended their children since one was judged.
         failed: whether it is given up.
         deliveries: how often its bundle was sent, by the worker's address.
@@ -57,63 +57,71 @@ class SentJob:
     waiting: deque[Candidate] = field(default_factory=deque)
     suspects: deque[tuple[Candidate, int]] = field(default_factory=deque)
     sent: int = 0
-    false_starts: int = 0
     crashes_in_a_row: int = 0
     failed: bool = False
     deliveries: Counter[str] = field(default_factory=Counter)
+    bundle: Bundle | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.recipe, self.bundle = make_recipe(self.job.make_judge)
         self.waiting.extend(self.job.candidates)
-
-    bundle: Bundle | None = field(init=False, default=None)
 
     @property
     def left(self) -> int:
         """Number of grasps that no worker has."""
         return len(self.waiting) + len(self.suspects)
 
-    def cut(self, threads: int) -> SentChunk:
-        """Takes grasps off for a chunk, fewer as the end comes near.
+    def take_chunk(self, threads: int) -> SentChunk:
+        """Takes grasps for a chunk, fewer as the end comes near.
 
         Args:
-            threads: number of those that share what is left.
+            threads: number of threads that share the grasps that are left.
         """
         if self.suspects:
             grasp, losses = self.suspects.popleft()
             return SentChunk(self, (grasp,), losses)
-        size = min(
-            ChunkSettings.max_grasps, -(-len(self.waiting) // (ChunkSettings.per_thread * threads))
-        )
+        share = -(-len(self.waiting) // (ChunkSettings.per_thread * threads))
+        size = min(ChunkSettings.max_grasps, share)
         return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
 
     def give_up(self) -> None:
-        """Forgets what is left."""
+        """Drops the grasps that no worker has."""
         self.failed = True
         self.waiting.clear()
         self.suspects.clear()
 
 
 @dataclass(eq=False)
-class SentChunk:
+class SentTask:
+    """A task that a worker has.
+
+    Attributes:
+        worker: the worker.
+        future: of Dask.
+        done: whether the worker has done it; the answer may be lost with it nonetheless.
+    """
+
+    worker: ClusterWorker = field(init=False)
+    future: Any = field(init=False)
+    done: bool = field(init=False, default=False)
+
+
+@dataclass(eq=False)
+class SentChunk(SentTask):
     """Grasps that a worker has.
 
     Attributes:
-        job: of which they are.
+        job: whose grasps they are.
         grasps: the grasps.
         losses: workers that were lost at the one grasp.
-        future: of Dask.
-        done: whether the worker has judged them; the answers may be lost with it nonetheless.
     """
 
     job: SentJob
     grasps: tuple[Candidate, ...]
     losses: int = 0
-    future: Any = None
-    done: bool = False
 
     def take_back(self) -> None:
-        """Returns the grasps to their job, as nothing is known of them."""
+        """Returns the grasps to their job, as none of them was judged."""
         if self.job.failed:
             return
         if self.losses:
@@ -122,10 +130,10 @@ class SentChunk:
             self.job.waiting.extendleft(reversed(self.grasps))
 
     def suspect(self, grasps: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Returns grasps to their job, as each of them may be why a worker was lost.
+        """Returns grasps to their job, as each of them may have caused the loss of a worker.
 
         Returns:
-            Those with which that has happened too often.
+            Grasps at which too many workers were lost.
         """
         if self.job.failed:
             return ()
@@ -160,7 +168,7 @@ def require_same_versions(workers: Mapping[str, Mapping[str, str] | BaseExceptio
     """Refuses workers with other versions than ours.
 
     Args:
-        workers: what `deciding_versions` returned, by the worker's address; an error if it could not.
+        workers: what `deciding_versions` returned or raised, by the worker's address.
 
     Raises:
         ClusterError: names the first such worker, and how many there are.
@@ -169,7 +177,7 @@ def require_same_versions(workers: Mapping[str, Mapping[str, str] | BaseExceptio
     refused = []
     for address, theirs in workers.items():
         if isinstance(theirs, BaseException):
-            refused.append(f"worker {address} cannot run burg_drake ({_error_words(theirs)})")
+            refused.append(f"worker {address} cannot run burg_drake ({one_line(theirs)})")
             continue
         other = [
             f"{name} {theirs.get(name, 'none')} (here {version})"
@@ -184,10 +192,6 @@ def require_same_versions(workers: Mapping[str, Mapping[str, str] | BaseExceptio
             f"{refused[0]}{more}; results agree only if all machines have the same"
             " versions: install the same environment on all of them"
         )
-
-
-def _error_words(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 CONNECTION_ERRORS = (

@@ -1,4 +1,4 @@
-"""Bundles on a worker's machine, and the recipe by which a child process builds a judge from one."""
+"""Bundles on a worker's machine, and recipes by which child processes build judges from them."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class PickledJudgeFactory:
 
 
 class _Unpacker(pickle.Unpickler):
-    """The counterpart of `bundled_judge._Packer`."""
+    """The counterpart of `bundle._Packer`."""
 
     def __init__(self, data: bytes, folder: Path | None) -> None:
         super().__init__(io.BytesIO(data))
@@ -142,7 +142,7 @@ class JudgeRecipe:
         """The factory for this machine; None if the bundle is not here yet.
 
         Args:
-            place: see `unpacked.unpack`.
+            place: see `unpack`.
         """
         if not self.bundle:
             return PickledJudgeFactory(self.make_judge)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pickle
 import threading
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,12 +39,11 @@ class Chunk:
 
 @dataclass(frozen=True)
 class ChunkAnswers:
-    """What became of a chunk.
+    """Verdicts of a chunk, or why there are none.
 
     Attributes:
         verdicts: in the order of completion, with the place of the grasp in the chunk.
-        crashing: places of the grasps whose outcome is that they end the child.
-        seconds: time that it took.
+        crashing: places of the grasps at which the child crashes.
         missing: whether the bundle is not on this machine, and nothing was done.
         ended: whether the worker closes or the run has ended, and nothing is known.
         error: why the judge could not be built, if so.
@@ -53,14 +51,13 @@ class ChunkAnswers:
 
     verdicts: Sequence[tuple[int, Verdict]] = ()
     crashing: frozenset[int] = frozenset()
-    seconds: float = 0.0
     missing: bool = False
     ended: bool = False
     error: BurgError | None = None
 
 
-class Supervisor(WorkerPlugin):
-    """The children of one worker, for one run.
+class RunPlugin(WorkerPlugin):
+    """What a worker keeps for one run: child processes, which end when nobody needs them.
 
     Attributes:
         name: of the run.
@@ -74,11 +71,27 @@ class Supervisor(WorkerPlugin):
 
     def setup(self, worker: Any) -> None:
         """Called by Dask as the worker starts, or as the plugin is registered."""
+        self._lock = threading.Lock()
+        self._stopped = False
+
+
+def _start_idle_timer(function: Callable[..., None], *arguments: Any) -> threading.Timer:
+    """Calls a function after the idle time-out, unless the timer is cancelled."""
+    timer = threading.Timer(CHILD_IDLE_TIMEOUT, function, arguments)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+class Supervisor(RunPlugin):
+    """Children of a worker that judge grasps, each with a judge of its own."""
+
+    def setup(self, worker: Any) -> None:
+        """Called by Dask as the worker starts, or as the plugin is registered."""
+        super().setup(worker)
         self._pools: list[JudgePool] = []
         self._idle: list[JudgePool] = []
-        self._lock = threading.Lock()
         self._timers: dict[int, threading.Timer] = {}
-        self._stopped = False
 
     def teardown(self, worker: Any) -> None:
         """Called by Dask as the worker closes, or as the run ends."""
@@ -94,10 +107,10 @@ class Supervisor(WorkerPlugin):
 
     def judge(self, job: Job, limits: WorkerLimits) -> ChunkAnswers:
         """Has a child judge the grasps of a job."""
-        pool = self._take(limits)
+        pool = self._take_pool(limits)
         if pool is None:
             return ChunkAnswers(ended=True)
-        start, failed = time.monotonic(), list[JobFailed]()
+        failed: list[JobFailed] = []
         places = {id(grasp): k for k, grasp in enumerate(job.candidates)}
         pool.crashing.clear()
         try:
@@ -109,16 +122,15 @@ class Supervisor(WorkerPlugin):
                 raise
             return ChunkAnswers(ended=True)
         finally:
-            self._give_back(pool)
+            self._return_pool(pool)
         ids = [grasp.id for grasp in job.candidates]
         return ChunkAnswers(
             found,
             frozenset(ids.index(id) for id in pool.crashing),
-            time.monotonic() - start,
             error=failed[0].error if failed else None,
         )
 
-    def _take(self, limits: WorkerLimits) -> JudgePool | None:
+    def _take_pool(self, limits: WorkerLimits) -> JudgePool | None:
         with self._lock:
             if self._stopped:
                 return None
@@ -130,17 +142,14 @@ class Supervisor(WorkerPlugin):
                 self._pools.append(pool)
             return pool
 
-    def _give_back(self, pool: JudgePool) -> None:
+    def _return_pool(self, pool: JudgePool) -> None:
         with self._lock:
             if self._stopped:
                 return
             self._idle.append(pool)
-            timer = threading.Timer(CHILD_IDLE_TIMEOUT, self._end, [pool])
-            timer.daemon = True
-            self._timers[id(pool)] = timer
-            timer.start()
+            self._timers[id(pool)] = _start_idle_timer(self._end_if_idle, pool)
 
-    def _end(self, pool: JudgePool) -> None:
+    def _end_if_idle(self, pool: JudgePool) -> None:
         with self._lock:
             if pool not in self._idle:
                 return
@@ -189,7 +198,7 @@ class ClusterCall:
 
 @dataclass(frozen=True)
 class CallAnswer:
-    """What became of a call.
+    """Result of a call, or why there is none.
 
     Attributes:
         result: of the function, pickled.
@@ -204,27 +213,16 @@ class CallAnswer:
     ended: bool = False
 
 
-class CallChildren(WorkerPlugin):
-    """The children of one worker, for one run: one for each of its threads.
-
-    Attributes:
-        name: of the run.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"name": self.name}
+class CallChildren(RunPlugin):
+    """Children of a worker that call functions, one for each of its threads."""
 
     def setup(self, worker: Any) -> None:
         """Called by Dask as the worker starts, or as the plugin is registered."""
+        super().setup(worker)
         self._threads: int = worker.state.nthreads
         self._pool: WorkerPool | None = None
         self._calls = 0
-        self._lock = threading.Lock()
         self._timer: threading.Timer | None = None
-        self._stopped = False
 
     def teardown(self, worker: Any) -> None:
         """Called by Dask as the worker closes, or as the run ends."""
@@ -243,7 +241,7 @@ class CallChildren(WorkerPlugin):
             work: see `ClusterCall`.
             folder: of the bundle.
         """
-        pool = self._begin()
+        pool = self._begin_call()
         if pool is None:
             return CallAnswer(ended=True)
         try:
@@ -255,9 +253,9 @@ class CallChildren(WorkerPlugin):
                 return CallAnswer(error=error)
             return CallAnswer(error=SimulationError(one_line(error)))
         finally:
-            self._end()
+            self._end_call()
 
-    def _begin(self) -> WorkerPool | None:
+    def _begin_call(self) -> WorkerPool | None:
         with self._lock:
             if self._stopped:
                 return None
@@ -268,15 +266,13 @@ class CallChildren(WorkerPlugin):
                 self._pool = WorkerPool(self._threads, retries=0, own_group=True)
             return self._pool
 
-    def _end(self) -> None:
+    def _end_call(self) -> None:
         with self._lock:
             self._calls -= 1
             if self._calls == 0 and not self._stopped:
-                self._timer = threading.Timer(CHILD_IDLE_TIMEOUT, self._rest)
-                self._timer.daemon = True
-                self._timer.start()
+                self._timer = _start_idle_timer(self._end_if_idle)
 
-    def _rest(self) -> None:
+    def _end_if_idle(self) -> None:
         """Ends idle children, as their driver may be gone."""
         with self._lock:
             if self._calls:

@@ -1,3 +1,4 @@
-"""Grasps from files and runs as sets to work on, and what sets say of their origin.
+"""Sets of grasps: sampled ones, those of files and runs, their counts, and their usual mistakes.
 
-Read `input` first, then `candidate_files`; `sampled` and `scored` make sets."""
+Read `input` and `given_grasps` for grasps from elsewhere, `sampling` and `sampled_sets` for others.
+"""

@@ -76,11 +76,10 @@ def object_grasps(
         MeshError: a mesh file is damaged.
     """
     cache_version = 2  # Raise it when this code gives other grasps for the same arguments.
-    direction_decimals = 3  # A twentieth of a degree: small turns keep their cached grasps.
-    height_step = 0.001  # Metres; smaller changes in height keep the cached grasps.
     library.entry(object)
-    down_O = np.round((0.0, 0.0, -1.0) @ X_WO[:3, :3], direction_decimals) + 0.0
-    height = height_step * round(float(X_WO[2, 3]) / height_step)
+    # turns below a twentieth of a degree and changes in height below 1 mm keep the cached grasps
+    down_O = np.round((0.0, 0.0, -1.0) @ X_WO[:3, :3], 3) + 0.0
+    height = 0.001 * round(float(X_WO[2, 3]) / 0.001)
     files = [station.hand_model, *referenced_files(station.hand_model, station.packages)]
     hand = content_hash(dump_document(station.hand), files)
     asked = content_hash(
@@ -105,26 +104,21 @@ def _upright_pose(down_O: Array, height: float) -> Array:
 def _sample_alone(
     library: ObjectLibrary, object: str, X_WO: Array, station: Station, n: int, seed: int
 ) -> Arrays:
-    # Antipodal grasps tried for each wanted one; bounds the time to a second.
-    max_draws_per_grasp = 40
-    batch_size = 256  # Grasps that are tested at a time.
-    from burg_drake.grasping import HandClearance
-    from burg_drake.station import build_station_diagram
-
     x, y, *_ = station.document.table.center
     X_WO = make_pose(X_WO[:3, :3], (x, y, X_WO[2, 3]))
     bare = replace(station, document=replace(station.document, X_WS=Pose(), background={}))
     placed = Instance(object=object, X_SO=Pose.from_matrix(X_WO))
     document = SceneDocument(name=object, library=str(library.root), instances=(placed,))
     alone = Scene(document, library, library.root)
-    screen = HandClearance(build_station_diagram(alone, bare, robot="hand"))
-    sampler = ObjectSampler(library, station, max_draws_per_grasp * n, seed, SamplingSettings())
+    screen, _ = hand_alone(alone, bare)
+    # 40 antipodal grasps are tried for each wanted one, which bounds the time to a second
+    sampler = ObjectSampler(library, station, 40 * n, seed, SamplingSettings())
     tried = sampler(object, approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG))
     test = sampler.clear_test(object, screen, object, X_WO)
     rows = np.empty(0, dtype=np.intp)
     first = 0
     while len(rows) < n and first < len(tried):
-        some = tried.X_OG[first : first + batch_size]
+        some = tried.X_OG[first : first + 256]
         rows = np.append(rows, first + np.flatnonzero(test(some)))
         first += len(some)
     rows = rows[:n]
@@ -293,7 +287,7 @@ def _count_object(
 def within_reach(scene: SceneLike, station: StationLike) -> tuple[str, ...]:
     """Objects that are out of the arm's reach.
 
-    An object is within reach if the arm can execute one of `TRIED` sampled grasps, all the way from
+    An object is within reach if the arm can execute one of 24 sampled grasps, all the way from
     home to the end of the lift, as if it stood in its place alone: among the station's obstacles,
     but with no other object, so that the answer stays as it is when others are moved. What the hand
     carries is not looked at. An object that the hand takes nowhere as it stands is out of reach.
@@ -322,18 +316,14 @@ def within_reach(scene: SceneLike, station: StationLike) -> tuple[str, ...]:
 
 
 def _is_within_reach(scene: Scene, object: str, X_WO: Array, station: Station) -> bool:
-    max_grasps = 24  # Grasps of an object that the arm is asked about.
-    batch_sizes = (2, 4, 6, 12)  # The arm can execute one of the first few for most objects.
     reach = reach_without_objects(station)
-    grasps = object_grasps(scene.library, object, X_WO, station, max_grasps)
+    grasps = object_grasps(scene.library, object, X_WO, station, 24)
     X_WG = X_WO @ grasps.X_OG
-    first = 0
-    for count in batch_sizes:
-        some = slice(first, first + count)
+    # the arm can execute one of the first few for most objects
+    for some in (slice(0, 2), slice(2, 6), slice(6, 12), slice(12, 24)):
         found = reach.check_all([""] * len(X_WG[some]), X_WG[some], grasps.width[some])
         if any(verdict.outcome is None for verdict in found):
             return True
-        first += count
     return False
 
 

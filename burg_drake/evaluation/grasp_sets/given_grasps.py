@@ -1,4 +1,4 @@
-"""Reads grasps from files, gives each to an instance of a scene, or measures it in another frame."""
+"""Reads grasps from files, gives them to instances of a scene, or changes their frame."""
 
 from __future__ import annotations
 
@@ -21,9 +21,14 @@ from burg_drake.core import (
     suggest_names,
     transform_points,
 )
-from burg_drake.evaluation.candidates import INSTANCE_COLUMN, InstanceNames, require_instances
+from burg_drake.evaluation.candidates import (
+    INSTANCE_COLUMN,
+    InstanceNames,
+    instances_by_name,
+    require_instances,
+)
 from burg_drake.evaluation.grasp_sets.input import read_input, split_by_instance, without_instance
-from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading, with_poses
 from burg_drake.formats import (
     PANDA_GRIPPER,
     PREGRASP_WIDTH_COLUMN,
@@ -108,8 +113,6 @@ def held_instances(
 
 def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) -> Array:
     """(N,) distance from G to what of an instance lies between the fingers [m]; inf if nothing."""
-    # In units of the tips' reach: grasp point, finger tips, as far behind.
-    probe_heights = (0.0, 1.0, -1.0)
     from burg_drake.geometry import RayCaster
 
     mesh = scene.library.surface(scene.instance(name).object)
@@ -117,7 +120,11 @@ def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) ->
     X_OG = inverse(scene.X_SO(name)) @ X_SG
     reach = gripper.opening[1] / 2.0
     nearest = np.full(len(X_OG), np.inf)
-    for height in probe_heights:
+    for height in (
+        0.0,
+        1.0,
+        -1.0,
+    ):  # grasp point, finger tips, as far behind; in reaches of the tips
         origins = X_OG[:, :3, 3] + height * gripper.tip * X_OG[:, :3, 2]
         for side in (1.0, -1.0):
             _, along = rays.first_hits(origins, side * X_OG[:, :3, 0], reach)
@@ -127,14 +134,12 @@ def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) ->
 
 
 def _distance_beside(scene: Scene, name: str, p_SG: Array) -> Array:
-    """(N,) distance from points (N, 3) to an instance, good to half of `SPACING` or so [m]."""
-    point_spacing = 0.005  # Metres between the surface points whose distance is taken.
+    """(N,) distance from points (N, 3) to an instance, good to 2.5 mm or so [m]."""
+    from scipy.spatial import cKDTree
     from trimesh.remesh import subdivide_to_size
 
     mesh = scene.library.surface(scene.instance(name).object)
-    points, _ = subdivide_to_size(mesh.vertices, mesh.faces, point_spacing, max_iter=20)
-    from scipy.spatial import cKDTree
-
+    points, _ = subdivide_to_size(mesh.vertices, mesh.faces, 0.005, max_iter=20)
     distance, _ = cKDTree(points).query(transform_points(inverse(scene.X_SO(name)), p_SG))
     return np.asarray(distance)
 
@@ -155,14 +160,8 @@ def group_by_instance(
         chosen = owner == name
         if not chosen.any():
             continue
-        sets[name] = GraspSet.create(
-            inverse(scene.X_SO(name)) @ X_SG[chosen],
-            object=instance.object,
-            width=grasps.width[chosen],
-            score=grasps.score[chosen],
-            provenance=grasps.provenance,
-            columns={key: values[chosen] for key, values in grasps.columns.items()},
-        )
+        X_OG = inverse(scene.X_SO(name)) @ X_SG[chosen]
+        sets[name] = with_poses(grasps.select(chosen), X_OG, object=instance.object)
     return sets
 
 
@@ -183,17 +182,10 @@ def join_in_frame(scene: Scene, grasps: Mapping[str, GraspSet], X_SF: Array) -> 
     if not grasps:
         return GraspSet.create(np.empty((0, 4, 4)), object="", columns={INSTANCE_COLUMN: ""})
     X_FS = inverse(X_SF)
-    placed = [
-        GraspSet.create(
-            X_FS @ scene.X_SO(name) @ part.X_OG,
-            object=part.object,
-            width=part.width,
-            score=part.score,
-            provenance=part.provenance,
-            columns={**part.columns, INSTANCE_COLUMN: np.full(len(part), name)},
-        )
-        for name, part in grasps.items()
-    ]
+    placed = []
+    for name, part in grasps.items():
+        columns = {**part.columns, INSTANCE_COLUMN: np.full(len(part), name)}
+        placed.append(with_poses(part, X_FS @ scene.X_SO(name) @ part.X_OG, columns=columns))
     return GraspSet.concatenate(placed)
 
 
@@ -243,7 +235,7 @@ def read_grasps(
     Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
     are measured in the frame of their object go to every instance of it. Those that are measured
     in one frame for all, a camera's or a world's, go to the instance that they hold; see
-    `candidates.scene_frame.held_instances`.
+    `held_instances`.
 
     Example::
 
@@ -279,52 +271,40 @@ def read_grasps(
                 f"the grasps of {path} are in the frames of their objects; leave out the"
                 " pose and the object ids, which do not apply"
             )
-        found = _group_by_file_names(grasps, names)
-        return GivenGrasps(
-            found,
-            (
-                *imported.notes,
-                *_repeated_grasps_note(found, path),
-                *_wide_grasps_note(grasps, path, gripper),
-            ),
-        )
-    if frame == "camera" and X_SF is None:
-        raise InvalidInputError(
-            f"the grasps of {path} are in the frame of a camera; give the pose of the"
-            " camera in the scene, or the frame that they are really in"
-        ).about("X_SF", "frame")
-    X_SF = np.eye(4) if X_SF is None else X_SF
-    X_SG = X_SF @ grasps.X_OG
-    measured = {**grasps.provenance, "X_SM": X_SF.tolist()}
-    grasps = dataclasses.replace(grasps, provenance=measured)
-    owner, held = _find_owners(grasps, X_SG, names, object_ids or {}, gripper)
-    placed = group_by_instance(scene, without_instance(grasps), X_SG, owner)
-    notes = _missed_objects_note(placed, held, names)
-    return GivenGrasps(
-        placed,
-        (
-            *imported.notes,
-            *notes,
-            *_repeated_grasps_note(placed, path),
-            *_wide_grasps_note(grasps, path, gripper),
-        ),
-    )
+        found, notes = _group_by_file_names(grasps, names), list(imported.notes)
+    else:
+        if frame == "camera" and X_SF is None:
+            raise InvalidInputError(
+                f"the grasps of {path} are in the frame of a camera; give the pose of the"
+                " camera in the scene, or the frame that they are really in"
+            ).about("X_SF", "frame")
+        X_SF = np.eye(4) if X_SF is None else X_SF
+        measured = {**grasps.provenance, "X_SM": X_SF.tolist()}
+        grasps = dataclasses.replace(grasps, provenance=measured)
+        X_SG = X_SF @ grasps.X_OG
+        owner, held = _find_owners(grasps, X_SG, names, object_ids or {}, gripper)
+        found = group_by_instance(scene, without_instance(grasps), X_SG, owner)
+        notes = [*imported.notes, *_missed_objects_note(found, held, names)]
+    notes += _repeated_grasps_note(found, path) + _wide_grasps_notes(grasps, path, gripper)
+    return GivenGrasps(found, tuple(notes))
 
 
-def _wide_grasps_note(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ...]:
-    """A note about widths to which the hand does not open."""
-    width_tolerance = 1e-6  # Metres; error of single precision.
+def _wide_grasps_notes(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ...]:
+    """Notes about widths to which the hand does not open."""
     widest, notes = gripper.opening[1], []
-    arriving = grasps.columns.get(PREGRASP_WIDTH_COLUMN)
-    for name, values in (("width", grasps.width), (PREGRASP_WIDTH_COLUMN, arriving)):
-        beyond = None if values is None else values[values > widest + width_tolerance]
-        if beyond is not None and len(beyond):
-            notes.append(
-                f"{name} of {len(beyond)} of {len(grasps)} grasps of {path} is more than"
-                f" the {1e3 * widest:g} mm to which hand {gripper.name!r} opens (the"
-                f" largest is {1e3 * beyond.max():.4g} mm); they are judged with the hand"
-                f" open at {1e3 * widest:g} mm."
-            )
+    widths = {
+        "width": grasps.width,
+        PREGRASP_WIDTH_COLUMN: grasps.columns.get(PREGRASP_WIDTH_COLUMN),
+    }
+    for name, values in widths.items():
+        if values is None or not (values > widest + 1e-6).any():  # error of single precision
+            continue
+        notes.append(
+            f"{name} of {(values > widest + 1e-6).sum()} of {len(grasps)} grasps of {path} is more"
+            f" than the {1e3 * widest:g} mm to which hand {gripper.name!r} opens (the"
+            f" largest is {1e3 * np.nanmax(values):.4g} mm); they are judged with the hand"
+            f" open at {1e3 * widest:g} mm."
+        )
     return tuple(notes)
 
 
@@ -395,7 +375,7 @@ def _group_by_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, Grasp
     sets: dict[str, list[GraspSet]] = {name: [] for name in names.scene.instances}
     for name in foreign:
         chosen = without_instance(grasps.select(grasps.object == name))
-        for instance in names.of_object(name):
+        for instance in names.instances_of(name):
             object = names.scene.instance(instance).object
             sets[instance].append(with_objects_renamed(chosen, {name: object}))
     return {
@@ -415,7 +395,7 @@ def _find_owners(
     """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and which of them are told
     by the file, or have something of it between their fingers."""
     names.require_used([""])
-    among = names.of_object("") if names.given else None
+    among = names.instances_of("") if names.given else None
     owner = _named_owners(grasps, names, object_ids)
     open_ = owner == ""
     held = np.ones(len(owner), dtype=bool)
@@ -424,9 +404,7 @@ def _find_owners(
 
 
 def _missed_objects_note(
-    placed: Mapping[str, GraspSet],
-    held: NDArray[np.bool_],
-    names: InstanceNames,
+    placed: Mapping[str, GraspSet], held: NDArray[np.bool_], names: InstanceNames
 ) -> tuple[str, ...]:
     """A note about grasps that hold nothing.
 
@@ -453,7 +431,6 @@ def _named_owners(
     grasps: GraspSet, names: InstanceNames, object_ids: Mapping[int, str]
 ) -> NDArray[np.object_]:
     """(N,) instances that object ids tell; empty texts where they do not."""
-    unknown_id = -1  # Object id of grasps whose object is not known.
     named = np.full(len(grasps), "", dtype=object)
     if not object_ids:
         return named
@@ -462,7 +439,7 @@ def _named_owners(
             "object_ids"
         )
     ids = grasps.columns["object_id"]
-    unknown = sorted(set(ids.tolist()) - {*object_ids, unknown_id})
+    unknown = sorted(set(ids.tolist()) - {*object_ids, -1})  # -1: the object is not known
     if unknown:
         raise InvalidInputError(
             f"{names.path} has grasps of object id {unknown[0]}, but no instance is named"
@@ -470,7 +447,7 @@ def _named_owners(
             f"{', '.join(f'{number}={name}' for number, name in object_ids.items())}"
         ).about("object_ids")
     for number, name in object_ids.items():
-        instance, *others = names.called(name)
+        instance, *others = instances_by_name(names.scene, name)
         if others:
             raise InvalidInputError(
                 f"object id {number} is named {name!r}, but scene {names.scene.name!r}"
@@ -541,9 +518,8 @@ def read_in_frame(
                 f"{path} has grasps in {FRAME_WORDS[given]}, but they are wanted in "
                 f"{FRAME_WORDS[wanted]}; give the pose of the camera in the scene"
             ).about("X_SF")
-        grasps = _change_frame(
-            imported.grasps, seen.X_SF if given == "camera" else inverse(seen.X_SF)
-        )
+        X_TF = seen.X_SF if given == "camera" else inverse(seen.X_SF)
+        grasps = with_poses(imported.grasps, X_TF @ imported.grasps.X_OG)
         return ImportedGrasps(grasps, wanted, imported.notes)
     if seen.scene is None:
         raise InvalidInputError(
@@ -574,18 +550,6 @@ def read_in_frame(
     X_SX = make_pose() if seen.X_SF is None else seen.X_SF
     grasps = _add_object_ids(join_in_frame(seen.scene, placed.by_instance, X_SX), seen.object_ids)
     return ImportedGrasps(grasps, wanted, placed.notes)
-
-
-def _change_frame(grasps: GraspSet, X_TF: Array) -> GraspSet:
-    """The same grasps, measured in T instead of F."""
-    return GraspSet.create(
-        X_TF @ grasps.X_OG,
-        object=grasps.object,
-        width=grasps.width,
-        score=grasps.score,
-        provenance=grasps.provenance,
-        columns=grasps.columns,
-    )
 
 
 def _add_object_ids(grasps: GraspSet, object_ids: Mapping[int, str]) -> GraspSet:

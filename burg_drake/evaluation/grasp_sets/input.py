@@ -1,4 +1,4 @@
-"""Grasps to work on: a file of any project or the folder of a run, and the hand that they are for."""
+"""Grasps to work on: a file of any project or the folder of a run, and their hand."""
 
 from __future__ import annotations
 
@@ -76,17 +76,16 @@ def hand_entry(hand: Hand, document: Path | None) -> dict[str, str]:
 
 def object_files(library: ObjectLibrary, objects: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Mesh and physics of objects, under the names that `formats.grasp_conversion` knows."""
-    return {name: _object_entry(library, name) for name in objects}
-
-
-def _object_entry(library: ObjectLibrary, object: str) -> dict[str, Any]:
-    entry = library.entry(object)
+    entries = {name: library.entry(name) for name in objects}
     return {
-        "file": str(library.path(entry.surface or entry.mesh).resolve()),
-        "scale": 1.0,
-        "mass": entry.mass,
-        "com": list(entry.mass_properties.center_of_mass),
-        "friction": entry.friction,
+        name: {
+            "file": str(library.path(entry.surface or entry.mesh).resolve()),
+            "scale": 1.0,
+            "mass": entry.mass,
+            "com": list(entry.mass_properties.center_of_mass),
+            "friction": entry.friction,
+        }
+        for name, entry in entries.items()
     }
 
 
@@ -199,7 +198,7 @@ def read_input(
         InvalidInputError: the file cannot be read, or is the table of a run.
         UnknownNameError: there is no such format or correction.
     """
-    path = Path(path)
+    path, hand_taken = Path(path), gripper or PANDA_GRIPPER
     correction = check_corrections(correction)
     if path.is_dir():
         imported = ImportedGrasps(run_grasps(load_run(path)), "object")
@@ -209,16 +208,13 @@ def read_input(
             " their outcomes"
         )
     else:
-        imported = read_grasp_file(path, format, gripper or PANDA_GRIPPER)
-    imported = correct_grasps(imported, gripper or PANDA_GRIPPER, correction)
+        imported = read_grasp_file(path, format, hand_taken)
+    imported = correct_grasps(imported, hand_taken, correction)
     hand = hand_of(imported.grasps)
     if hand is None:
         if path.is_dir() or (format or format_name(path)) == OWN_FORMAT:
             return imported
-        provenance = {
-            **imported.grasps.provenance,
-            "hand": {"name": (gripper or PANDA_GRIPPER).name},
-        }
+        provenance = {**imported.grasps.provenance, "hand": {"name": hand_taken.name}}
         grasps = dataclasses.replace(imported.grasps, provenance=provenance)
         return dataclasses.replace(imported, grasps=grasps)
     if gripper is None or hand["name"] == gripper.name:

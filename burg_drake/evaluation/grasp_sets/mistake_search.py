@@ -1,4 +1,4 @@
-"""Finds the usual mistake that a set of grasps shows, by the open hand's clearance and pad contacts."""
+"""Finds the usual mistake that a set of grasps shows, by clearance of the hand and pad contacts."""
 
 from __future__ import annotations
 
@@ -41,13 +41,17 @@ if TYPE_CHECKING:
     from burg_drake.station import StationDiagram
 
 
-class MistakeSearchSettings:
-    """Mistake search settings."""
+class MistakeLimits:
+    """MistakeLimits of the search, tuned on sets with and without mistakes.
+
+    Of random grasps up to 0.67 fit after two mistakes at once are corrected. Correct widths are
+    0.75 to 1.07 of the distance of the contacts, half widths half of that.
+    """
 
     max_grasps = 100  # Maximum number of grasps of a set that are examined.
     min_fitting = 3  # Minimum number of grasps that fit after the correction.
     min_share = 0.6  # Minimum share of grasps that fit after the correction.
-    min_share_combined = 0.8  # The same of two mistakes at once; up to 0.67 of random grasps fit.
+    min_share_combined = 0.8  # The same of two mistakes at once.
     min_share_about = 0.9  # The same of turns about the closing direction, and above max_closing.
     min_gain = 2.5  # Minimum ratio of fitting grasps after to before the correction.
     min_gained = 10  # Minimum number that fit only after, where more fit before.
@@ -56,8 +60,7 @@ class MistakeSearchSettings:
     min_fitting_closing = 8  # Minimum number that fit after the correction above max_closing.
     tie_ratio = 0.9  # Mistakes are equally good if the ratio of their counts is above this.
     min_friction = 0.5  # Friction coefficient of the pads at least; other sets assume other ones.
-    # Width over contact distance of half widths; correct ones have 0.75 to 1.07.
-    half_width_ratios = (0.35, 0.6)
+    half_width_ratios = (0.35, 0.6)  # Width over contact distance of half widths.
     max_touched_share = 0.9  # Above this share of grasps that touched the object, poses are right.
     max_scenes = 3  # Maximum number of scenes of a run over many that are examined.
     millimetre_distance = 1.0  # Metres; beyond this median distance millimetres are tried.
@@ -111,11 +114,9 @@ def _find_common_mistake(search: _MistakeSearch) -> MistakeFound | None:
     mistakes = search.mistakes()
     alone, in_scene = search.fits(mistakes)
     found = _choose_mistake(search, mistakes, alone)
-    return (
-        found
-        if found is not None or in_scene is None
-        else _choose_mistake(search, mistakes, in_scene)
-    )
+    if found is None and in_scene is not None:
+        return _choose_mistake(search, mistakes, in_scene)
+    return found
 
 
 def mistake_notes(
@@ -158,7 +159,7 @@ def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...
         grasps = split_by_instance(
             run.candidates.grasps.with_columns(instance=run.candidates.instance)
         )
-        if touched.sum() < MistakeSearchSettings.max_touched_share * len(touched):
+        if touched.sum() < MistakeLimits.max_touched_share * len(touched):
             found = find_mistake(grasps, station, scene)
             if found is not None:
                 hints.append(found.text() + _repeat_command(asked or run, found.options()))
@@ -177,7 +178,7 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
     codes, texts = rows.codes("outcome")
     missed = ~np.isin(texts, CONTACT_OUTCOMES)[codes]
     by_scene = np.bincount(rows.run[missed], minlength=len(campaign.names))
-    for place in np.argsort(-by_scene, kind="stable")[: MistakeSearchSettings.max_scenes].tolist():
+    for place in np.argsort(-by_scene, kind="stable")[: MistakeLimits.max_scenes].tolist():
         name = campaign.names[place]
         with contextlib.suppress(BurgError):
             hints = given_hints(load_run(campaign.folder(name)), campaign)
@@ -223,19 +224,13 @@ def half_width_note(
 
     test, ratios = _FitTest(station, source), []
     for name, part in grasps.items():
-        known = np.flatnonzero(part.width > 0.0)[: MistakeSearchSettings.max_grasps]
+        known = np.flatnonzero(part.width > 0.0)[: MistakeLimits.max_grasps]
         contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
         apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
         ratios += (part.width[known] / apart)[contacts.touching].tolist()
-    half = sum(
-        MistakeSearchSettings.half_width_ratios[0]
-        < ratio
-        < MistakeSearchSettings.half_width_ratios[1]
-        for ratio in ratios
-    )
-    if half < max(
-        MistakeSearchSettings.min_fitting, MistakeSearchSettings.min_share_combined * len(ratios)
-    ):
+    low, high = MistakeLimits.half_width_ratios
+    half = sum(low < ratio < high for ratio in ratios)
+    if half < max(MistakeLimits.min_fitting, MistakeLimits.min_share_combined * len(ratios)):
         return ""
     return (
         f"The widths of {half} of the {len(ratios)} grasps that were checked are half of"
@@ -267,11 +262,8 @@ class _MistakeSearch:
         self.correction = correction_of(first)
         self.total = sum(len(part) for part in grasps.values())
         rows = [(name, part, k) for name, part in grasps.items() for k in _promising_rows(part)]
-        chosen = np.unique(
-            np.linspace(0, len(rows) - 1, min(MistakeSearchSettings.max_grasps, len(rows))).astype(
-                int
-            )
-        )
+        count = min(MistakeLimits.max_grasps, len(rows))
+        chosen = np.unique(np.linspace(0, len(rows) - 1, count).astype(int))
         frames = {name: frames_of(part, gripper) for name, part in grasps.items()}
         picked = [rows[i] for i in chosen]
         self._name = np.array([name for name, _, _ in picked])
@@ -291,10 +283,8 @@ class _MistakeSearch:
         # A camera's optical frame (OpenCV) in its body frame (ROS, x forward).
         optical_rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
         found = usual_mistakes(self.format, self._gripper)
-        if (
-            np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1))
-            < MistakeSearchSettings.millimetre_distance
-        ):
+        distance = np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1))
+        if distance < MistakeLimits.millimetre_distance:
             found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
         if self._scene is None:
             return found
@@ -382,36 +372,25 @@ class _MistakeSearch:
             before, after: (N,) which grasps fit as they were read, and once it is corrected.
         """
         about, n = self.keeps_closing_line(mistake), int(after.sum())
-        if self.closing_share <= MistakeSearchSettings.max_closing or about:
+        if self.closing_share <= MistakeLimits.max_closing or about:
             combined = mistake.step or bool(mistake.turn and mistake.forward)
-            share = (
-                MistakeSearchSettings.min_share_combined
-                if combined
-                else MistakeSearchSettings.min_share
-            )
-            least = max(
-                MistakeSearchSettings.min_fitting,
-                (MistakeSearchSettings.min_share_about if about else share) * self.count,
-            )
+            share = MistakeLimits.min_share_combined if combined else MistakeLimits.min_share
+            share = MistakeLimits.min_share_about if about else share
+            least = max(MistakeLimits.min_fitting, share * self.count)
         elif mistake.reads_otherwise:
             least = max(
-                MistakeSearchSettings.min_fitting_closing,
-                MistakeSearchSettings.min_share_about * self.count,
+                MistakeLimits.min_fitting_closing, MistakeLimits.min_share_about * self.count
             )
         else:
             return False
-        if n < least or n >= MistakeSearchSettings.min_gain * before.sum():
+        if n < least or n >= MistakeLimits.min_gain * before.sum():
             return bool(n >= least)
         gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
         enough = (
-            gained >= MistakeSearchSettings.min_gained
-            and lost <= MistakeSearchSettings.max_lost_share * gained
+            gained >= MistakeLimits.min_gained and lost <= MistakeLimits.max_lost_share * gained
         )
-        return (
-            enough
-            and mistake.reads_otherwise
-            and n >= MistakeSearchSettings.min_share_about * self.count
-        )
+        nearly_all = n >= MistakeLimits.min_share_about * self.count
+        return enough and mistake.reads_otherwise and nearly_all
 
     def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
         """Other formats that measure grasps as those are once a mistake is corrected."""
@@ -462,7 +441,7 @@ class _FitTest:
             mine = names == name
             contacts = grasp_contacts(self.surface(name), X_OG[mine], self.jaws)
             friction = max(
-                MistakeSearchSettings.min_friction, self._library.entry(self._object(name)).friction
+                MistakeLimits.min_friction, self._library.entry(self._object(name)).friction
             )
             closing[mine] = are_antipodal(contacts, X_OG[mine], friction)
         return closing
@@ -533,15 +512,11 @@ def _choose_mistake(
     best = max(count.values())
     named = [m for m in count if not m.step]
     top = max((count[m] for m in named), default=0)
-    good = (
-        [m for m in named if count[m] == top]
-        if top >= MistakeSearchSettings.tie_ratio * best
-        else []
-    )
+    good = [m for m in named if count[m] == top >= MistakeLimits.tie_ratio * best]
     chosen = good[0] if good else next(m for m in count if count[m] == best)
     reach = None
     if chosen.forward and chosen.moves_frame:
-        run = _adjacent_mistakes(chosen, count, MistakeSearchSettings.tie_ratio * best)
+        run = _adjacent_mistakes(chosen, count, MistakeLimits.tie_ratio * best)
         known = [m for m in count if m in run and not m.step and m.forward]
         middle = 0.5 * (run[0].forward + run[-1].forward)
         chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))
@@ -569,19 +544,14 @@ def _adjacent_mistakes(
     chosen: Mistake, count: Mapping[Mistake, int], least: float
 ) -> list[Mistake]:
     """Mistakes with the same turn and neighbouring distances that do about as well."""
-    line = sorted(
-        (m for m in count if m.moves_frame and m.turn == chosen.turn), key=_forward_distance
-    )
+    same = [m for m in count if m.moves_frame and m.turn == chosen.turn]
+    line = sorted(same, key=lambda mistake: mistake.forward)
     low = high = line.index(chosen)
     while low > 0 and count[line[low - 1]] >= least:
         low -= 1
     while high + 1 < len(line) and count[line[high + 1]] >= least:
         high += 1
     return line[low : high + 1]
-
-
-def _forward_distance(mistake: Mistake) -> float:
-    return mistake.forward
 
 
 def _other_reader(name: str, others: Sequence[str]) -> str:
@@ -604,12 +574,8 @@ def _promising_rows(grasps: GraspSet) -> list[int]:
     """Grasps to look at: the successes, where scores are 0 and 1, or else the half with the highest
     scores, where there are so many; data sets have failures, and networks poor grasps."""
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
-    if (
-        set(score.tolist()) == {0.0, 1.0}
-        and (score == 1.0).sum() >= MistakeSearchSettings.min_fitting
-    ):
-        return [int(k) for k in np.flatnonzero(score == 1.0)]
-    best = np.argsort(-score, kind="stable")[
-        : max(MistakeSearchSettings.max_grasps, len(grasps) // 2)
-    ]
-    return sorted(int(k) for k in best)
+    success = score == 1.0
+    if set(score.tolist()) == {0.0, 1.0} and success.sum() >= MistakeLimits.min_fitting:
+        return [int(k) for k in np.flatnonzero(success)]
+    count = max(MistakeLimits.max_grasps, len(grasps) // 2)
+    return sorted(int(k) for k in np.argsort(-score, kind="stable")[:count])

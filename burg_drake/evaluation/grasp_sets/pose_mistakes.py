@@ -71,8 +71,6 @@ POSE_CORRECTIONS: Mapping[str, tuple[Callable[[Array], Array], str]] = {
 }
 """Corrections of poses (..., 4, 4) in the file's convention, with words."""
 HALF_WIDTHS = "half_widths"
-CORRECTION_FORMS = (*POSE_CORRECTIONS, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
-"""What `correction` may have."""
 MIN_LIKELY_GRASPS = 8  # Number of examined grasps from which a mistake can be called likely.
 _TURN_PATTERN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
 _FORWARD_PATTERN = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
@@ -145,7 +143,8 @@ def correct_grasps(
     Args:
         imported: what was read.
         gripper: the hand that it was read for.
-        correction: names of `CORRECTION_FORMS`; `half_widths` doubles widths.
+        correction: names of `POSE_CORRECTIONS`, `half_widths`, which doubles widths, and forms such
+            as `turn:z90` and `forward:103.4`.
 
     Raises:
         UnknownNameError: there is no such correction.
@@ -156,16 +155,15 @@ def correct_grasps(
     if not names:
         return replace(imported, grasps=replace(grasps, provenance=provenance))
     X_MG = correct_poses(grasps.X_OG, frames_of(grasps, gripper), names)
-    factor = 2.0 if HALF_WIDTHS in names else 1.0
-    found = GraspSet.create(
-        X_MG,
-        object=grasps.object,
-        width=grasps.width * factor,
-        score=grasps.score,
-        provenance={**provenance, "correction": list(names)},
-        columns=grasps.columns,
-    )
-    return replace(imported, grasps=found)
+    width = grasps.width * (2.0 if HALF_WIDTHS in names else 1.0)
+    provenance["correction"] = list(names)
+    return replace(imported, grasps=with_poses(grasps, X_MG, width=width, provenance=provenance))
+
+
+def with_poses(grasps: GraspSet, X_OG: Array, **changes: Any) -> GraspSet:
+    """The grasps at other poses (N, 4, 4), with identifiers of these; and other changed fields."""
+    names = ("object", "width", "score", "provenance", "columns")
+    return GraspSet.create(X_OG, **{name: getattr(grasps, name) for name in names} | changes)
 
 
 def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -193,13 +191,10 @@ def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
 
 def format_of_set(grasps: GraspSet) -> GraspFormat:
     """The format that a set was read from, as its provenance says; else ours."""
-    names = [
-        grasps.provenance.get("format"),
-        *(p.get("format") for p in provenance_parts(grasps.provenance)),
-    ]
-    return GRASP_FORMATS[
-        next((n for n in names if isinstance(n, str) and n in GRASP_FORMATS), "burg_drake")
-    ]
+    provenances = (grasps.provenance, *provenance_parts(grasps.provenance))
+    names = [found.get("format") for found in provenances]
+    known = (name for name in names if isinstance(name, str) and name in GRASP_FORMATS)
+    return GRASP_FORMATS[next(known, "burg_drake")]
 
 
 @dataclass(frozen=True)
@@ -255,11 +250,11 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
         format: that the grasps were read as.
         gripper: the hand.
     """
-    # Distances along the approach, beside those of known frames.
-    offsets_mm = np.arange(-120.0, 121.0, 5.0)
     origin = _frame_offset_mm(format, gripper)
     base = round(1e3 * gripper.X_HG[2, 3], 2)
-    known = {round(o - origin, 2) for o in _frame_offsets_mm(gripper)} | {base, -base}
+    origins = [_frame_offset_mm(known, gripper) for known in GRASP_FORMATS.values()]
+    origins.append(-1e3 * gripper.tip)
+    known = {round(o - origin, 2) for o in origins} | {base, -base}
     first = sorted((base, -base), key=lambda d: (abs(d + origin - base), -d))
     distances = [d for d in dict.fromkeys([*first, *sorted(known, key=abs)]) if d]
     quarter, flange = ("turn:z90",), (("turn:z45",), ("turn:z-45",))
@@ -276,7 +271,7 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
     found += [_frame_mistake(turn, d) for turn, d in product(flange, (0.0, base)) if turn or d]
     found += [
         replace(_frame_mistake(turn, d), step=True)
-        for turn, d in product(((), quarter), offsets_mm.tolist())
+        for turn, d in product(((), quarter), np.arange(-120.0, 121.0, 5.0).tolist())
         if d and d not in distances
     ]
     return list(dict.fromkeys(found))
@@ -285,14 +280,6 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
 def _frame_offset_mm(format: GraspFormat, gripper: Gripper) -> float:
     """How far the origin of a format's frame is behind G [mm]."""
     return -1e3 * float(format.X_GF(gripper)[2, 3])
-
-
-def _frame_offsets_mm(gripper: Gripper) -> list[float]:
-    """How far origins of known frames are behind G [mm]: of all formats, and the finger tips."""
-    return [
-        *(_frame_offset_mm(format, gripper) for format in GRASP_FORMATS.values()),
-        -1e3 * gripper.tip,
-    ]
 
 
 def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
@@ -347,8 +334,7 @@ class MistakeFound:
     @property
     def is_likely(self) -> bool:
         """Whether nearly all grasps fit once it is corrected, and nothing else does as well."""
-        min_share = 0.9  # Share of grasps that fit after the correction.
-        enough = self.count >= MIN_LIKELY_GRASPS and self.after >= min_share * self.count
+        enough = self.count >= MIN_LIKELY_GRASPS and self.after >= 0.9 * self.count
         return enough and not self.alternatives
 
     def text(self, format_option: str = "--grasps-format") -> str:

@@ -1,4 +1,4 @@
-"""Grasp sets of several objects: sampled ones with their provenance, and analytic quality of any set."""
+"""Grasp sets of several objects: sampled ones with provenance, and analytic quality of any set."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from burg_drake.core import (
 from burg_drake.evaluation.candidates import INSTANCE_COLUMN
 from burg_drake.evaluation.grasp_sets.input import object_files, set_documents
 from burg_drake.evaluation.grasp_sets.sampling import sample_library, sample_on_scene
+from burg_drake.evaluation.judge import hand_alone
 from burg_drake.evaluation.settings import SamplingSettings
 from burg_drake.geometry import Surface
 from burg_drake.grasping import (
@@ -41,7 +42,7 @@ from burg_drake.grasping import (
 )
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.station import Station, StationLike, as_station
+from burg_drake.station import Station, StationLike, as_station, instance_pose
 
 
 def sample_grasps(
@@ -85,12 +86,10 @@ def sample_grasps(
     else:
         scene = as_scene(source)
         library = scene.library
-    stream = (
-        sample_library(library, station, n, seed, chosen, only)
-        if scene is None
-        else sample_on_scene(scene, station, n, seed, chosen, only)
-    )
-    sampled = dict(stream)
+    if scene is None:
+        sampled = dict(sample_library(library, station, n, seed, chosen, only))
+    else:
+        sampled = dict(sample_on_scene(scene, station, n, seed, chosen, only))
     if not sampled:
         raise InvalidInputError(
             f"{(scene or library).name!r} has no free objects to sample grasps on"
@@ -140,8 +139,11 @@ def sampled_set(
 
 def _settings_data(settings: SamplingSettings) -> dict[str, Any]:
     """The settings as JSON values; of the weights, whose objects have some."""
-    values = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
-    return {**values, "standoffs": list(settings.standoffs), "weights": sorted(settings.weights)}
+    return {
+        **vars(settings),
+        "standoffs": list(settings.standoffs),
+        "weights": sorted(settings.weights),
+    }
 
 
 SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
@@ -158,7 +160,7 @@ def scored_set(
     by: str = DEFAULT_METRIC,
     progress: bool | Listener = False,
 ) -> GraspSet:
-    """Adds the metrics of `grasping.quality`, and in a scene the clearance of the open hand.
+    """Adds the metrics of `grasping.METRICS`, and in a scene the clearance of the open hand.
 
     Example::
 
@@ -173,14 +175,14 @@ def scored_set(
         scene: where the objects stand. A grasp is on the instance that its column `instance` names,
             or on the only one of its object.
         friction: coefficients by object, in place of the library's; under "" for all others.
-        by: the metric that becomes the score, `grasping.quality.METRICS`.
+        by: the metric that becomes the score, `grasping.METRICS`.
         progress: True shows it on standard error; a function gets the events.
 
     Returns:
         The same grasps in the same order; `provenance["quality"]` tells with what they were scored.
         In a scene `gravity_margin` is known, and there are the `SCENE_COLUMNS`, which grasps from
         elsewhere lose without one: `clearance` [m], negative where the hand overlaps something;
-        `suggest_names`, what it overlaps or is nearest to; `screened`, the outcome of the screen, `clear`
+        `nearest`, what it overlaps or is nearest to; `screened`, the outcome of the screen, `clear`
         or one of `Outcome`; and `collides_with`, what decided it, "" if clear.
 
     Raises:
@@ -198,7 +200,10 @@ def scored_set(
     chosen = _friction_by_object(friction or {}, objects)
     jaws = jaws_of(station.hand, station.hand_model, station.packages)
     instance = None if scene is None else _instances(grasps, scene)
-    X_WO = None if scene is None or instance is None else _instance_poses(instance, scene, station)
+    X_WO = None
+    if scene is not None and instance is not None:
+        poses = {name: instance_pose(scene, station, name) for name in set(instance.tolist())}
+        X_WO = np.array([poses[name] for name in instance.tolist()]).reshape(-1, 4, 4)
     columns: dict[str, Any] = {name: np.full(len(grasps), np.nan) for name in METRICS}
     columns["force_closure"] = np.zeros(len(grasps), bool)
     payloads = {}
@@ -229,10 +234,9 @@ def scored_set(
 
 
 def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Indices of the rows chosen (N,), so many at a time."""
-    batch_size = 2000  # Grasps that are scored at a time; the metrics do not depend on it.
+    """Indices of the rows chosen (N,), 2000 at a time; metrics do not depend on the number."""
     rows = np.flatnonzero(chosen)
-    return [rows[k : k + batch_size] for k in range(0, len(rows), batch_size)]
+    return [rows[k : k + 2000] for k in range(0, len(rows), 2000)]
 
 
 def _friction_by_object(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
@@ -277,21 +281,10 @@ def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
     return found.astype(str)
 
 
-def _instance_poses(instance: NDArray[np.str_], scene: Scene, station: Station) -> Array:
-    """(N, 4, 4) poses of instances (N,) in the world."""
-    X_WO = np.empty((len(instance), 4, 4))
-    for name in set(instance.tolist()):
-        X_WO[instance == name] = station.document.X_WS.matrix() @ scene.X_SO(name)
-    return X_WO
-
-
 def _clearances(
     instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: ProgressMeter
 ) -> dict[str, Any]:
-    from burg_drake.grasping import HandClearance
-    from burg_drake.station import build_station_diagram
-
-    screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
+    screen, _ = hand_alone(scene, station)
     columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
     for name in sorted(set(instance.tolist())):
         for some in _batches(instance == name):
@@ -301,7 +294,4 @@ def _clearances(
             for column, value in zip(SCENE_COLUMNS, values, strict=True):
                 columns[column][some] = value
             pace.step(len(some))
-    return {
-        name: values.astype(float if name == "clearance" else str)
-        for name, values in columns.items()
-    }
+    return {n: v.astype(float if n == "clearance" else str) for n, v in columns.items()}

@@ -26,6 +26,7 @@ from burg_drake.evaluation.candidates import (
     drop_equal_grasps,
     join_candidates,
 )
+from burg_drake.evaluation.judge import hand_alone
 from burg_drake.evaluation.settings import (
     DEFAULT_APPROACH_ANGLE_DEG,
     SLIPPERY_FRICTION_FACTOR,
@@ -72,7 +73,6 @@ def approach_half_space_of_arm(
     Raises:
         InvalidInputError: there is no arm, or the object is right above its base.
     """
-    min_base_distance = 0.01  # Metres; an object closer to the base's vertical is on no side of it.
     arm = station.document.arm
     if arm is None:
         raise InvalidInputError(
@@ -80,7 +80,7 @@ def approach_half_space_of_arm(
             " which the hand could approach"
         )
     x, y, _ = p_WM - arm.X_WA.matrix()[:3, 3]
-    if np.hypot(x, y) < min_base_distance:
+    if np.hypot(x, y) < 0.01:  # metres
         raise InvalidInputError(
             f"{name!r} is right above the base of the arm, so the hand cannot approach it"
             " from the arm's side"
@@ -92,9 +92,9 @@ def _direction_in_object(
     X_WO: Array, v_W: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """A direction of the world as a rounded unit vector in the object frame."""
-    direction_decimals = 6  # Rounded, so objects turned about the vertical share their grasps.
     v_O = np.asarray(v_W) @ X_WO[:3, :3] / np.linalg.norm(v_W)
-    x, y, z = np.round(v_O, direction_decimals) + 0.0  # no negative zeros
+    # rounded, so objects turned about the vertical share their grasps; and no negative zeros
+    x, y, z = np.round(v_O, 6) + 0.0
     return float(x), float(y), float(z)
 
 
@@ -102,8 +102,8 @@ PAD_CONTACT = "pads"
 """Counted as blocker where the pads do not meet the object antipodally."""
 
 
-class ClearTest:
-    """Keeps grasps of one object, see `grasping.antipodal_sampling.Accept`.
+class ClearanceFilter:
+    """Keeps grasps of one object, see `grasping.Accept`.
 
     Args:
         screen: of the open hand.
@@ -178,7 +178,7 @@ def sample_on_scene(
         scene: the scene.
         station: gives the opening of the hand, its body, and the place of the arm.
         n: grasps for each instance; there are fewer where there are (almost) no more, and
-            `sampling_shortfall.shortfall` says why.
+            `shortfall_note` says why.
         seed: of the random numbers.
         settings: how.
         only: names of free instances, or of objects for all their instances; all if None.
@@ -194,29 +194,24 @@ def sample_on_scene(
     names = chosen_instances(scene, only)
     objects = {instance.object for instance in scene.instances.values()}
     _require_known_names(settings.weights, objects, "weights: the scene does not have object")
-    return _generate_on_scene(scene, station, n, seed, settings, names)
 
+    def sampled() -> Iterator[tuple[str, GraspSet]]:
+        from burg_drake.station import instance_pose
 
-def _generate_on_scene(
-    scene: Scene,
-    station: Station,
-    n: int,
-    seed: int,
-    settings: SamplingSettings,
-    names: tuple[str, ...],
-) -> Iterator[tuple[str, GraspSet]]:
-    draw = ObjectSampler(scene.library, station, n, seed, settings)
-    screen = None if settings.blind else _scene_screen(scene, station)
-    found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
-    for name in names:
-        object, X_WO = scene.instance(name).object, _instance_pose(scene, station, name)
-        cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
-        if screen is not None:
-            yield name, draw.clear(object, cones, screen, name, X_WO)
-        else:
-            if (object, cones) not in found:
-                found[object, cones] = draw(object, cones)
-            yield name, found[object, cones]
+        draw = ObjectSampler(scene.library, station, n, seed, settings)
+        screen = None if settings.blind else hand_alone(scene, station)[0]
+        found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
+        for name in names:
+            object, X_WO = scene.instance(name).object, instance_pose(scene, station, name)
+            cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
+            if screen is not None:
+                yield name, draw.clear(object, cones, screen, name, X_WO)
+            else:
+                if (object, cones) not in found:
+                    found[object, cones] = draw(object, cones)
+                yield name, found[object, cones]
+
+    return sampled()
 
 
 def sample_library(
@@ -252,26 +247,19 @@ def sample_library(
     where = f"library {library.name!r} has no object"
     names = _require_known_names(objects, library.objects, where)
     _require_known_names(settings.weights, library.objects, f"weights: {where}")
-    return _generate_on_library(library, station, n, seed, settings, names)
 
+    def sampled() -> Iterator[tuple[str, GraspSet]]:
+        from burg_drake.grasping import hand_clearance_alone
 
-def _generate_on_library(
-    library: ObjectLibrary,
-    station: Station,
-    n: int,
-    seed: int,
-    settings: SamplingSettings,
-    names: tuple[str, ...],
-) -> Iterator[tuple[str, GraspSet]]:
-    from burg_drake.grasping import hand_clearance_alone
+        draw = ObjectSampler(library, station, n, seed, settings)
+        for name in names:
+            if settings.blind:
+                yield name, draw(name, ())
+            else:
+                screen = hand_clearance_alone(library, name, station)
+                yield name, draw.clear(name, (), screen, name, np.eye(4))
 
-    draw = ObjectSampler(library, station, n, seed, settings)
-    for name in names:
-        if settings.blind:
-            yield name, draw(name, ())
-        else:
-            screen = hand_clearance_alone(library, name, station)
-            yield name, draw.clear(name, (), screen, name, np.eye(4))
+    return sampled()
 
 
 class ObjectSampler:
@@ -285,9 +273,13 @@ class ObjectSampler:
         seed: int,
         settings: SamplingSettings,
     ) -> None:
+        from burg_drake.station import check_hand
+
         self._library, self._station = library, station
         self._n, self._seed, self._settings = n, seed, settings
-        self._pad = _pad_range(station)
+        path, packages = station.hand_path, station.packages
+        low, high = check_hand(station.hand, station.hand_model, path, packages).pad_bounds
+        self._pad = (low[2], high[2])  # along z of G [m]
         self._surfaces: dict[str, trimesh.Trimesh] = {}
 
     def surface(self, object: str) -> trimesh.Trimesh:
@@ -341,14 +333,16 @@ class ObjectSampler:
         notes = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
         return dataclasses.replace(grasps, provenance={**grasps.provenance, **notes})
 
-    def clear_test(self, object: str, screen: HandClearance, name: str, X_WO: Array) -> ClearTest:
+    def clear_test(
+        self, object: str, screen: HandClearance, name: str, X_WO: Array
+    ) -> ClearanceFilter:
         """Tells which grasps of an object the hand can take; see `clear`."""
         from burg_drake.geometry import Surface
         from burg_drake.grasping import jaws_of
 
         surface, friction = Surface.of(self.surface(object)), self._friction(object)
         jaws = jaws_of(self._station.hand, self._station.hand_model, self._station.packages)
-        return ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
+        return ClearanceFilter(screen, name, X_WO, surface, jaws, friction, self._settings)
 
     def _friction(self, object: str) -> float:
         given = self._settings.friction
@@ -372,11 +366,6 @@ def _require_known_names(
     return chosen
 
 
-def _instance_pose(scene: Scene, station: Station, instance: str) -> Array:
-    X_WO: Array = station.document.X_WS.matrix() @ scene.X_SO(instance)
-    return X_WO
-
-
 def _approach_cones(
     surface: trimesh.Trimesh,
     X_WO: Array,
@@ -393,25 +382,11 @@ def _approach_cones(
     return cones
 
 
-def _pad_range(station: Station) -> tuple[float, float]:
-    """From where to where the pads of the hand reach along z of G [m]."""
-    from burg_drake.station import check_hand
-
-    hand, document = station.hand, station.hand_path
-    low, high = check_hand(hand, station.hand_model, document, station.packages).pad_bounds
-    return low[2], high[2]
-
-
-def _scene_screen(scene: Scene, station: Station) -> HandClearance:
-    from burg_drake.grasping import HandClearance
-    from burg_drake.station import build_station_diagram
-
-    return HandClearance(build_station_diagram(scene, station, robot="hand"))
-
-
 LINE_REJECTIONS = {
     PairRejection.too_long: "are longer than the hand can open",
-    PairRejection.slanted: "meet the surface at an angle at which a friction of {friction:g} does not hold",
+    PairRejection.slanted: (
+        "meet the surface at an angle at which a friction of {friction:g} does not hold"
+    ),
     PairRejection.no_room: "leave no room for a finger",
     PairRejection.no_approach: "allow no approach within the limits",
 }
@@ -471,15 +446,15 @@ def _describe_lines(provenance: Mapping[str, Any]) -> str:
 
 
 def _describe_bodies(bodies: Mapping[str, int], margin: float) -> str:
-    max_bodies = 3  # Number of blocking bodies that are named.
     hit = {body: n for body, n in bodies.items() if body != PAD_CONTACT}
-    parts = [f"{body} in {n:,}" for body, n in list(hit.items())[:max_bodies]]
-    rest = sum(list(hit.values())[max_bodies:])
+    parts = [f"{body} in {n:,}" for body, n in list(hit.items())[:3]]
+    rest = sum(list(hit.values())[3:])
     parts += [f"others in {rest:,}"] if rest else []
     meets = f"comes within {1e3 * margin:g} mm of" if margin else "hits"
     text = f"the open hand {meets} {_join_parts(parts)}" if parts else ""
     if bodies.get(PAD_CONTACT):
-        text += f"{', and ' if text else ''}its pads meet the object elsewhere in {bodies[PAD_CONTACT]:,}"
+        pads = f"its pads meet the object elsewhere in {bodies[PAD_CONTACT]:,}"
+        text += f", and {pads}" if text else pads
     return text
 
 

@@ -1,3 +1,4 @@
 """The report of a run as one self-contained HTML page.
 
-Read `page` first, or `campaign` for many scenes; `sections` are put together of `elements`."""
+Read `pages` first; the sections (`*_sections`) are put together of `page_elements` and `charts`.
+"""

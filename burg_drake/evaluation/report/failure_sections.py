@@ -1,4 +1,4 @@
-"""Sections of the report about failures: causes, bodies in the way, moved objects, arm, reachability."""
+"""Sections of the report about failures: causes, obstacles, moved objects, arm, reachability."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ from burg_drake.core import (
     format_count,
     format_percent,
 )
-from burg_drake.evaluation.outcome_counts import Summary, Texts, code_texts, member_codes
+from burg_drake.evaluation.outcome_counts import Summary, TextValues, code_texts, member_codes
 from burg_drake.evaluation.report.outcome_sections import outcome_text
 from burg_drake.evaluation.report.page_elements import (
     GROUP_CLASSES,
     command,
     folded_section,
+    number_cells,
     section,
     table,
+    table_row,
 )
 from burg_drake.evaluation.results_table import Columns
 from burg_drake.evaluation.run_folder import Run
@@ -61,36 +63,35 @@ TYPICAL_MARGINS = (
     ("lift", ("blocked",)),
 )
 """Margin that ranks cases of an outcome by strength, by beginning of its name."""
-CAUSE_MARGINS = tuple(name for name, _ in TYPICAL_MARGINS)  # Margins of `TYPICAL_MARGINS`.
+CAUSE_MARGINS = tuple(name for name, _ in TYPICAL_MARGINS)
 
 
 @dataclass(frozen=True, eq=False)
 class CauseRows:
-    """What is asked about the grasps of one run or of many.
+    """The grasps of one run or of many, by outcome, object and blocker.
 
     Attributes:
-        outcomes: (N,) places in `Outcome`.
-        objects, blockers: what each grasp is on, and what was in its way.
+        outcomes: (N,) indices into `Outcome`.
+        objects, blockers: of each grasp.
         margins: (N,) by name of `CAUSE_MARGINS`; those that the runs have.
         replay: the command that shows the grasp of a row.
     """
 
     outcomes: NDArray[np.int8]
-    objects: Texts
-    blockers: Texts
+    objects: TextValues
+    blockers: TextValues
     margins: Mapping[str, Array]
     replay: Callable[[int], str]
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Grasps that ended alike.
+    """Grasps with the same outcome.
 
     Attributes:
-        outcome: how.
+        outcome: the outcome.
         number: of grasps.
-        objects, blockers: what they are on and what was in their way, with how often, most frequent
-            first.
+        objects, blockers: of these grasps, with their counts, most frequent first.
         typical: row of the median one.
     """
 
@@ -166,16 +167,11 @@ def _cause_entry(cause: Cause, whole: int, replay: str) -> Html:
     where = [f"on {_counted_names(cause.objects)}"]
     if cause.blockers:
         where.append(f"in the way: {_counted_names(cause.blockers)}")
+    name = outcome_text(cause.outcome)
+    share = f"{format_count(cause.number)} ({format_percent(cause.number / whole)})"
     return element(
         "article",
-        element(
-            "h3",
-            element("i", class_=style, aria_hidden="true"),
-            outcome_text(cause.outcome),
-            element(
-                "span", f"{format_count(cause.number)} ({format_percent(cause.number / whole)})"
-            ),
-        ),
+        element("h3", element("i", class_=style, aria_hidden="true"), name, element("span", share)),
         element("p", f"{cause.outcome.meaning}; {'; '.join(where)}"),
         command(replay),
     )
@@ -203,8 +199,7 @@ def collision_section(columns: Columns) -> Html | None:
             f"{np.median(depth):.1f} mm",
             f"{depth.max():.1f} mm",
         ]
-        numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
-        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+        rows.append(table_row(name, *number_cells(cells)))
     head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
     return folded_section(
         "Start collisions",
@@ -240,7 +235,7 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         "farthest",
         "turned by at most",
         "toppled",
-        ("main causes: trials"),
+        "main causes: trials",
     ]
     toppled = _toppled(columns)
     rows = []
@@ -257,9 +252,8 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
             _largest_turn(columns.get(TURNED_PREFIX + name), mask),
             toppled[name] or "·",
         ]
-        numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
         cause = element("td", f"on {by} ({times})")
-        rows.append(element("tr", element("th", name, scope="row"), *numbers, cause))
+        rows.append(table_row(name, *number_cells(cells), cause))
     return folded_section(
         "What was disturbed",
         f"Objects that were moved by {min_displacement * 1e3:g} mm or more in trials on"
@@ -276,7 +270,7 @@ def _toppled(columns: Columns) -> Counter[str]:
 
 
 def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
-    """The largest of the angles [rad] that are chosen, for people."""
+    """The largest of the chosen angles [rad] in degrees."""
     known = np.empty(0) if angle is None else angle[mask & np.isfinite(angle)]
     return f"{math.degrees(known.max()):.1f}°" if len(known) else "·"
 
@@ -292,13 +286,9 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
     for outcome in arm_outcomes:
         count = summary.total.outcomes[outcome]
         if count:
-            cells = [
-                element("td", cell, class_="number")
-                for cell in (count, format_percent(count / clear))
-            ]
-            name = element("th", outcome.value.replace("_", " "), scope="row")
-            blockers = element("td", _blockers(columns, outcome))
-            rows.append(element("tr", name, *cells, element("td", outcome.meaning), blockers))
+            cells = number_cells((count, format_percent(count / clear)))
+            cells += [element("td", outcome.meaning), element("td", _blockers(columns, outcome))]
+            rows.append(table_row(outcome_text(outcome), *cells))
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"The open hand is clear at {clear} grasps. The arm can execute {planned} of them"
@@ -334,8 +324,7 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
         if len(values):
             figures = (np.median(values), np.quantile(values, 0.95), values.max())
             cells: list[Child] = [len(values), *(f"{figure:.3g} {unit}" for figure in figures)]
-            numbers = [element("td", cell, class_="number") for cell in cells]
-            rows.append(element("tr", element("th", label, scope="row"), *numbers))
+            rows.append(table_row(label, *number_cells(cells)))
     touches = Counter(t for t in columns["touched"].tolist() if t)
     text = "How closely the simulated arm followed its plans within its torque limits."
     text += f" {summary.pushes}" if summary.pushes else ""

@@ -19,13 +19,14 @@ from burg_drake.core import (
     display_unit,
     format_column_value,
 )
-from burg_drake.evaluation.report.charts import Limit, Series, mirrored_histogram
+from burg_drake.evaluation.report.charts import HistogramSeries, Limit, mirrored_histogram
 from burg_drake.evaluation.report.page_elements import (
     GROUP_CLASSES,
     LIFTED_GROUP,
     command,
     folded_section,
     group_legend,
+    number_cells,
     present_groups,
     section,
     table,
@@ -56,7 +57,7 @@ def margin_section(
 
     Args:
         columns: (N,) by name, of grasps that came to a trial.
-        groups: (N,) of each, see `outcome_groups`.
+        groups: (N,) of each, see `group_indices`.
         trial: settings of the trial's phases, with the limits of what counts as lifted.
     """
     # Settings from whose value on a held object does not count as lifted.
@@ -81,7 +82,7 @@ def margin_section(
 
 
 def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> Html | None:
-    """The others; likewise."""
+    """All other margins; None if nothing was executed."""
     charts = _margin_charts(FURTHER_MARGINS, columns, groups, {})
     if not charts:
         return None
@@ -120,17 +121,14 @@ def _margin_charts(
 def _margin_chart(
     margin: str, values: np.ndarray, groups: NDArray[np.int8], limit: Limit | None
 ) -> Html:
-    series = {
-        k: Series(
-            values[groups == k], GROUP_CLASSES[OUTCOME_GROUPS[k].name], OUTCOME_GROUPS[k].name
-        )
-        for k in {LIFTED_GROUP, *present_groups(groups)}
-    }
-    success = series.pop(LIFTED_GROUP)
-    failures = [series[k] for k in sorted(series)]
+    def series(k: int) -> HistogramSeries:
+        name = OUTCOME_GROUPS[k].name
+        return HistogramSeries(values[groups == k], GROUP_CLASSES[name], name)
+
+    failures = [series(k) for k in present_groups(groups) if k != LIFTED_GROUP]
     unit, _ = display_unit(margin)
     return mirrored_histogram(
-        success, failures, title=column_axis_label(margin), unit=unit, limit=limit
+        series(LIFTED_GROUP), failures, title=column_axis_label(margin), unit=unit, limit=limit
     )
 
 
@@ -138,14 +136,7 @@ def best_section(run: Run) -> Html | None:
     """The best grasps and how to watch them; nothing where none was lifted."""
     per_object = 3  # Rows for each object.
     # Columns, with the decimals that tell the best grasps apart.
-    decimals = {
-        "clearance": 1,
-        "slip": 2,
-        "tilt": 2,
-        "pad_force": 1,
-        "patch_area": 0,
-        "others_moved": 2,
-    }
+    decimals = dict(clearance=1, slip=2, tilt=2, pad_force=1, patch_area=0, others_moved=2)
     best = run.best(per_object, each=True)
     if not best:
         return None
@@ -153,14 +144,8 @@ def best_section(run: Run) -> Html | None:
     rows = []
     for row in map(run.row, best):
         cells = [format_column_value(name, row[name], digits) for name, digits in decimals.items()]
-        rows.append(
-            element(
-                "tr",
-                element("td", element("code", row["id"], class_="copy")),
-                element("td", row["object"]),
-                *(element("td", cell, class_="number") for cell in cells),
-            )
-        )
+        id = element("td", element("code", row["id"], class_="copy"))
+        rows.append(element("tr", id, element("td", row["object"]), *number_cells(cells)))
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
     return folded_section(
         "Best grasps",
@@ -180,15 +165,10 @@ def failure_section(run: Run) -> Html | None:
     failures = run.failures
     if not failures:
         return None
-    rows = [
-        element(
-            "tr",
-            element("td", element("code", row["id"])),
-            element("td", row["stage"]),
-            element("td", row["reason"]),
-        )
-        for row in map(run.row, failures[:max_rows])
-    ]
+    rows = []
+    for row in map(run.row, failures[:max_rows]):
+        cells = element("code", row["id"]), row["stage"], row["reason"]
+        rows.append(element("tr", *(element("td", cell) for cell in cells)))
     more = f" The first {max_rows} are listed." if len(failures) > max_rows else ""
     text = f"{len(failures)} grasps could not be simulated; they count as not executed.{more}"
     return folded_section("Failures", text, table(["grasp", "stage", "reason"], rows))

@@ -1,4 +1,4 @@
-"""Sections of the report about outcomes: opening, funnel of stages, counts by object, certainty, cost."""
+"""Sections of the report about outcomes: opening, stages, counts by object, certainty, cost."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from burg_drake.core import (
     Stage,
     clustered_interval,
     format_count,
-    format_count as number,
     format_duration,
     format_number,
     format_percent,
@@ -22,8 +21,10 @@ from burg_drake.evaluation.report.charts import BarPart, interval_mark, legend, 
 from burg_drake.evaluation.report.page_elements import (
     GROUP_CLASSES,
     folded_section,
+    number_cells,
     section,
     table,
+    table_row,
     tiles,
 )
 from burg_drake.visualization import OUTCOME_GROUPS, Child, Html, element, join, outcome_group
@@ -42,8 +43,6 @@ STEP_LOSSES = {
     "lifted": (Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED),
 }
 """Outcomes that stop a grasp on its way to each step of the funnel."""
-
-
 GROUP_COLUMNS = ("grasps", "outcomes", "lifted / executed", "share with 95 % interval")
 """Columns of `group_row` behind the name."""
 
@@ -55,7 +54,8 @@ def objects_section(summary: Summary) -> Html:
     more = ""
     if len(objects) > max_objects:
         objects = worst_first(objects)[:max_objects]
-        more = f" The {max_objects} of {len(summary.objects)} objects with the lowest shares are shown."
+        whole = len(summary.objects)
+        more = f" The {max_objects} of {whole} objects with the lowest shares are shown."
     rows = [group_row(group) for group in objects]
     if len(objects) > 1:
         rows.append(group_row(summary.total, "total"))
@@ -98,14 +98,14 @@ def group_row(group: OutcomeCounts, style: str = "", name: Child = None) -> Html
     if group.executed:
         mark = interval_mark(group.lifted / group.executed, *group.interval)
         share = join(mark, f" {format_percent(group.lifted / group.executed)}")
-    return element(
-        "tr",
-        element("th", group.name if name is None else name, scope="row"),
-        element("td", number(group.judged), class_="number"),
+    lifted = f"{format_count(group.lifted)} / {format_count(group.executed)}"
+    return table_row(
+        group.name if name is None else name,
+        *number_cells([format_count(group.judged)]),
         element("td", stacked_bar(parts, group.judged), class_="wide"),
-        element("td", f"{number(group.lifted)} / {number(group.executed)}", class_="number"),
+        *number_cells([lifted]),
         element("td", share, class_="estimate"),
-        class_=style or None,
+        style=style,
     )
 
 
@@ -115,19 +115,12 @@ def count_section(summary: Summary) -> Html:
     groups = [*summary.objects, *([summary.total] if len(summary.objects) > 1 else [])]
     rows = []
     for group in groups:
-        cells = [
-            element("td", group.outcomes[o] or "·", class_=_count_style(group.outcomes[o]))
-            for o in seen
-        ]
-        style = "total" if group is summary.total else None
-        rows.append(element("tr", element("th", group.name, scope="row"), *cells, class_=style))
+        cells = number_cells(group.outcomes[o] or "·" for o in seen)
+        style = "total" if group is summary.total else ""
+        rows.append(table_row(group.name, *cells, style=style))
     head = ["object", *(outcome_text(o) for o in seen)]
     matrix = table(head, rows, numbers=tuple(range(1, len(head))), style="matrix")
     return folded_section("Counts", "Every grasp ends with exactly one outcome.", matrix)
-
-
-def _count_style(count: int) -> str:
-    return "number" if count else "number zero"
 
 
 def cost_section(summary: Summary) -> Html:
@@ -135,15 +128,9 @@ def cost_section(summary: Summary) -> Html:
     head = ["stage", "grasps", "CPU time", "median", "grasps per CPU second"]
     rows = []
     for cost in summary.costs:
-        rate = format_number(cost.rate)
-        cells: list[Child] = [
-            cost.grasps,
-            format_duration(cost.seconds),
-            format_duration(cost.median),
-            rate,
-        ]
-        numbers = [element("td", cell, class_="number") for cell in cells]
-        rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))
+        durations = format_duration(cost.seconds), format_duration(cost.median)
+        cells = number_cells([cost.grasps, *durations, format_number(cost.rate)])
+        rows.append(table_row(cost.name, *cells))
     text = "CPU time of the worker processes, without their start."
     if summary.mode != "hand":
         text += " The time for reachable includes the search for motions of the arm."
@@ -227,12 +214,12 @@ def _lost_text(total: OutcomeCounts, step: str) -> str:
     return f"{format_count(sum(n for n, _ in lost))}: {', '.join(parts)}"
 
 
-class CertaintyClasses:
-    """Certainty classes."""
-
-    lifted = GROUP_CLASSES["lifted"]  # CSS classes.
-    failed = GROUP_CLASSES["lost during lift or hold"]
-    contested = "contested"
+CERTAINTY_CLASSES = {
+    "lifted": GROUP_CLASSES["lifted"],
+    "contested": "contested",
+    "failed": GROUP_CLASSES["lost during lift or hold"],
+}
+"""CSS classes of certain and of contested verdicts."""
 
 
 def certainty_section(summary: Summary, contested: Sequence[str] = ()) -> Html | None:
@@ -259,17 +246,12 @@ def certainty_section(summary: Summary, contested: Sequence[str] = ()) -> Html |
     )
     if settled:
         text += f" Judged again by {', '.join(summary.settled_by)}, whose verdicts count:"
-        text += f" {number(settled)}."
-    keys = [
-        (CertaintyClasses.lifted, "lifted"),
-        (CertaintyClasses.contested, "contested"),
-        (CertaintyClasses.failed, "failed"),
-    ]
+        text += f" {format_count(settled)}."
     return section(
         "How sure the verdicts are",
         text,
         table(head, rows, numbers=(1, *range(3, width)), style="stacking"),
-        legend(keys),
+        legend([(style, name) for name, style in CERTAINTY_CLASSES.items()]),
         _contested_names(contested),
     )
 
@@ -288,23 +270,21 @@ def _contested_names(contested: Sequence[str]) -> Html | None:
 
 def _certainty_row(group: OutcomeCounts, settled: bool, style: str = "") -> Html:
     lifts, losses = group.contested_lifts, group.contested - group.contested_lifts
-    parts = [
-        BarPart(group.surely_lifted, CertaintyClasses.lifted, f"lifted: {group.surely_lifted}"),
-        BarPart(
-            group.contested,
-            CertaintyClasses.contested,
-            f"contested: {lifts} lifted, {losses} failed",
-        ),
-        BarPart(group.surely_lost, CertaintyClasses.failed, f"failed: {group.surely_lost}"),
-    ]
-    cells = [
-        element("td", number(group.executed), class_="number"),
+    counts = (group.surely_lifted, group.contested, group.surely_lost)
+    tips = (
+        f"lifted: {group.surely_lifted}",
+        f"contested: {lifts} lifted, {losses} failed",
+        f"failed: {group.surely_lost}",
+    )
+    parts = list(map(BarPart, counts, CERTAINTY_CLASSES.values(), tips))
+    further = [group.contested, group.settled] if settled else [group.contested]
+    return table_row(
+        group.name,
+        *number_cells([format_count(group.executed)]),
         element("td", stacked_bar(parts, group.executed), class_="wide"),
-        element("td", number(group.contested), class_="number"),
-    ]
-    if settled:
-        cells.append(element("td", number(group.settled), class_="number"))
-    return element("tr", element("th", group.name, scope="row"), *cells, class_=style or None)
+        *number_cells(map(format_count, further)),
+        style=style,
+    )
 
 
 def opening_section(summary: Summary) -> Html:
@@ -360,7 +340,8 @@ def _success_sentence(summary: Summary) -> str:
         return f"None of {grasp_count_text(total.judged)} lifted its object."
     interval = interval_text(summary, executed=False)
     share = f"{format_percent(total.lifted / total.judged)}, 95 % interval {interval}"
-    return f"{format_count(total.lifted)} of {grasp_count_text(total.judged)} lifted their object ({share})."
+    number = f"{format_count(total.lifted)} of {grasp_count_text(total.judged)}"
+    return f"{number} lifted their object ({share})."
 
 
 def _cascade_sentence(summary: Summary) -> str:
@@ -427,27 +408,21 @@ def _key_figures(summary: Summary) -> list[tuple[str, Child, str]]:
     )
     extra = "".join(f"; {format_count(n)} more {what}" for what, n in besides if n)
     scenes = f" in {format_count(len(summary.scenes))} scenes" if summary.scenes else ""
+    executed = format_count(total.executed)
     objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
     return [
         ("Grasps judged", format_count(total.judged), objects + scenes),
-        ("Executed", format_count(total.executed), screened),
-        (
-            "Lifted",
-            format_count(total.lifted),
-            f"of {format_count(total.executed)} executed{extra}",
-        ),
-        (
-            "Success when executed",
-            format_percent(total.lifted / total.executed) if total.executed else "-",
-            f"{interval_text(summary, executed=True)} (95 % interval)"
-            if total.executed
-            else "nothing executed",
-        ),
-        (
-            "Success of all",
-            format_percent(total.lifted / total.judged) if total.judged else "-",
-            f"{interval_text(summary, executed=False)} (95 % interval)"
-            if total.judged
-            else "nothing judged",
-        ),
+        ("Executed", executed, screened),
+        ("Lifted", format_count(total.lifted), f"of {executed} executed{extra}"),
+        ("Success when executed", *_success_figure(summary, executed=True)),
+        ("Success of all", *_success_figure(summary, executed=False)),
     ]
+
+
+def _success_figure(summary: Summary, *, executed: bool) -> tuple[str, str]:
+    """The share of grasps that were lifted, and its interval."""
+    whole = summary.total.executed if executed else summary.total.judged
+    if not whole:
+        return "-", f"nothing {'executed' if executed else 'judged'}"
+    interval = interval_text(summary, executed=executed)
+    return format_percent(summary.total.lifted / whole), f"{interval} (95 % interval)"

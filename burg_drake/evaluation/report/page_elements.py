@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,9 @@ from burg_drake.visualization import (
     page_style,
 )
 
-GROUP_CLASSES = {
-    group.name: f"g{i}" for i, group in enumerate(OUTCOME_GROUPS)
-}  # CSS class of each outcome group.
-THEMED_COLOURS = {
+GROUP_CLASSES = {group.name: f"g{i}" for i, group in enumerate(OUTCOME_GROUPS)}
+"""CSS class of each outcome group."""
+_THEMED_COLOURS = {
     "hand collides": ("#9aa2a9", "#6b747b"),
     "arm has no path": ("#1a3373", "#8fa6e8"),
     "simulation failed": ("#1d2328", "#f4f6f7"),
@@ -36,9 +35,9 @@ def style_sheet() -> str:
     """All styles of the page."""
     sheet = page_style("burg_drake.evaluation.report", "style.css")
     light = "".join(
-        _group_rule(g.name, THEMED_COLOURS.get(g.name, (g.hex,))[0]) for g in OUTCOME_GROUPS
+        _group_rule(g.name, _THEMED_COLOURS.get(g.name, (g.hex,))[0]) for g in OUTCOME_GROUPS
     )
-    dark = "".join(_group_rule(name, tones[1]) for name, tones in THEMED_COLOURS.items())
+    dark = "".join(_group_rule(name, tones[1]) for name, tones in _THEMED_COLOURS.items())
     return f"{sheet}{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n"
 
 
@@ -75,14 +74,11 @@ def header(kind: str, title: str, about: str) -> Html:
 
 def tiles(entries: list[tuple[str, Child, str]]) -> Html:
     """Large figures in a row: name, figure, note of each."""
-    return element(
-        "dl",
-        *(
-            element("div", element("dt", name), element("dd", value, element("small", note)))
-            for name, value, note in entries
-        ),
-        class_="tiles",
-    )
+    figures = [
+        element("div", element("dt", name), element("dd", value, element("small", note)))
+        for name, value, note in entries
+    ]
+    return element("dl", *figures, class_="tiles")
 
 
 def closing_section(*sections: Child) -> Html:
@@ -110,6 +106,16 @@ def table(
         class_=style or None,
     )
     return element("div", whole, class_="scroll")
+
+
+def number_cells(values: Iterable[Child]) -> list[Html]:
+    """Cells of a table, aligned to the right; a centred dot, which stands for none, is fainter."""
+    return [element("td", v, class_="number zero" if v == "·" else "number") for v in values]
+
+
+def table_row(name: Child, *cells: Child, style: str = "") -> Html:
+    """A row of a table under its name; `style` is a CSS class."""
+    return element("tr", element("th", name, scope="row"), *cells, class_=style or None)
 
 
 def command(line: str) -> Html:

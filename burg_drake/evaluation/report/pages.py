@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Outcome, Stage, atomic_write, format_count, format_percent
-from burg_drake.evaluation.campaign_document import LEDGER_FILE
-from burg_drake.evaluation.campaign_folder import SCENES_FOLDER, Campaign
-from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, Texts
+from burg_drake.core import Outcome, Stage, atomic_write, format_count, format_percent
+from burg_drake.evaluation.campaign_folder import LEDGER_FILE, SCENES_FOLDER, Campaign
+from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, TextValues
 from burg_drake.evaluation.report.failure_sections import (
     CAUSE_MARGINS,
     CauseRows,
@@ -53,10 +52,13 @@ from burg_drake.evaluation.report.page_elements import (
     groups_of_codes,
     header,
     html_page,
+    number_cells,
     section,
     table,
+    table_row,
 )
 from burg_drake.evaluation.report.pictures import (
+    DRAWN_COLUMNS,
     grasp_section,
     object_pictures,
     pictures_of,
@@ -68,163 +70,12 @@ from burg_drake.evaluation.report.reproduction import (
     repeat_campaign_section,
     repeat_section,
 )
+from burg_drake.evaluation.run_document import CampaignDocument, RunDocument
 from burg_drake.evaluation.run_folder import REPORT_FILE, Run
 from burg_drake.evaluation.run_summary import summarize
 from burg_drake.evaluation.table_parts import StoredRows
 from burg_drake.evaluation.trial_origin import engine_label
 from burg_drake.visualization import Child, Html, element
-
-
-class SceneChartLayout:
-    """Scene chart layout."""
-
-    width = 480  # SVG units, as all lengths here.
-    height = 190
-    left = 44  # Margin.
-    right = 6  # Margin.
-    top = 8  # Margin.
-    bottom = 26  # Margin.
-
-
-def scenes_section(
-    scenes: Sequence[OutcomeCounts],
-    link: Callable[[str], str | None],
-    drill_down: Callable[[str], str],
-) -> Html:
-    """Success over scenes, worst first.
-
-    Args:
-        scenes: in the order of the run.
-        link: where the report of a scene is, from the page; None if it has none.
-        drill_down: the command that makes the report of a scene.
-    """
-    max_shown = 20  # Scenes that are shown with their outcomes.
-    ranked = worst_first(scenes)
-    shown = ranked[:max_shown]
-    rows = [group_row(group, name=_scene_name(group.name, link)) for group in shown]
-    how: list[Child] = []
-    if any(link(group.name) is None for group in ranked):
-        how = [element("p", "This command writes the report of one scene:", class_="note")]
-        how.append(command(drill_down(ranked[0].name)))
-    text = (
-        "Success when executed in each scene with its 95 % interval, worst scene first."
-        " Scenes in which nothing was executed come first and have no dot."
-    )
-    more = f" Below are the {max_shown} worst." if len(ranked) > max_shown else ""
-    return section(
-        "Outcomes by scene",
-        text + more,
-        ranked_chart(ranked),
-        table(["scene", *GROUP_COLUMNS], rows, numbers=(1, 3), style="stacking"),
-        *how,
-        _all_scenes(ranked, link) if len(ranked) > max_shown else None,
-    )
-
-
-def ranked_chart(ranked: Sequence[OutcomeCounts]) -> Html:
-    """A dot with its interval for each scene, from the worst on the left to the best."""
-    step = (SceneChartLayout.width - SceneChartLayout.left - SceneChartLayout.right) / max(
-        len(ranked), 1
-    )
-    places = [SceneChartLayout.left + (k + 0.5) * step for k in range(len(ranked))]
-    tried = [(x, group) for x, group in zip(places, ranked, strict=True) if group.executed]
-    whiskers = "".join(
-        f"M{x:.1f} {_share_y(group.interval[0]):.1f}V{_share_y(group.interval[1]):.1f}"
-        for x, group in tried
-    )
-    marks: list[Child] = []
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-        y = f"{_share_y(share):.1f}"
-        marks.append(
-            element(
-                "line",
-                x1=SceneChartLayout.left,
-                x2=SceneChartLayout.width - SceneChartLayout.right,
-                y1=y,
-                y2=y,
-                class_="grid",
-            )
-        )
-        text = f"{100 * share:.0f} %"
-        marks.append(
-            element("text", text, x=SceneChartLayout.left - 6, y=y, dy="0.35em", class_="end")
-        )
-    label = f"{format_count(len(ranked))} scenes, worst to best"
-    width = f"stroke-width:{min(max(0.5 * step, 0.5), 2.5):.2f}"
-    return element(
-        "svg",
-        *marks,
-        element("path", d=whiskers, class_="whiskers", style=width) if whiskers else None,
-        *_scene_dots(tried, step),
-        element(
-            "text", label, x=SceneChartLayout.left, y=SceneChartLayout.height - 6, class_="title"
-        ),
-        viewBox=f"0 0 {SceneChartLayout.width} {SceneChartLayout.height}",
-        class_="histogram ranked",
-        role="img",
-        aria_label=f"Success when executed of {_chart_description(ranked)}",
-    )
-
-
-def _scene_dots(tried: Sequence[tuple[float, OutcomeCounts]], step: float) -> list[Html]:
-    max_named = 200  # With more scenes, dots do not tell their names.
-    radius = min(max(0.35 * step, 0.8), 3.2)
-    dots = []
-    for x, group in tried:
-        share = group.lifted / group.executed
-        tip = f"{group.name}: {group.lifted} of {group.executed}, {format_percent(share)}"
-        name = element("title", tip) if len(tried) <= max_named else None
-        place = {"cx": f"{x:.1f}", "cy": f"{_share_y(share):.1f}", "r": f"{radius:.1f}"}
-        dots.append(element("circle", *([name] if name else []), **place, class_="dot"))
-    return dots
-
-
-def _chart_description(ranked: Sequence[OutcomeCounts]) -> str:
-    shares = [group.lifted / group.executed for group in ranked if group.executed]
-    if not shares:
-        return f"{len(ranked)} scenes: nothing was executed"
-    return (
-        f"{len(ranked)} scenes: from {format_percent(min(shares))} to {format_percent(max(shares))}"
-    )
-
-
-def _share_y(share: float) -> float:
-    return (
-        SceneChartLayout.height
-        - SceneChartLayout.bottom
-        - (SceneChartLayout.height - SceneChartLayout.bottom - SceneChartLayout.top) * share
-    )
-
-
-def _scene_name(name: str, link: Callable[[str], str | None]) -> Child:
-    target = link(name)
-    return name if target is None else element("a", name, href=target)
-
-
-def _all_scenes(ranked: Sequence[OutcomeCounts], link: Callable[[str], str | None]) -> Html:
-    max_listed = 2000  # Scenes that are listed.
-    rows = []
-    for group in ranked[:max_listed]:
-        low, high = (f"{100 * bound:.0f}" for bound in group.interval)
-        share = format_percent(group.lifted / group.executed) if group.executed else "-"
-        interval = f"{low} to {high} %" if group.executed else "-"
-        cells = (
-            format_count(group.judged),
-            format_count(group.executed),
-            format_count(group.lifted),
-            share,
-            interval,
-        )
-        numbers = (element("td", cell, class_="number") for cell in cells)
-        name = element("th", _scene_name(group.name, link), scope="row")
-        rows.append(element("tr", name, *numbers))
-    head = ["scene", "grasps", "executed", "lifted", "success", "95 % interval"]
-    title = f"All {format_count(len(ranked))} scenes"
-    if len(ranked) > max_listed:
-        title = f"The {format_count(max_listed)} worst of {format_count(len(ranked))} scenes"
-    summary = element("summary", element("h3", title))
-    listed = table(head, rows, numbers=(1, 2, 3, 4, 5))
-    return element("details", summary, listed, class_="screen")
 
 
 def write_report(run: Run) -> None:
@@ -245,7 +96,7 @@ def report_page(run: Run) -> str:
     title = f"{run.document.scene.name} on {run.document.station.name}"
     return html_page(
         f"Grasp evaluation: {title}",
-        header("Grasp evaluation", title, _run_about(run)),
+        header("Grasp evaluation", title, _about(run.document, run.document.grasps.count)),
         _run_notice(run),
         opening_section(summary),
         scene_picture(pictures),
@@ -270,18 +121,6 @@ def report_page(run: Run) -> str:
             provenance_section(run),
         ),
     )
-
-
-def _run_about(run: Run) -> str:
-    document = run.document
-    how = "sampled" if document.grasps.origin == "sampled" else "given"
-    day = document.stretches[0].started[:10] if document.stretches else ""
-    engine = engine_label(document.engine)
-    about = (
-        f"{format_count(document.grasps.count)} {how} grasps, mode {document.mode}, engine {engine}"
-    )
-    about += f", seed {document.seed}"
-    return f"{about}{', ' if day else ''}{day}"
 
 
 def _run_notice(run: Run) -> Html | None:
@@ -325,19 +164,19 @@ def renew_report(campaign: Campaign) -> None:
 
 def campaign_page(campaign: Campaign) -> str:
     """The report as HTML."""
-    text_columns = ("object", "blocker", "outcome", "stage")
-    pose_columns = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
+    text_columns = ("id", "object", "blocker", "outcome", "stage")
     document, summary = campaign.document, summarize(campaign)
     number = len(campaign.names)
     title = f"{format_count(number)} scene{'' if number == 1 else 's'} on {document.station.name}"
-    names = {*MAIN_MARGINS, *FURTHER_MARGINS, *CAUSE_MARGINS, *text_columns, *pose_columns, "id"}
+    names = {*MAIN_MARGINS, *FURTHER_MARGINS, *CAUSE_MARGINS, *text_columns, *DRAWN_COLUMNS}
     stored = campaign.rows(sorted(names))
-    outcomes = _member_indices(stored, "outcome", [outcome.value for outcome in Outcome])
+    outcomes = _member_indices(stored, "outcome", list(Outcome))
     groups = groups_of_codes(outcomes)
-    tried, own = _executed_margins(stored, groups)
+    executed = _member_indices(stored, "stage", list(Stage)) == list(Stage).index(Stage.EXECUTED)
+    tried = {n: stored.column(n)[executed] for n in (*MAIN_MARGINS, *FURTHER_MARGINS)}
     return html_page(
         f"Grasp evaluation: {title}",
-        header("Grasp evaluation of many scenes", title, _campaign_about(campaign)),
+        header("Grasp evaluation of many scenes", title, _about(document)),
         _campaign_notice(campaign, summary),
         opening_section(summary),
         scenes_section(
@@ -348,23 +187,24 @@ def campaign_page(campaign: Campaign) -> str:
         certainty_section(summary),
         object_pictures(campaign, stored, groups),
         causes_section(_cause_rows(campaign, stored, outcomes)),
-        margin_section(tried, own, document.trial),
+        margin_section(tried, groups[executed], document.trial),
         repeat_campaign_section(campaign),
         closing_section(
             count_section(summary),
-            further_margins(tried, own),
+            further_margins(tried, groups[executed]),
             cost_section(summary),
             campaign_provenance_section(campaign),
         ),
     )
 
 
-def _campaign_about(campaign: Campaign) -> str:
-    document = campaign.document
+def _about(document: RunDocument | CampaignDocument, count: int | None = None) -> str:
+    """Origin and number of the grasps, mode, engine, seed and day of a run."""
     how = "sampled" if document.grasps.origin == "sampled" else "given"
-    day = document.stretches[0].started[:10] if document.stretches else ""
-    about = f"{how} grasps, mode {document.mode}, engine {engine_label(document.engine)}"
-    return f"{about}, seed {document.seed}{', ' if day else ''}{day}"
+    grasps = f"{how} grasps" if count is None else f"{format_count(count)} {how} grasps"
+    facts = [grasps, f"mode {document.mode}", f"engine {engine_label(document.engine)}"]
+    facts += [f"seed {document.seed}", *(s.started[:10] for s in document.stretches[:1])]
+    return ", ".join(facts)
 
 
 def _campaign_notice(campaign: Campaign, summary: Summary) -> Html | None:
@@ -392,21 +232,10 @@ def _report_command(campaign: Campaign, name: str) -> str:
     return shlex.join(["burg-drake", "report", str(campaign.folder(name))])
 
 
-def _member_indices(stored: StoredRows, name: str, members: list[str]) -> NDArray[np.int8]:
-    """A column of texts (N,) as places among the members."""
+def _member_indices(stored: StoredRows, name: str, members: Sequence[str]) -> NDArray[np.int8]:
+    """A column of texts (N,) as indices into the members."""
     codes, texts = stored.codes(name)
     return np.array([members.index(text) for text in texts], dtype=np.int8)[codes]
-
-
-def _executed_margins(
-    stored: StoredRows, groups: NDArray[np.int8]
-) -> tuple[Mapping[str, Array], NDArray[np.int8]]:
-    """Margins of grasps that came to a trial, and their groups."""
-    stages = [stage.value for stage in Stage]
-    tried = _member_indices(stored, "stage", stages) == stages.index(Stage.EXECUTED)
-    return {name: stored.column(name)[tried] for name in (*MAIN_MARGINS, *FURTHER_MARGINS)}, groups[
-        tried
-    ]
 
 
 def _cause_rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) -> CauseRows:
@@ -419,8 +248,136 @@ def _cause_rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int
 
     return CauseRows(
         outcomes=outcomes,
-        objects=Texts(*stored.codes("object")),
-        blockers=Texts(*stored.codes("blocker")),
+        objects=TextValues(*stored.codes("object")),
+        blockers=TextValues(*stored.codes("blocker")),
         margins={name: stored.column(name) for name in CAUSE_MARGINS},
         replay=replay,
     )
+
+
+class _Layout:
+    """Lengths in the chart of scenes, in SVG units."""
+
+    width = 480
+    height = 190
+    left = 44  # Edges of the plot.
+    right = 474
+    top = 8
+    bottom = 164
+
+
+def scenes_section(
+    scenes: Sequence[OutcomeCounts],
+    link: Callable[[str], str | None],
+    drill_down: Callable[[str], str],
+) -> Html:
+    """Success over scenes, worst first.
+
+    Args:
+        scenes: in the order of the run.
+        link: where the report of a scene is, from the page; None if it has none.
+        drill_down: the command that makes the report of a scene.
+    """
+    max_shown = 20  # Scenes that are shown with their outcomes.
+    ranked = worst_first(scenes)
+    shown = ranked[:max_shown]
+    rows = [group_row(group, name=_scene_name(group.name, link)) for group in shown]
+    how: list[Child] = []
+    if any(link(group.name) is None for group in ranked):
+        how = [element("p", "This command writes the report of one scene:", class_="note")]
+        how.append(command(drill_down(ranked[0].name)))
+    text = (
+        "Success when executed in each scene with its 95 % interval, worst scene first."
+        " Scenes in which nothing was executed come first and have no dot."
+    )
+    more = f" Below are the {max_shown} worst." if len(ranked) > max_shown else ""
+    return section(
+        "Outcomes by scene",
+        text + more,
+        ranked_chart(ranked),
+        table(["scene", *GROUP_COLUMNS], rows, numbers=(1, 3), style="stacking"),
+        *how,
+        _all_scenes(ranked, link) if len(ranked) > max_shown else None,
+    )
+
+
+def ranked_chart(ranked: Sequence[OutcomeCounts]) -> Html:
+    """A dot with its interval for each scene, from the worst on the left to the best."""
+    step = (_Layout.right - _Layout.left) / max(len(ranked), 1)
+    places = [_Layout.left + (k + 0.5) * step for k in range(len(ranked))]
+    tried = [(x, group) for x, group in zip(places, ranked, strict=True) if group.executed]
+    whiskers = "".join(
+        f"M{x:.1f} {_share_y(group.interval[0]):.1f}V{_share_y(group.interval[1]):.1f}"
+        for x, group in tried
+    )
+    marks: list[Child] = []
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        y, text = f"{_share_y(share):.1f}", f"{100 * share:.0f} %"
+        marks += [
+            element("line", x1=_Layout.left, x2=_Layout.right, y1=y, y2=y, class_="grid"),
+            element("text", text, x=_Layout.left - 6, y=y, dy="0.35em", class_="end"),
+        ]
+    label = f"{format_count(len(ranked))} scenes, worst to best"
+    width = f"stroke-width:{min(max(0.5 * step, 0.5), 2.5):.2f}"
+    return element(
+        "svg",
+        *marks,
+        element("path", d=whiskers, class_="whiskers", style=width) if whiskers else None,
+        *_scene_dots(tried, step),
+        element("text", label, x=_Layout.left, y=_Layout.height - 6, class_="title"),
+        viewBox=f"0 0 {_Layout.width} {_Layout.height}",
+        class_="histogram ranked",
+        role="img",
+        aria_label=f"Success when executed of {_chart_description(ranked)}",
+    )
+
+
+def _scene_dots(tried: Sequence[tuple[float, OutcomeCounts]], step: float) -> list[Html]:
+    max_named = 200  # With more scenes, dots do not tell their names.
+    radius = min(max(0.35 * step, 0.8), 3.2)
+    dots = []
+    for x, group in tried:
+        share = group.lifted / group.executed
+        tip = f"{group.name}: {group.lifted} of {group.executed}, {format_percent(share)}"
+        name = element("title", tip) if len(tried) <= max_named else None
+        place = {"cx": f"{x:.1f}", "cy": f"{_share_y(share):.1f}", "r": f"{radius:.1f}"}
+        dots.append(element("circle", *([name] if name else []), **place, class_="dot"))
+    return dots
+
+
+def _chart_description(ranked: Sequence[OutcomeCounts]) -> str:
+    shares = [group.lifted / group.executed for group in ranked if group.executed]
+    if not shares:
+        return f"{len(ranked)} scenes: nothing was executed"
+    return (
+        f"{len(ranked)} scenes: from {format_percent(min(shares))} to {format_percent(max(shares))}"
+    )
+
+
+def _share_y(share: float) -> float:
+    return _Layout.bottom - (_Layout.bottom - _Layout.top) * share
+
+
+def _scene_name(name: str, link: Callable[[str], str | None]) -> Child:
+    target = link(name)
+    return name if target is None else element("a", name, href=target)
+
+
+def _all_scenes(ranked: Sequence[OutcomeCounts], link: Callable[[str], str | None]) -> Html:
+    max_listed = 2000  # Scenes that are listed.
+    rows = []
+    for group in ranked[:max_listed]:
+        share = interval = "-"
+        if group.executed:
+            low, high = (f"{100 * bound:.0f}" for bound in group.interval)
+            share, interval = format_percent(group.lifted / group.executed), f"{low} to {high} %"
+        counts = map(format_count, (group.judged, group.executed, group.lifted))
+        cells = number_cells([*counts, share, interval])
+        rows.append(table_row(_scene_name(group.name, link), *cells))
+    head = ["scene", "grasps", "executed", "lifted", "success", "95 % interval"]
+    title = f"All {format_count(len(ranked))} scenes"
+    if len(ranked) > max_listed:
+        title = f"The {format_count(max_listed)} worst of {format_count(len(ranked))} scenes"
+    summary = element("summary", element("h3", title))
+    listed = table(head, rows, numbers=(1, 2, 3, 4, 5))
+    return element("details", summary, listed, class_="screen")

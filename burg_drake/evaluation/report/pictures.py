@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +33,7 @@ from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.scene import Scene
 from burg_drake.visualization import (
     OUTCOME_GROUPS,
+    Child,
     FlatView,
     Html,
     SolidMesh,
@@ -53,8 +53,8 @@ from burg_drake.visualization import (
 )
 
 
-class GraspPictureLayout:
-    """Grasp picture layout."""
+class _Layout:
+    """Lengths in a picture of grasps."""
 
     panel = 220.0  # Side of a picture [SVG units].
     caption = 22.0  # Height of the line above it.
@@ -70,15 +70,15 @@ class DrawnGrasps:
         ids: (N,) of the run.
         X_OG: (N, 4, 4) in the object frame.
         width: (N,) distance between the fingers [m].
-        groups: (N,) indices into `palette.GROUPS`.
-        counts: how many there are of all groups, drawn or not, by index.
+        groups: (N,) indices into `OUTCOME_GROUPS`.
+        counts: number of grasps of each group, drawn or not, by index.
     """
 
     ids: NDArray[np.str_]
     X_OG: Array
     width: Array
     groups: NDArray[np.int8]
-    counts: Mapping[int, int]
+    counts: NDArray[np.int64]
 
 
 def solid_of(scene: Scene, name: str) -> SolidMesh:
@@ -113,7 +113,7 @@ def scene_drawing(
     width, height = view.size
     return element(
         "svg",
-        element("path", d=path_data(view.places(board)), class_="board"),
+        element("path", d=path_data(view.project(board)), class_="board"),
         *(element("path", d=d, class_="fixed") for d in behind[:1] if d),
         *(element("path", d=footprint(s, view), class_="ground") for s in free.values()),
         *_solid_tones(list(free.values()), view),
@@ -141,42 +141,32 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
     turned = SolidMesh(transform_points(X_WS, solid.vertices), solid.faces)
     corners = grasp_corners(X_WS @ X_SO @ grasps.X_OG, grasps.width)
     everything = np.vstack([turned.vertices, project_to_ground(turned), corners.reshape(-1, 3)])
-    view = fit_view(everything, R_WC, GraspPictureLayout.panel, GraspPictureLayout.panel)
+    view = fit_view(everything, R_WC, _Layout.panel, _Layout.panel)
     behind = join(
         element("path", d=footprint(turned, view), class_="ground"), *_solid_tones([turned], view)
     )
     lifted = grasps.groups == LIFTED_GROUP
-    counts = (
-        grasps.counts.get(LIFTED_GROUP, 0),
-        sum(n for k, n in grasps.counts.items() if k != LIFTED_GROUP),
-    )
+    successes = int(grasps.counts[LIFTED_GROUP])
+    failures = int(grasps.counts.sum()) - successes
     panels = []
-    for place, (mask, text, count) in enumerate(
-        ((lifted, "lifted", counts[0]), (~lifted, "not lifted", counts[1]))
+    for left, mask, text, count in (
+        (0.0, lifted, "lifted", successes),
+        (_Layout.panel, ~lifted, "not lifted", failures),
     ):
-        number = f"{count:,}" if count else "none"
+        caption = f"{text}: {format_count(count) if count else 'none'}"
+        drawn = [behind, *_strokes(grasps, mask, corners, view), _ruler(view)]
         panel = (
-            element(
-                "text", f"{text}: {number}", x=GraspPictureLayout.panel / 2, y=15, class_="panel"
-            ),
-            element(
-                "g",
-                behind,
-                *_strokes(grasps, mask, corners, view),
-                _ruler(view),
-                transform=f"translate(0 {GraspPictureLayout.caption:g})",
-            ),
+            element("text", caption, x=_Layout.panel / 2, y=15, class_="panel"),
+            element("g", *drawn, transform=f"translate(0 {_Layout.caption:g})"),
         )
-        panels.append(
-            element("g", *panel, transform=f"translate({place * GraspPictureLayout.panel:g} 0)")
-        )
+        panels.append(element("g", *panel, transform=f"translate({left:g} 0)"))
     return element(
         "svg",
         *panels,
-        viewBox=f"0 0 {2 * GraspPictureLayout.panel:g} {GraspPictureLayout.caption + GraspPictureLayout.panel + GraspPictureLayout.foot:g}",
+        viewBox=f"0 0 {2 * _Layout.panel:g} {_Layout.caption + _Layout.panel + _Layout.foot:g}",
         class_="drawing grasps",
         role="img",
-        aria_label=f"Grasps on {name}: {counts[0]} lifted it, {counts[1]} did not",
+        aria_label=f"Grasps on {name}: {successes} lifted it, {failures} did not",
     )
 
 
@@ -204,23 +194,19 @@ def _solid_tones(solids: Sequence[SolidMesh], view: FlatView) -> list[Html]:
 
 
 def _ruler(view: FlatView) -> Html:
-    length = GraspPictureLayout.ruler * view.scale
-    x, y = (
-        GraspPictureLayout.panel - 8 - length,
-        GraspPictureLayout.panel + GraspPictureLayout.foot - 3,
-    )
+    length = _Layout.ruler * view.scale
+    x, y = _Layout.panel - 8 - length, _Layout.panel + _Layout.foot - 3
+    text = f"{100 * _Layout.ruler:g} cm"
     return element(
         "g",
         element("line", x1=f"{x:.1f}", x2=f"{x + length:.1f}", y1=y, y2=y),
-        element(
-            "text", f"{100 * GraspPictureLayout.ruler:g} cm", x=f"{x + length / 2:.1f}", y=y - 4
-        ),
+        element("text", text, x=f"{x + length / 2:.1f}", y=y - 4),
         class_="ruler",
     )
 
 
 def _label(view: FlatView, solid: SolidMesh, name: str, note: str) -> Html:
-    places = view.places(solid.vertices)
+    places = view.project(solid.vertices)
     x, y = (places.min(axis=0) + places.max(axis=0)) / 2.0
     lines = [element("tspan", name, x=f"{x:.1f}", class_="name")]
     if note:
@@ -234,41 +220,39 @@ MAX_DRAWN_GRASPS = 1500
 """Number of grasps that are drawn in all pictures together."""
 DEFAULT_DRAWN_WIDTH = 0.05
 """Metres between the fingers of a grasp whose width is not known."""
+DRAWN_COLUMNS = ("id", "x", "y", "z", "qw", "qx", "qy", "qz", "width")
+"""Columns that `_drawn_grasps` needs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """What the pictures of a run are made from.
+    """Data that the pictures of a run are made from.
 
     Attributes:
         scene: as it was judged.
         columns: the results.
-        groups: (N,) of each row, see `outcome_groups`.
+        groups: (N,) of each row, see `group_indices`.
+        solids, fixed: surfaces of the free and the fixed instances in the scene frame, by name.
     """
 
     scene: Scene
     columns: Columns
     groups: NDArray[np.int8]
-
-    @cached_property
-    def solids(self) -> dict[str, SolidMesh]:
-        """Surfaces of the free instances in the scene frame."""
-        return {name: solid_of(self.scene, name) for name in self.scene.instances}
-
-    @cached_property
-    def fixed(self) -> dict[str, SolidMesh]:
-        """Surfaces of the fixed instances in the scene frame."""
-        return {name: solid_of(self.scene, name) for name in self.scene.background}
+    solids: Mapping[str, SolidMesh]
+    fixed: Mapping[str, SolidMesh]
 
 
 def pictures_of(run: Run, groups: NDArray[np.int8]) -> Pictures | None:
     """What to draw; nothing if the files that the run was judged with are gone or have changed."""
     try:
-        pictures = Pictures(run.scene(), run.results, groups)
-        _ = pictures.solids, pictures.fixed
+        scene = run.scene()
+        solids, fixed = (
+            {name: solid_of(scene, name) for name in names}
+            for names in (scene.instances, scene.background)
+        )
     except BurgError:
         return None
-    return pictures
+    return Pictures(scene, run.results, groups, solids, fixed)
 
 
 def scene_picture(pictures: Pictures | None) -> Html | None:
@@ -303,17 +287,12 @@ def grasp_section(pictures: Pictures | None) -> Html | None:
         chosen = rows[drawn_rows(pictures.groups[rows], MAX_DRAWN_GRASPS // len(shown))]
         figures.append(_instance_figure(pictures, name, rows, chosen))
         drawn += len(chosen)
-    total = int(np.isin(instances, shown).sum())
-    text = "Each object as it stands in the scene: on the left with the grasps that lifted it, on"
-    text += (
+    text = (
+        "Each object as it stands in the scene: on the left with the grasps that lifted it, on"
         " the right with all others. Each fork shows the two fingers; its stem points toward"
-        " the arm. Point at"
+        " the arm. Point at a grasp to see its id."
     )
-    text += " a grasp to see its id."
-    if drawn < total:
-        text += (
-            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
-        )
+    text += _shown_text(drawn, int(np.isin(instances, shown).sum()))
     if len(shown) < len(with_grasps):
         text += f" The first {len(shown)} of {len(with_grasps)} objects are shown."
     return section(
@@ -322,6 +301,13 @@ def grasp_section(pictures: Pictures | None) -> Html | None:
         group_legend(present_groups(pictures.groups)),
         element("div", *figures, class_="pictures"),
     )
+
+
+def _shown_text(drawn: int, total: int) -> str:
+    """How many grasps are drawn, if not all are."""
+    if drawn == total:
+        return ""
+    return f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
 
 
 def drawn_rows(groups: NDArray[np.int8], most: int) -> NDArray[np.int64]:
@@ -344,37 +330,47 @@ def _instance_figure(
         *("patch_area", "score", "confidence", "judged_again"),
     )
     columns, groups = pictures.columns, pictures.groups
-    counts = np.bincount(groups[rows][groups[rows] >= 0], minlength=len(OUTCOME_GROUPS))
-    width = columns["width"][chosen]
-    grasps = DrawnGrasps(
-        ids=columns["id"][chosen],
-        X_OG=poses_of_rows(columns, chosen),
-        width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
-        groups=groups[chosen],
-        counts={k: int(n) for k, n in enumerate(counts)},
-    )
+    drawn = {key: columns[key][chosen] for key in DRAWN_COLUMNS}
+    grasps = _drawn_grasps(drawn, groups[chosen], groups[rows])
     drawing = grasp_drawing(name, pictures.solids[name], pictures.scene.X_SO(name), grasps)
     best = best_rows(
         {key: values[rows] for key, values in columns.items() if key in ranking_columns}
     )
-    caption = [
-        element("b", name),
-        f" {format_count(int(counts[LIFTED_GROUP]))} of {format_count(len(rows))} lifted",
-    ]
+    caption = _caption(name, grasps, len(rows))
     if best:
         id = str(columns["id"][rows[best[0]]])
         caption += [", best: ", element("code", id, class_="copy")]
     return element("figure", element("figcaption", *caption), drawing)
 
 
-def poses_of_rows(columns: Columns, rows: NDArray[np.int64]) -> Array:
-    """`X_OG` (M, 4, 4) of some rows of a table."""
-    X_OG = np.tile(np.eye(4), (len(rows), 1, 1))
-    if len(rows):
-        wxyz = np.column_stack([columns[name][rows] for name in ("qw", "qx", "qy", "qz")])
+def _caption(name: str, grasps: DrawnGrasps, total: int) -> list[Child]:
+    lifted = format_count(int(grasps.counts[LIFTED_GROUP]))
+    return [element("b", name), f" {lifted} of {format_count(total)} lifted"]
+
+
+def _drawn_grasps(
+    columns: Columns, groups: NDArray[np.int8], all_groups: NDArray[np.int8]
+) -> DrawnGrasps:
+    """Grasps of the rows of a table with `DRAWN_COLUMNS`.
+
+    Args:
+        columns: the table.
+        groups: (N,) of its rows.
+        all_groups: (M,) of all grasps on the object.
+    """
+    X_OG = np.tile(np.eye(4), (len(groups), 1, 1))
+    if len(groups):
+        wxyz = np.column_stack([columns[name] for name in ("qw", "qx", "qy", "qz")])
         X_OG[:, :3, :3] = rotation_from_quaternion(wxyz)
-        X_OG[:, :3, 3] = np.column_stack([columns[name][rows] for name in "xyz"])
-    return X_OG
+        X_OG[:, :3, 3] = np.column_stack([columns[name] for name in "xyz"])
+    width = columns["width"].astype(float)
+    return DrawnGrasps(
+        ids=columns["id"],
+        X_OG=X_OG,
+        width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
+        groups=groups,
+        counts=np.bincount(all_groups[all_groups >= 0], minlength=len(OUTCOME_GROUPS)),
+    )
 
 
 def object_pictures(
@@ -386,30 +382,32 @@ def object_pictures(
     Args:
         campaign: the run.
         stored: its rows, with poses, widths and ids.
-        groups: (N,) of each row, see `outcome_groups`.
+        groups: (N,) of each row, see `group_indices`.
     """
     codes, names = stored.codes("object")
-    libraries = _unchanged_libraries(campaign)
-    known = [k for k, name in enumerate(names) if _library_with(libraries, name) is not None]
+    library_of: dict[str, ObjectLibrary] = {}
+    for library in reversed(_unchanged_libraries(campaign)):
+        library_of |= dict.fromkeys(library.objects, library)
     numbers = np.bincount(codes, minlength=len(names))
-    ranked = sorted((k for k in known if numbers[k]), key=lambda k: (-numbers[k], names[k]))
+    known = [k for k, name in enumerate(names) if name in library_of and numbers[k]]
+    ranked = sorted(known, key=lambda k: (-numbers[k], names[k]))
     if not ranked:
         return None
     figures, drawn, shown = [], 0, ranked[:MAX_PICTURED_INSTANCES]
     for k in shown:
         rows = np.flatnonzero(codes == k)
         chosen = rows[drawn_rows(groups[rows], MAX_DRAWN_GRASPS // len(shown))]
-        library = _library_with(libraries, names[k])
-        if library is not None:
-            figures.append(_object_figure(library, names[k], stored, groups, rows, chosen))
-            drawn += len(chosen)
-    text = "Each object with its grasps from all scenes: on the left those that lifted it, on the"
-    text += " right all others. Each fork shows the two fingers; its stem points toward the arm."
-    total = int(numbers[shown].sum())
-    if drawn < total:
-        text += (
-            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
-        )
+        part = stored.table.take(chosen)
+        columns = {n: part.column(n).to_numpy(zero_copy_only=False) for n in DRAWN_COLUMNS}
+        columns["id"] = columns["id"].astype(np.str_)
+        grasps = _drawn_grasps(columns, groups[chosen], groups[rows])
+        figures.append(_object_figure(library_of[names[k]], names[k], grasps, len(rows)))
+        drawn += len(chosen)
+    text = (
+        "Each object with its grasps from all scenes: on the left those that lifted it, on the"
+        " right all others. Each fork shows the two fingers; its stem points toward the arm."
+    )
+    text += _shown_text(drawn, int(numbers[shown].sum()))
     if len(shown) < len(ranked):
         text += f" The {len(shown)} of {len(ranked)} objects with the most grasps are shown."
     legend = group_legend(present_groups(groups))
@@ -427,35 +425,9 @@ def _unchanged_libraries(campaign: Campaign) -> list[ObjectLibrary]:
     return found
 
 
-def _library_with(libraries: list[ObjectLibrary], name: str) -> ObjectLibrary | None:
-    return next((library for library in libraries if name in library.objects), None)
-
-
-def _object_figure(
-    library: ObjectLibrary,
-    name: str,
-    stored: StoredRows,
-    groups: NDArray[np.int8],
-    rows: NDArray[np.int64],
-    chosen: NDArray[np.int64],
-) -> Html:
-    pose_columns = ("x", "y", "z", "qw", "qx", "qy", "qz")
-    part = stored.table.take(chosen)
-    columns = {
-        key: part.column(key).to_numpy(zero_copy_only=False) for key in (*pose_columns, "width")
-    }
-    width = columns["width"].astype(float)
-    counts = np.bincount(groups[rows], minlength=len(OUTCOME_GROUPS))
-    grasps = DrawnGrasps(
-        ids=np.array(part.column("id").to_pylist(), dtype=np.str_),
-        X_OG=poses_of_rows(columns, np.arange(len(chosen))),
-        width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
-        groups=groups[chosen],
-        counts={k: int(n) for k, n in enumerate(counts)},
-    )
+def _object_figure(library: ObjectLibrary, name: str, grasps: DrawnGrasps, total: int) -> Html:
     X_SO = make_pose(upright_rotation(library.entry(name)))
     surface = object_surface(library, name)
     solid = SolidMesh(transform_points(X_SO, surface.vertices), surface.faces)
-    lifted = f" {format_count(int(counts[LIFTED_GROUP]))} of {format_count(len(rows))} lifted"
-    caption = element("figcaption", element("b", name), lifted)
+    caption = element("figcaption", *_caption(name, grasps, total))
     return element("figure", caption, grasp_drawing(name, solid, X_SO, grasps))

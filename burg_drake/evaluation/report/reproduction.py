@@ -1,4 +1,4 @@
-"""The last sections of a report: commands that repeat the run, its inputs, settings and versions."""
+"""The last sections of a report: command that repeats the run, inputs, settings, versions."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from burg_drake.core import format_duration, load_document, option_name
-from burg_drake.evaluation.campaign_document import CampaignDocument
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.report.page_elements import command, folded_section, section
-from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
+from burg_drake.evaluation.run_document import (
+    HASH_DIGITS,
+    CampaignDocument,
+    Input,
+    RunDocument,
+)
 from burg_drake.evaluation.run_folder import GRASPS_FILE, RUN_FILE, STATION_FILE, Run
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.trial_origin import (
@@ -95,17 +99,12 @@ def _settings_options(document: RunDocument | CampaignDocument, station: Path | 
         if document.mode == "hand" and not document.trial.get("approach"):  # begins at the grasp
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
-    words += _changed_options(limit_settings(document.trial))
-    words += _option_words(engine=document.engine.name, seed=document.seed)
+    limits = limit_settings(document.trial)
+    unusual = {k: v for k, v in limits.items() if v != getattr(EvaluationSettings, k)}
+    words += _option_words(**unusual, engine=document.engine.name, seed=document.seed)
     if document.table != EvaluationSettings.table:
         words += _option_words(table=document.table)
     return words + (_option_words(shard=document.shard) if document.shard else [])
-
-
-def _changed_options(asked: dict[str, Any]) -> list[str]:
-    """The options of fields of `EvaluationSettings` whose values are not the usual ones."""
-    unusual = {k: v for k, v in asked.items() if v != getattr(EvaluationSettings, k)}
-    return _option_words(**unusual)
 
 
 def _option_words(**values: Any) -> list[str]:
@@ -133,7 +132,7 @@ def repeat_section(run: Run) -> Html:
     """The command that makes the same results again, and the settings that decide about them."""
     document = run.document
     facts = [
-        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        ("scene", _content_text(document.scene)),
         *_common_facts(document),
         ("run", f"{document.hash} (hash of all of the above; column run of the table)"),
     ]
@@ -147,19 +146,15 @@ def repeat_section(run: Run) -> Html:
 
 def provenance_section(run: Run) -> Html:
     """All inputs with their hashes, settings, versions, sessions and files."""
-    facts = [
-        *_input_facts(run.document),
-        *_setting_facts(run.document),
-        *_session_facts(run.document),
-    ]
+    document = run.document
     files = (
         f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
         f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
     )
+    facts = [*_input_facts(document), *_setting_facts(document), *_session_facts(document)]
+    facts.append(("files", files))
     text = "All inputs, the sessions in which the grasps were judged, and the files of the folder."
-    return folded_section(
-        "All settings and versions", text, _facts_list([*facts, ("files", files)])
-    )
+    return folded_section("All settings and versions", text, _facts_list(facts))
 
 
 def repeat_campaign_section(campaign: Campaign) -> Html:
@@ -185,13 +180,10 @@ def campaign_provenance_section(campaign: Campaign) -> Html:
     """All settings, versions, and who worked on a run over many scenes."""
     document = campaign.document
     facts = [
-        *(
-            (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
-            for folder, content in document.libraries.items()
-        ),
-        *_setting_facts(document),
-        *_session_facts(document),
+        (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
+        for folder, content in document.libraries.items()
     ]
+    facts += [*_setting_facts(document), *_session_facts(document)]
     text = "All inputs except the scenes, and the sessions in which the grasps were judged."
     return folded_section("All settings and versions", text, _facts_list(facts))
 
@@ -203,13 +195,17 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
     names = (*packages, *document.engine.packages)
     return [
-        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("station", _content_text(document.station)),
         ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
         ("motion", motion_text(read_motion(document.trial))),
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
         ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
     ]
+
+
+def _content_text(given: Input) -> str:
+    return f"{given.path}, content {given.content[:HASH_DIGITS]}"
 
 
 def _facts_list(facts: list[tuple[str, str]]) -> Html:
@@ -233,8 +229,8 @@ def _input_facts(document: RunDocument) -> list[tuple[str, str]]:
     library = document.library
     grasps = document.grasps
     return [
-        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
-        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("scene", _content_text(document.scene)),
+        ("station", _content_text(document.station)),
         ("object library", f"{library.name} ({library.path})"),
         *(
             (f"object {name}", f"build {build[:HASH_DIGITS]}")
@@ -260,16 +256,16 @@ def _setting_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, 
 
 def _engine_text(engine: Engine) -> str:
     """All settings of an engine, by name."""
-    settings = {name: value for name, value in vars(engine).items() if name != "name"}
-    return ", ".join(
-        f"{name.replace('_', ' ')} {_engine_value(value)}" for name, value in settings.items()
-    )
-
-
-def _engine_value(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return format_duration(value) if isinstance(value, float) else str(value).replace("_", " ")
+    texts = []
+    for name, value in vars(engine).items():
+        text = str(value).replace("_", " ")
+        if isinstance(value, bool):
+            text = "yes" if value else "no"
+        elif isinstance(value, float):
+            text = format_duration(value)
+        if name != "name":
+            texts.append(f"{name.replace('_', ' ')} {text}")
+    return ", ".join(texts)
 
 
 def _settings_list(settings: dict[str, float]) -> str:

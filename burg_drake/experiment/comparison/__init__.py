@@ -1,4 +1,3 @@
-"""Simulated and real outcomes held against each other.
+"""Comparison of simulated with real outcomes, and of two runs.
 
-Read `comparing` and `comparison` first, then `of_trials` and `of_runs`; `judge_assessment` has the
-figures."""
+Read `run_comparison` first, then `comparison`; `judge_assessment` has the figures."""

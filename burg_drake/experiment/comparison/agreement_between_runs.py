@@ -17,7 +17,7 @@ from burg_drake.experiment.comparison.group_agreement import (
 )
 from burg_drake.experiment.comparison.judge_assessment import replay_commands
 from burg_drake.experiment.comparison.margin_calibration import MarginCalibration, calibrate_margins
-from burg_drake.experiment.comparison.result_table import TextFactor
+from burg_drake.experiment.comparison.result_table import TextFactor, take_rows
 from burg_drake.experiment.comparison.verdict_pairs import (
     MEASURED_MARGINS,
     VerdictPairs,
@@ -104,9 +104,7 @@ class SecondVerdicts:
 
     def take(self, rows: Values) -> SecondVerdicts:
         """Some grasps, as indices or truth values."""
-        margins = {name: values[rows] for name, values in self.margins.items()}
-        texts = self.stage.take(rows), self.judged_again.take(rows)
-        return SecondVerdicts(*texts, self.confidence[rows], margins)
+        return SecondVerdicts(*(take_rows(column, rows) for column in vars(self).values()))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ compared as two engines.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -78,7 +78,7 @@ class JudgedRuns:
 
     @classmethod
     def load(cls, path: str | Path | Run | Campaign) -> JudgedRuns:
-        """The runs in a folder; see `evaluation.results`."""
+        """The runs in a folder; see `open_results`."""
         return cls(path if isinstance(path, (Run, Campaign)) else open_results(path))
 
     @property
@@ -164,7 +164,7 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
         label="reality",
         scenes=tuple(dict.fromkeys(s.scene.name for s in sources)),
         hashes=tuple(s.hash for s in sources),
-        station=_join_distinct(s.station.name for s in sources),
+        station=", ".join(dict.fromkeys(s.station.name for s in sources)),
         mode="robot",
         engine="reality",
     )
@@ -192,14 +192,10 @@ def require_common_scene(first: JudgedRuns, second: JudgedRuns) -> None:
 
 def list_scene_names(scenes: Mapping[str, str]) -> str:
     """Names of scenes by content, for messages; of many the first few."""
-    max_names = 3  # Scenes that are named.
+    max_names = 3
     names = [f"{name} ({content})" for content, name in scenes.items()]
     more = f" and {len(names) - max_names} more" if len(names) > max_names else ""
     return ", ".join(names[:max_names]) + more
-
-
-def _join_distinct(texts: Iterable[str]) -> str:
-    return ", ".join(dict.fromkeys(texts))
 
 
 TRIAL_SETTING_UNITS = {
@@ -258,31 +254,27 @@ def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
 
 
 def approach_note(first: JudgedRuns, second: JudgedRuns) -> str:
-    """What to know of runs that are compared though only one of them, of the whole arm, has
-    approached; empty of others."""
-    still = [
-        which
-        for which, judged in (("first", first), ("second", second))
-        if not _phase_settings(judged)["approach"]
-    ]
-    if len(still) != 1:
+    """A note if only one of the runs, of the whole arm, has approached; else empty."""
+    approached = [_phase_settings(judged)["approach"] for judged in (first, second)]
+    if approached[0] == approached[1]:
         return ""
-    other = "second" if still[0] == "first" else "first"
-    return (
-        f"the hand alone did not approach in the {still[0]} run; the whole arm did in the {other}"
-    )
+    still, moved = ("second", "first") if approached[0] else ("first", "second")
+    return f"the hand alone did not approach in the {still} run; the whole arm did in the {moved}"
 
 
 def differing_phases(first: JudgedRuns, second: JudgedRuns) -> list[str]:
-    """Settings of trials in which the runs of two folders differ, with both values. What a run did
-    not record is what it was then. Whether the hand alone approaches is no such difference to the
-    whole arm, which does; see `approach_note`."""
-    titles = {"lift_height": "lift"}  # Titles that differ from the names of settings.
+    """Settings of trials in which the runs of two folders differ, with both values.
+
+    Settings that a run did not record have the defaults of their time. That the hand alone does not
+    approach, and the whole arm does, is not listed; see `approach_note`.
+    """
+    titles = {"lift_height": "lift"}
     one, other = (_phase_settings(judged) for judged in (first, second))
     if "arm" in (first.found.document.mode, second.found.document.mode):
         del one["approach"]
     return [
-        f"{titles.get(name, name.replace('_', ' '))} {_both_values(name, one[name], other[name])}"
+        f"{titles.get(name, name.replace('_', ' '))} {_value_text(name, one[name])}"
+        f" and {_value_text(name, other[name])}"
         for name in one
         if not _are_equal(one[name], other[name])
     ]
@@ -311,10 +303,6 @@ def _are_equal(one: Value, other: Value) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         return all(math.isclose(a, b, abs_tol=1e-12) for a, b in zip(one, other, strict=True))
     return one == other
-
-
-def _both_values(name: str, one: Value, other: Value) -> str:
-    return f"{_value_text(name, one)} and {_value_text(name, other)}"
 
 
 def _value_text(name: str, value: Value) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from burg_drake.core import MISSING_NUMBER, format_number, outcome_label
+from burg_drake.core import MISSING_NUMBER, display_unit, format_number, outcome_label
 from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
 from burg_drake.experiment.comparison.confusion_matrix import Agreement, Paired
@@ -118,26 +118,23 @@ def selection_suffix(comparison: Comparison) -> str:
 
 def cell_name(comparison: Comparison, cell: str) -> str:
     """What the grasps of a cell of the matrix have in common."""
-    # Names of the cells of the confusion matrix.
-    names_of_trials = {
+    if comparison.kind == "runs":
+        return {
+            "tp": "success in both runs",
+            "fp": "success in the first run, failure in the second",
+            "fn": "failure in the first run, success in the second",
+            "tn": "failure in both runs",
+        }[cell]
+    return {
         "tp": "success predicted and seen",
         "fp": "success predicted, failure seen",
         "fn": "failure predicted, success seen",
         "tn": "failure predicted and seen",
-    }
-    # Names of the cells for two runs.
-    names_of_runs = {
-        "tp": "success in both runs",
-        "fp": "success in the first run, failure in the second",
-        "fn": "failure in the first run, success in the second",
-        "tn": "failure in both runs",
-    }
-    return (names_of_runs if comparison.kind == "runs" else names_of_trials)[cell]
+    }[cell]
 
 
 def measure_name(comparison: Comparison, key: str) -> str:
     """What a figure is called."""
-    # Names of figures of two runs, neither of which is the truth.
     names_of_runs = {
         "predicted": "success in the first run",
         "actual": "success in the second run",
@@ -186,8 +183,8 @@ def headline_sentence(comparison: Comparison) -> str:
         return _identical_rows_sentence(c)
     if c.kind == "runs":
         return (
-            f"On {found.trials:,} grasps the two runs agree in {brief_share_text(found.accuracy)}: success in"
-            f" {brief_share_text(found.predicted)} by the first ({c.first.label}) and in"
+            f"On {found.trials:,} grasps the two runs agree in {brief_share_text(found.accuracy)}:"
+            f" success in {brief_share_text(found.predicted)} by the first ({c.first.label}) and in"
             f" {brief_share_text(found.actual)} by the second ({c.reference.label})."
         )
     plural = "" if found.trials == 1 else "s"
@@ -198,25 +195,24 @@ def headline_sentence(comparison: Comparison) -> str:
         where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for,"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
-        p = (
-            ""
-            if c.difference.p_value is None
-            else f" (McNemar p = {format_number(c.difference.p_value)})"
-        )
+        d, other = c.difference, brief_share_text(headline_agreement(c.other).accuracy)
+        p = "" if d.p_value is None else f" (McNemar p = {format_number(d.p_value)})"
         return (
-            f"{where} {first} was right in {brief_share_text(found.accuracy)}, {second} in"
-            f" {brief_share_text(headline_agreement(c.other).accuracy)}; {difference_sentence(c)}{p}."
+            f"{where} {first} was right in {brief_share_text(found.accuracy)}, {second} in {other};"
+            f" in {d.only_first} trials only the first was right, in {d.only_second} only the"
+            f" second{p}."
         )
-    true = (
-        f"Of the grasps that it expected to succeed, {brief_share_text(found.precision)} succeeded"
-    )
-    foreseen = f"of the grasps that succeeded, it had expected {brief_share_text(found.recall)}"
+    precision, recall = brief_share_text(found.precision), brief_share_text(found.recall)
+    expected = f"Of the grasps that it expected to succeed, {precision} succeeded"
+    succeeded = f"of the grasps that succeeded, it had expected {recall}"
     if found.precision.value is None:
-        true = "It expected no grasp to succeed"
+        expected = "It expected no grasp to succeed"
     if found.recall.value is None:
-        foreseen = "no grasp succeeded"
-    right = f"{where} the simulator's verdict was right for {brief_share_text(found.accuracy)} of the grasps"
-    return f"{right}. {true}; {foreseen}. In brackets: 95 % intervals."
+        succeeded = "no grasp succeeded"
+    return (
+        f"{where} the simulator's verdict was right for {brief_share_text(found.accuracy)} of the"
+        f" grasps. {expected}; {succeeded}. In brackets: 95 % intervals."
+    )
 
 
 def headline_agreement(judged: Judgement) -> Agreement:
@@ -264,14 +260,6 @@ def agreement_sentence(comparison: Comparison) -> str:
     )
 
 
-def difference_sentence(comparison: Comparison) -> str:
-    """Which of two simulators was right where the other was wrong."""
-    d = comparison.difference
-    if d is None:
-        return ""
-    return f"in {d.only_first} trials only the first was right, in {d.only_second} only the second"
-
-
 def population_difference_sentence(comparison: Comparison) -> str:
     """Which of two simulators is right about more of the grasps that the trials stand for; empty
     where nothing says what they were chosen from."""
@@ -279,8 +267,9 @@ def population_difference_sentence(comparison: Comparison) -> str:
     if found is None or found.value is None:
         return ""
     return (
-        f"Of all grasps that the trials stand for, the first is right about"
-        f" {100 * found.value:+.1f} percentage points more {bracketed_interval(found, percent=True)}."
+        "Of all grasps that the trials stand for, the first is right about"
+        f" {100 * found.value:+.1f} percentage points more"
+        f" {bracketed_interval(found, percent=True)}."
     )
 
 
@@ -306,14 +295,16 @@ def bias_sentence(comparison: Comparison, judged: Judgement | None = None) -> st
         who = f"{which} simulator promises"
     every = population_agreement(judged)
     if every is not None and every.excess.value is not None:
+        points = _percentage_points_text(every.excess.value, "success than")
+        of_trials = _percentage_points_text(b.difference.value, "than")
         return (
-            f"Over all these grasps the {who} {_percentage_points_text(every.excess.value, 'success than')} {other}"
-            f" {bracketed_interval(every.excess, percent=True)}. In the selected trials alone, each counted"
-            f" once, it promises {_percentage_points_text(b.difference.value, 'than')} {other}: of {b.trials:,}"
-            f" grasps, {parted}."
+            f"Over all these grasps the {who} {points} {other}"
+            f" {bracketed_interval(every.excess, percent=True)}. In the selected trials alone, each"
+            f" counted once, it promises {of_trials} {other}: of {b.trials:,} grasps, {parted}."
         )
+    points = _percentage_points_text(b.difference.value, "success than")
     return (
-        f"The {who} {_percentage_points_text(b.difference.value, 'success than')} {other}"
+        f"The {who} {points} {other}"
         f" {bracketed_interval(b.difference, percent=True)}: of {b.trials:,} grasps, {parted}"
         f" (McNemar's exact test: p = {format_number(b.p_value)})."
     )
@@ -334,11 +325,8 @@ def unpredictable_sentence(judged: Judgement) -> str:
     if found is None:
         return ""
     count = sum(found.outcomes.values())
-    without = (
-        found.selected
-        if population_agreement(judged) is None
-        else found.all_grasps or found.selected
-    )
+    every = None if population_agreement(judged) is None else found.all_grasps
+    without = every or found.selected
     return (
         f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
         f" alone cannot predict ({outcome_counts_text(found.outcomes)}),"
@@ -355,10 +343,11 @@ def too_few_trials_sentence(comparison: Comparison, judged: Judgement) -> str:
     if not found or any(c.auroc.value is not None for c in found):
         return ""
     most = max(found, key=lambda c: min(c.successes, c.trials - c.successes))
+    needed = MIN_TRIALS_PER_OUTCOME
     return (
-        f"Too few trials to tell which margins predict {success_description(comparison)}: that takes"
-        f" {MIN_TRIALS_PER_OUTCOME} successes and {MIN_TRIALS_PER_OUTCOME} failures; there are"
-        f" {most.successes} and {most.trials - most.successes}."
+        f"Too few trials to tell which margins predict {success_description(comparison)}: that"
+        f" takes {needed} successes and {needed} failures; there are {most.successes} and"
+        f" {most.trials - most.successes}."
     )
 
 
@@ -396,8 +385,6 @@ def no_outliers_sentence(judged: Judgement) -> str:
 
 def margin_title(name: str) -> tuple[str, str, float]:
     """What a margin is called, its unit for people, and how many of them its column's unit is."""
-    from burg_drake.core import display_unit
-
     if name == PROBABILITY_MARGIN:
         return "predicted probability", "", 1.0
     if name.endswith("_mm"):

@@ -6,15 +6,11 @@ import math
 from collections.abc import Callable, Sequence
 
 from burg_drake.core import format_count, format_number
-from burg_drake.evaluation import interval_mark, nice_step, section, table
+from burg_drake.evaluation import nice_step, section, table
 from burg_drake.experiment.comparison.comparison import (
-    PERCENT_MEASURES,
     Comparison,
-    bracketed_interval,
     cell_name,
-    estimate_text,
     margin_title,
-    measure_name,
     no_outliers_sentence,
     outcome_counts_text,
     outlier_name,
@@ -23,26 +19,25 @@ from burg_drake.experiment.comparison.comparison import (
     unpredictable_sentence,
 )
 from burg_drake.experiment.comparison.confusion_matrix import Agreement
-from burg_drake.experiment.comparison.estimates import AGREEMENT_MEASURES, CONFUSION_CELLS, Estimate
+from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.comparison.figure_tables import (
+    Named,
+    figure_cell,
+    group_table,
+    measure_table,
+    named_row,
+    number_cells,
+    placement_groups,
+    unpredictable_table,
+)
 from burg_drake.experiment.comparison.group_agreement import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.margin_calibration import Bin, MarginCalibration
-from burg_drake.experiment.comparison.terminal_tables import (
-    PREDICTION_MEASURES,
-    rows_without_unpredictable,
-)
-from burg_drake.visualization import Child, Html, element, join
+from burg_drake.visualization import Html, element
 
-
-class ReliabilityPlotLayout:
-    """Reliability plot layout."""
-
-    width = 330  # SVG units.
-    height = 210  # SVG units.
-    left = 38  # Margin.
-    right = 10  # Margin.
-    top = 24  # Margin.
-    bottom = 38  # Margin.
+PLOT_SIZE = 330, 210  # width and height of a reliability plot in SVG units
+PLOT_LEFT, PLOT_RIGHT = 38, 320  # x of the axes' ends
+PLOT_TOP, PLOT_BOTTOM = 24, 172  # y of the shares 1 and 0
 
 
 def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
@@ -63,15 +58,7 @@ def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
 
     def x(value: float) -> float:
         along = (size * value - low * step) / ((high - low) * step)
-        return (
-            ReliabilityPlotLayout.left
-            + (
-                ReliabilityPlotLayout.width
-                - ReliabilityPlotLayout.left
-                - ReliabilityPlotLayout.right
-            )
-            * along
-        )
+        return PLOT_LEFT + (PLOT_RIGHT - PLOT_LEFT) * along
 
     named = f"{title} [{unit}]" if unit else title
     axis = [
@@ -79,26 +66,20 @@ def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
             "text",
             f"{k * step:.6g}",
             x=f"{x(k * step / size):.1f}",
-            y=ReliabilityPlotLayout.height - ReliabilityPlotLayout.bottom + 15,
+            y=PLOT_BOTTOM + 15,
         )
         for k in range(low, high + 1)
     ]
     return element(
         "svg",
         element("text", vertical, x=4, y=12, class_="title"),
-        element(
-            "text",
-            named,
-            x=ReliabilityPlotLayout.width - ReliabilityPlotLayout.right,
-            y=ReliabilityPlotLayout.height - 5,
-            class_="title end",
-        ),
+        element("text", named, x=PLOT_RIGHT, y=PLOT_SIZE[1] - 5, class_="title end"),
         *_grid_lines(),
         element("g", *axis, class_="middle"),
         _mean_line((found.weighted or found.share).value),
         _isotonic_line(found, x),
         *(part for row in found.bins for part in _bin_marks(row, x, size, unit)),
-        viewBox=f"0 0 {ReliabilityPlotLayout.width} {ReliabilityPlotLayout.height}",
+        viewBox=f"0 0 {PLOT_SIZE[0]} {PLOT_SIZE[1]}",
         class_="plot",
         role="img",
         aria_label=f"{vertical} over {named}",
@@ -106,10 +87,8 @@ def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
 
 
 def _share_height(share: float) -> float:
-    """Height of a share."""
-    return ReliabilityPlotLayout.top + (
-        ReliabilityPlotLayout.height - ReliabilityPlotLayout.top - ReliabilityPlotLayout.bottom
-    ) * (1.0 - share)
+    """y of a share in a plot."""
+    return PLOT_TOP + (PLOT_BOTTOM - PLOT_TOP) * (1.0 - share)
 
 
 def _grid_lines() -> list[Html]:
@@ -117,20 +96,9 @@ def _grid_lines() -> list[Html]:
     for share in (0.0, 0.25, 0.5, 0.75, 1.0):
         y = f"{_share_height(share):.1f}"
         style = "axis" if share == 0.0 else "grid"
-        parts.append(
-            element(
-                "line",
-                x1=ReliabilityPlotLayout.left,
-                x2=ReliabilityPlotLayout.width - ReliabilityPlotLayout.right,
-                y1=y,
-                y2=y,
-                class_=style,
-            )
-        )
+        parts.append(element("line", x1=PLOT_LEFT, x2=PLOT_RIGHT, y1=y, y2=y, class_=style))
         label = f"{100 * share:.0f} %" if share in (0.0, 0.5, 1.0) else ""
-        parts.append(
-            element("text", label, x=ReliabilityPlotLayout.left - 5, y=y, dy="0.35em", class_="end")
-        )
+        parts.append(element("text", label, x=PLOT_LEFT - 5, y=y, dy="0.35em", class_="end"))
     return parts
 
 
@@ -140,14 +108,7 @@ def _mean_line(share: float | None) -> Html | None:
     y = f"{_share_height(share):.1f}"
     return element(
         "g",
-        element(
-            "line",
-            x1=ReliabilityPlotLayout.left,
-            x2=ReliabilityPlotLayout.width - ReliabilityPlotLayout.right,
-            y1=y,
-            y2=y,
-            class_="base",
-        ),
+        element("line", x1=PLOT_LEFT, x2=PLOT_RIGHT, y1=y, y2=y, class_="base"),
         element("title", f"of all: {100 * share:.1f} %"),
     )
 
@@ -178,10 +139,6 @@ def _bin_marks(row: Bin, x: Callable[[float], float], size: float, unit: str) ->
     ]
 
 
-Named = Sequence[tuple[str, Judgement]]
-"""What a comparison says of each judge; the name is empty if there is only one."""
-
-
 def matrix_section(comparison: Comparison, judged: Named) -> Html:
     """Confusion matrices of the trials, and of all grasps that they stand for."""
     title = "Verdicts of both runs" if comparison.kind == "runs" else "Verdicts and outcomes"
@@ -192,9 +149,8 @@ def matrix_section(comparison: Comparison, judged: Named) -> Html:
             found.append(("all grasps", judgement.all_grasps))
         elif comparison.kind == "runs":
             found = [("grasps", judgement.selected)]
-        blocks += [
-            _matrix_table(comparison, _title_with_simulator(which, name), a) for which, a in found
-        ]
+        suffix = f", {name}" if name else ""
+        blocks += [_matrix_table(comparison, f"{which}{suffix}", a) for which, a in found]
     text = "Rows: what the simulation predicted. Columns: what happened."
     if comparison.kind == "runs":
         text = "Rows: the first run. Columns: the second run."
@@ -204,10 +160,6 @@ def matrix_section(comparison: Comparison, judged: Named) -> Html:
             " grasps that it was chosen from."
         )
     return section(title, text, element("div", *blocks, class_="beside"))
-
-
-def _title_with_simulator(title: str, name: str) -> str:
-    return f"{title}, {name}" if name else title
 
 
 def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
@@ -222,17 +174,12 @@ def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
         )
 
     rows = [
-        element("tr", element("th", f"success {judge}", scope="row"), *pair)
-        for pair in [(cell("tp", "right"), cell("fp", "wrong"))]
-    ]
-    rows.append(
-        element(
-            "tr",
-            element("th", f"failure {judge}", scope="row"),
-            cell("fn", "wrong"),
-            cell("tn", "right"),
+        named_row(f"{verdict} {judge}", *cells)
+        for verdict, cells in (
+            ("success", (cell("tp", "right"), cell("fp", "wrong"))),
+            ("failure", (cell("fn", "wrong"), cell("tn", "right"))),
         )
-    )
+    ]
     head = ["", f"success {other}", f"failure {other}"]
     return element(
         "div", element("h3", title[0].upper() + title[1:]), table(head, rows, style="confusion")
@@ -241,52 +188,18 @@ def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
 
 def figure_section(comparison: Comparison, judged: Named) -> Html:
     """All measures with their intervals."""
-    columns: list[tuple[str, Agreement]] = []
-    for name, judgement in judged:
-        columns.append((_title_with_simulator("selected trials", name), judgement.selected))
-        if judgement.all_grasps is not None:
-            columns.append((_title_with_simulator("all grasps", name), judgement.all_grasps))
-    if len(columns) == 1:
-        columns = [("value", columns[0][1])]
-    head = ["figure", *(name for name, _ in columns)]
-    rows = []
-    for key in AGREEMENT_MEASURES:
-        cells = [figure_cell(a.figure(key), percent=key in PERCENT_MEASURES) for _, a in columns]
-        rows.append(
-            element("tr", element("th", measure_name(comparison, key), scope="row"), *cells)
-        )
-    return section(
-        "Figures",
-        _describe_intervals(judged),
-        table(head, rows, numbers=range(1, len(head)), style="figures"),
-    )
-
-
-def figure_cell(found: Estimate, *, percent: bool) -> Html:
-    """A figure and its interval, below each other where there is little room."""
-    if found.value is None:
-        return element("td", found.reason, class_="number faint why")
-    bounds = element("small", bracketed_interval(found, percent=percent), class_="bounds")
-    return element("td", estimate_text(found, percent=percent), " ", bounds, class_="number")
+    found = measure_table(comparison, judged).html("figures")
+    return section("Figures", _describe_intervals(judged), found)
 
 
 def unpredictable_section(judged: Judgement) -> Html | None:
     """Figures with and without failures that the hand alone does not predict."""
     if judged.unpredictable is None:
         return None
-    rows = [
-        element(
-            "tr",
-            element("th", title, scope="row"),
-            *(figure_cell(found.figure(key), percent=True) for key in PREDICTION_MEASURES),
-        )
-        for title, found in rows_without_unpredictable(judged)
-    ]
-    head = ["of", *PREDICTION_MEASURES]
     return section(
         "What the hand alone cannot predict",
         unpredictable_sentence(judged),
-        table(head, rows, numbers=range(1, len(head)), style="figures"),
+        unpredictable_table(judged).html("figures"),
     )
 
 
@@ -296,33 +209,20 @@ def standing_out_section(judged: Judgement) -> Html:
         return section("What stands out", no_outliers_sentence(judged))
     rows = []
     for one in judged.standing_out:
-        cells: list[Child] = [
+        cells = (
             one.kind,
             "success" if one.predicted else "failure",
             f"{one.wrong} of {one.trials}",
             f"{one.other_wrong} of {one.other_trials}",
             outcome_counts_text(one.ended),
             format_number(one.corrected),
-        ]
-        rows.append(
-            element(
-                "tr",
-                element("th", outlier_name(one), scope="row"),
-                *(element("td", c) for c in cells),
-            )
         )
+        rows.append(named_row(outlier_name(one), *(element("td", cell) for cell in cells)))
     apart = " Failures that the hand alone cannot predict are left out."
     if judged.unpredictable is None:
         apart = ""
-    names = [
-        "",
-        "what",
-        "predicted",
-        "wrong",
-        "others wrong",
-        ("how the wrongly predicted ones ended"),
-        "p",
-    ]
+    names = ["", "what", "predicted", "wrong", "others wrong"]
+    names += ["how the wrongly predicted ones ended", "p"]
     return section(
         "What stands out",
         "Objects, verdicts and bodies in the way for which predictions were wrong more"
@@ -349,34 +249,10 @@ def _describe_intervals(judged: Named) -> str:
 
 def group_section(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> Html:
     """Counts, and shares with their intervals as dots and lines, by object or scene."""
-    max_rows = 60  # Groups in the table.
-    names = [head, "trials", "TP", "FP", "FN", "TN", "right", "precision", "recall"]
-    rows = [_group_row(group) for group in groups[:max_rows]]
+    max_rows = 60
     if len(groups) > max_rows:
         text += f" The first {max_rows} of {len(groups)}."
-    return section(title, text, table(names, rows, numbers=range(1, 6), style="groups"))
-
-
-def _group_row(group: FactorGroup) -> Html:
-    a = group.agreement
-    counts = [
-        element("td", format_count(round(n)), class_="number", data_label=name)
-        for name, n in zip(
-            ("trials", *map(str.upper, CONFUSION_CELLS)), (a.trials, *a.cells), strict=True
-        )
-    ]
-    shares = [
-        element("td", share_with_interval(found), class_="estimate", data_label=name)
-        for name, found in (("right", a.accuracy), ("precision", a.precision), ("recall", a.recall))
-    ]
-    return element("tr", element("th", group.name, scope="row"), *counts, *shares)
-
-
-def share_with_interval(found: Estimate) -> Child:
-    """A share as a dot with its interval, and in figures."""
-    if found.value is None or found.low is None or found.high is None:
-        return element("span", found.reason, class_="faint")
-    return join(interval_mark(found.value, found.low, found.high), f" {100 * found.value:.0f} %")
+    return section(title, text, group_table(head, groups).html("groups", max_rows))
 
 
 def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
@@ -384,13 +260,10 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
     max_plots = 4  # Margins with a plot, the most informative first.
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_distance_from_chance, reverse=True)
+    title = f"Do margins predict {success_description(comparison)}?"
     if not found:
         words = too_few_trials_sentence(comparison, judged)
-        return (
-            section(f"Do margins predict {success_description(comparison)}?", words)
-            if words
-            else None
-        )
+        return section(title, words) if words else None
     weighted = any(c.auroc_weighted is not None for c in found)
     head = ["margin", "trials"]
     head += ["AUROC, selected trials", "AUROC, all grasps"] if weighted else ["AUROC"]
@@ -405,7 +278,7 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
         " fits best; dashes: the share of all."
     )
     return section(
-        f"Do margins predict {success_description(comparison)}?",
+        title,
         text,
         element("div", *plots, class_="charts plots"),
         table(head, rows, numbers=range(1, len(head)), style="figures"),
@@ -421,14 +294,9 @@ def _distance_from_chance(found: MarginCalibration) -> float:
 
 def _margin_row(c: MarginCalibration, weighted: bool) -> Html:
     found = (c.auroc, c.auroc_weighted) if weighted else (c.auroc,)
-    return element(
-        "tr",
-        element(
-            "th", f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}", scope="row"
-        ),
-        element("td", format_count(c.trials), class_="number"),
-        *(figure_cell(f or Estimate.undefined(""), percent=False) for f in found),
-    )
+    name = f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}"
+    figures = (figure_cell(f or Estimate.undefined(""), percent=False) for f in found)
+    return named_row(name, *number_cells([format_count(c.trials)]), *figures)
 
 
 def placement_section(judged: Judgement, of: str) -> Html | None:
@@ -437,11 +305,8 @@ def placement_section(judged: Judgement, of: str) -> Html | None:
     if p is None or not p.within.trials + p.beyond.trials:
         return None
     limit = f"{p.limit_mm:g} mm"
-    groups = [
-        FactorGroup(name=f"every object within {limit}", agreement=p.within),
-        FactorGroup(name=f"an object more than {limit} off", agreement=p.beyond),
-        FactorGroup(name="not all measured", agreement=p.unmeasured),
-    ]
+    within, beyond = f"every object within {limit}", f"an object more than {limit} off"
+    groups = placement_groups(p, within, beyond)
     text = (
         "Where objects were off their planned places, the simulation judged another"
         " scene than the robot had. If agreement is much better in the first row, the"

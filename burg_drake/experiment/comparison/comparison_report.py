@@ -37,15 +37,22 @@ from burg_drake.experiment.comparison.comparison_figures import (
     matrix_section,
     placement_section,
     reliability_plot,
-    share_with_interval,
     standing_out_section,
     unpredictable_section,
 )
 from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.comparison.figure_tables import (
+    CONFIDENCE_HEADING,
+    deciding_stages,
+    labelled_row,
+    named_row,
+    number_cells,
+    run_agreement_table,
+    verdict_table,
+)
 from burg_drake.experiment.comparison.group_agreement import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Disagreement, Judgement
 from burg_drake.experiment.comparison.margin_calibration import MarginCalibration
-from burg_drake.experiment.comparison.terminal_tables import CONFIDENCE_HEADING, deciding_stages
 from burg_drake.visualization import Child, Html, element, join
 
 
@@ -63,19 +70,19 @@ def comparison_page(
         line: the command that makes it again; left out if empty.
         more: further sections.
     """
-    # Title of the page by kind of comparison.
-    kind_titles = {
+    c = comparison
+    kind = {
         "trials": "Simulation against reality",
         "simulators": "Two simulations against reality",
         "runs": "Simulation against simulation",
-    }
-    c = comparison
+    }[c.kind]
     title = ", ".join(c.first.scenes[:3]) + (" and others" if len(c.first.scenes) > 3 else "")
     title = f"{title} on {c.first.station}"
+    folder = files("burg_drake.experiment.comparison")
     return html_page(
-        f"{kind_titles[c.kind]}: {title}",
-        element("style", Html(_read_style())),
-        header(kind_titles[c.kind], title, _subtitle(c)),
+        f"{kind}: {title}",
+        element("style", Html((folder / "style.css").read_text(encoding="utf-8"))),
+        header(kind, title, _subtitle(c)),
         _lead_paragraph(c),
         *(element("p", note, class_="notice") for note in c.notes),
         *_sections(c, _photo_folder(c, Path(path))),
@@ -85,11 +92,6 @@ def comparison_page(
         if line
         else None,
     )
-
-
-def _read_style() -> str:
-    folder = files("burg_drake.experiment.comparison")
-    return (folder / "style.css").read_text(encoding="utf-8")
 
 
 def _subtitle(c: Comparison) -> str:
@@ -180,7 +182,7 @@ def _judge_sections(c: Comparison, judgement: Judgement, photos: Path | None) ->
     right = "same verdict in both runs" if c.kind == "runs" else "right verdicts"
     text = f"Share of {right}, precision and recall, with 95 % intervals."
     of = selection_suffix(c)
-    parts = [
+    return [
         unpredictable_section(judgement),
         standing_out_section(judgement) if c.kind != "runs" else None,
         group_section(f"By object{of}", text, "object", judgement.objects),
@@ -193,7 +195,6 @@ def _judge_sections(c: Comparison, judgement: Judgement, photos: Path | None) ->
         case_section(c, judgement, photos),
         outcome_section(c, judgement, of),
     ]
-    return parts
 
 
 def _name_simulator(part: Html | None, name: str) -> Html | None:
@@ -210,11 +211,11 @@ def _difference_section(c: Comparison) -> Html | None:
         return None
     points = bracketed_interval(d.difference, percent=True)
     text = (
-        f"{population_difference_sentence(c)} Both are right in {d.both} of {d.trials} trials, only the"
-        f" first in {d.only_first}, only the second in {d.only_second}, neither in {d.neither}. In"
-        f" these trials the first is right {100 * d.difference.value:+.1f} percentage points more"
-        f" often {points}; McNemar's exact test of equally many right verdicts:"
-        f" p = {d.p_value:.3g}."
+        f"{population_difference_sentence(c)} Both are right in {d.both} of {d.trials} trials, only"
+        f" the first in {d.only_first}, only the second in {d.only_second}, neither in"
+        f" {d.neither}. In these trials the first is right {100 * d.difference.value:+.1f}"
+        f" percentage points more often {points}; McNemar's exact test of equally many right"
+        f" verdicts: p = {d.p_value:.3g}."
     )
     return section("Which simulator is right more often?", text.lstrip())
 
@@ -265,21 +266,21 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
     max_rows = 50  # Wrong verdicts in the table.
     if not judged.disagreements:
         return None
-    tables = []
+    tables: list[Html] = []
     apart = judged.unpredictable
     beyond = {} if apart is None else apart.outcomes
-    predicted_successes = 0 if apart is None else apart.predicted_successes
-    of = [d for d in judged.disagreements if d.kind == "fp"]
+    promised = 0 if apart is None else apart.predicted_successes
+    false_successes = [d for d in judged.disagreements if d.kind == "fp"]
     groups = [
         (
             cell_name(comparison, "fp"),
-            [d for d in of if d.ended not in beyond],
-            round(judged.selected.fp) - predicted_successes,
+            [d for d in false_successes if d.ended not in beyond],
+            round(judged.selected.fp) - promised,
         ),
         (
             "success predicted, failed for reasons that the hand alone cannot predict",
-            [d for d in of if d.ended in beyond],
-            predicted_successes,
+            [d for d in false_successes if d.ended in beyond],
+            promised,
         ),
         (
             cell_name(comparison, "fn"),
@@ -318,12 +319,7 @@ def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
             offset = "-" if case.offset_mm is None else f"{format_number(case.offset_mm)} mm"
             cells += [offset, _note_and_photo(case, photos)]
         cells.append(join(*(command(line) for line in case.replays)))
-        rows.append(
-            element(
-                "tr",
-                *(element("td", c, data_label=h) for h, c in zip(head, cells, strict=True)),
-            )
-        )
+        rows.append(labelled_row(head, cells))
     return table(head, rows, style="cases")
 
 
@@ -337,36 +333,17 @@ def _note_and_photo(case: Disagreement, photos: Path | None) -> Child:
 
 def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
     """What became of grasps by verdict and the body in the way; `of` says of which."""
-    max_rows = 30  # Rows of the table.
-    rows = [
-        element(
-            "tr",
-            element("th", outcome_label(row.outcome), scope="row"),
-            element("td", row.blocker or "", class_="faint"),
-            element("td", row.stage),
-            element("td", format_count(row.trials), class_="number", data_label="trials"),
-            element(
-                "td", share_with_interval(row.successes), class_="estimate", data_label="succeeded"
-            ),
-        )
-        for row in judged.stopped[:max_rows]
-    ]
-    more = ""
-    if len(judged.stopped) > max_rows:
-        more = f" The first {max_rows} of {len(judged.stopped)}."
-    head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
+    max_rows = 30
+    more = f" The first {max_rows} of {len(judged.stopped)}."
+    more = more if len(judged.stopped) > max_rows else ""
     text = f"For each simulated outcome: how many of these grasps succeeded.{more}"
     if comparison.kind == "runs":
-        head[0], head[-1] = "first run", "success in the second, 95 % interval"
         text = (
             "For each outcome in the first run: how many of these grasps succeeded in the"
             f" second run.{more}"
         )
-    return section(
-        f"How each verdict turned out{of}",
-        text,
-        table(head, rows, numbers=(3,), style="groups"),
-    )
+    found = verdict_table(comparison, judged).html("groups", max_rows)
+    return section(f"How each verdict turned out{of}", text, found)
 
 
 def outcome_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
@@ -378,7 +355,7 @@ def outcome_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
             element("td", row.get(name, "·"), class_="number" if name in row else "number zero")
             for name in happened
         ]
-        rows.append(element("tr", element("th", outcome_label(simulated), scope="row"), *cells))
+        rows.append(named_row(outcome_label(simulated), *cells))
     runs = comparison.kind == "runs"
     head = ["first run" if runs else "simulated", *(outcome_label(n) for n in happened)]
     judge, other = ("in simulation", "on the robot")
@@ -413,35 +390,8 @@ def agreement_sections(comparison: Comparison) -> list[Html | None]:
 
 
 def _group_table(head: str, groups: Sequence[FactorGroup]) -> Html:
-    """Held alike by what grasps have in common, such as their object."""
-    max_rows = 60  # Groups in the table; the JSON has all.
-    rows = [
-        element(
-            "tr",
-            element("th", group.name, scope="row"),
-            element(
-                "td",
-                format_count(group.agreement.trials),
-                class_="number",
-                data_label="grasps",
-            ),
-            element(
-                "td",
-                share_with_interval(group.agreement.accuracy),
-                class_="estimate",
-                data_label="alike",
-            ),
-            element(
-                "td",
-                estimate_text(group.agreement.kappa, percent=False),
-                class_="number",
-                data_label="kappa",
-            ),
-        )
-        for group in groups[:max_rows]
-    ]
-    names = [head, "grasps", "alike, 95 % interval", "Cohen's kappa"]
-    return table(names, rows, numbers=(1, 3), style="groups")
+    max_rows = 60  # The JSON has all.
+    return run_agreement_table(head, groups).html("groups", max_rows)
 
 
 def _stage_section(
@@ -455,7 +405,7 @@ def _stage_section(
             count, parted = row.get(name, 0), apart.get(stage, {}).get(name, 0)
             text = f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
             cells.append(element("td", text, class_="number" if count else "number zero"))
-        rows.append(element("tr", element("th", stage, scope="row"), *cells))
+        rows.append(named_row(stage, *cells))
     text = (
         "Rows: the stage that decided in the first run. Columns: in the second run. In"
         " brackets: grasps that only one of the runs holds."
@@ -479,8 +429,7 @@ def _disagreement_section(parted: Sequence[PartedGrasp]) -> Html | None:
             "-" if one.confidence is None else f"{one.confidence:.3f}",
             join(*(command(line) for line in one.replays)),
         )
-        cases = (element("td", c, data_label=h) for h, c in zip(head, cells, strict=True))
-        rows.append(element("tr", *cases))
+        rows.append(labelled_row(head, cells))
     text = (
         f"{format_count(len(parted))} grasps. The commands show each one in the first and"
         " in the second run."
@@ -529,14 +478,7 @@ def _margin_difference_section(differences: Sequence[MarginDifference]) -> Html 
         title, unit, size = margin_title(one.name)
         values = (one.median, one.median_size, one.within)
         cells = (f"{format_number(size * value)} {unit}".rstrip() for value in values)
-        rows.append(
-            element(
-                "tr",
-                element("th", title, scope="row"),
-                element("td", format_count(one.grasps), class_="number"),
-                *(element("td", cell, class_="number") for cell in cells),
-            )
-        )
+        rows.append(named_row(title, *number_cells([format_count(one.grasps), *cells])))
     head = ["margin", "grasps", "median difference", "median size", "90 % within"]
     return section(
         "How much margins differ",

@@ -25,7 +25,7 @@ from burg_drake.experiment.comparison.estimates import (
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """A confusion matrix of predicted and actual success, and figures from it; see `AGREEMENT_MEASURES`.
+    """A confusion matrix of predicted and actual success, and its figures (`AGREEMENT_MEASURES`).
 
     Attributes:
         trials: number of trials behind it.
@@ -98,7 +98,7 @@ def estimate_agreement(
     counts: Values, *, population: Array | None = None, seed: int = 0
 ) -> Agreement:
     """Figures of one matrix. Its shares have Wilson's intervals, all others those of
-    `resampling.draw_cells`.
+    `draw_cells`.
 
     Args:
         counts: (4,) trials by cell, or (S, 4) by the stratum that they were chosen from.

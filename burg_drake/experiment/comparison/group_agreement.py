@@ -8,9 +8,8 @@ measures false alarms and power.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 from typing import Literal
 
@@ -22,7 +21,7 @@ from burg_drake.experiment.comparison.confusion_matrix import (
     count_cells_by_group,
     estimate_agreements,
 )
-from burg_drake.experiment.comparison.estimates import Estimate, Flags, Values, estimate_share
+from burg_drake.experiment.comparison.estimates import Estimate, Flags, estimate_share
 from burg_drake.experiment.comparison.result_table import TextFactor
 from burg_drake.experiment.comparison.verdict_pairs import VerdictPairs
 
@@ -88,7 +87,7 @@ def agreement_by_factor(
 def outcomes_by_verdict(pairs: VerdictPairs) -> tuple[Stopped, ...]:
     """What became of the grasps by verdict, the most frequent ones of a stage first; success is
     among the verdicts."""
-    stage_order = [stage.value for stage in Stage]  # In the order of the cascade.
+    stage_order = [stage.value for stage in Stage]
     stages, outcomes, blockers = pairs.stage, pairs.simulated, pairs.blocker
     width = (len(outcomes.names), len(blockers.names))
     code = (stages.index * width[0] + outcomes.index) * width[1] + blockers.index
@@ -108,24 +107,15 @@ def outcomes_by_verdict(pairs: VerdictPairs) -> tuple[Stopped, ...]:
     return tuple(sorted(rows, key=lambda row: (stage_order.index(row.stage), -row.trials)))
 
 
-def count_outcomes(pairs: VerdictPairs) -> dict[str, dict[str, int]]:
-    """How many trials ended how, by verdict; only what occurs."""
-    return cross_tabulate(pairs.simulated, pairs.ended)
-
-
 def cross_tabulate(rows: TextFactor, columns: TextFactor) -> dict[str, dict[str, int]]:
-    """How many trials have which text of one column and which of another; only what occurs."""
-    counts = _count_pairs(rows, columns)
+    """Counts of trials by the texts of two columns, without combinations that do not occur."""
+    width = len(columns.names)
+    flat = np.bincount(rows.index * width + columns.index, minlength=len(rows.names) * width)
+    counts = flat.reshape(len(rows.names), width)
     return {
         rows.names[r]: {columns.names[c]: int(counts[r, c]) for c in np.flatnonzero(counts[r])}
         for r in np.flatnonzero(counts.sum(axis=1))
     }
-
-
-def _count_pairs(rows: TextFactor, columns: TextFactor) -> Values:
-    width = len(columns.names)
-    flat = np.bincount(rows.index * width + columns.index, minlength=len(rows.names) * width)
-    return flat.reshape(len(rows.names), width)
 
 
 OUTLIER_SIGNIFICANCE_LEVEL = 0.05
@@ -167,8 +157,8 @@ def find_outlier_groups(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], 
         pairs: N trials that the verdicts can predict.
 
     Returns:
-        Groups with a corrected p-value below `OUTLIER_SIGNIFICANCE_LEVEL`, the smallest first, and the
-        number of tested groups. Groups with too few trials to reach that level are not tested.
+        Groups with a corrected p-value below `OUTLIER_SIGNIFICANCE_LEVEL`, the smallest first, and
+        the number of tested groups. Groups with too few trials to reach that level are not tested.
     """
     factors: list[tuple[GroupKind, TextFactor]] = [
         ("object", pairs.object),
@@ -176,33 +166,34 @@ def find_outlier_groups(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], 
         ("body in the way", pairs.blocker),
     ]
     wrong = pairs.predicted != pairs.actual
-    groups: list[tuple[GroupKind, str, bool, Flags, tuple[int, int, int, int]]] = []
+    groups: list[OutlierGroup] = []
     for predicted in (True, False):
         same = pairs.predicted == predicted
         for kind, factor in factors:
             for k in np.unique(factor.index[same]).tolist():
                 rows = same & (factor.index == k)
-                counts = _count_errors(wrong, rows, same & ~rows)
-                if factor.names[k] and _can_be_outlier(*counts):
-                    groups.append((kind, factor.names[k], predicted, rows & wrong, counts))
-    p_values = [excess_p_value(*counts) for *_, counts in groups]
+                errors = _count_errors(wrong, rows, same & ~rows)
+                if factor.names[k] and _can_be_outlier(*errors):
+                    p_value = excess_p_value(*errors)
+                    groups.append(
+                        OutlierGroup(
+                            kind=kind,
+                            name=factor.names[k],
+                            predicted=predicted,
+                            wrong=errors[0],
+                            trials=errors[1],
+                            other_wrong=errors[2],
+                            other_trials=errors[3],
+                            ended=pairs.ended.count(rows & wrong),
+                            p_value=p_value,
+                            corrected=p_value,
+                        )
+                    )
+    corrected = holm_correction([group.p_value for group in groups])
     found = [
-        OutlierGroup(
-            kind=kind,
-            name=name,
-            predicted=predicted,
-            wrong=count[0],
-            trials=count[1],
-            other_wrong=count[2],
-            other_trials=count[3],
-            ended=_count_endings(pairs.ended, rows),
-            p_value=p_value,
-            corrected=corrected,
-        )
-        for (kind, name, predicted, rows, count), p_value, corrected in zip(
-            groups, p_values, holm_correction(p_values), strict=True
-        )
-        if corrected < OUTLIER_SIGNIFICANCE_LEVEL
+        replace(group, corrected=p_value)
+        for group, p_value in zip(groups, corrected, strict=True)
+        if p_value < OUTLIER_SIGNIFICANCE_LEVEL
     ]
     return tuple(sorted(found, key=lambda one: one.p_value)), len(groups)
 
@@ -219,10 +210,6 @@ def _can_be_outlier(wrong: int, trials: int, other_wrong: int, other_trials: int
     total = wrong + other_wrong
     most = min(total, trials)
     return excess_p_value(most, trials, total - most, other_trials) < OUTLIER_SIGNIFICANCE_LEVEL
-
-
-def _count_endings(ended: TextFactor, rows: Flags) -> dict[str, int]:
-    return dict(Counter(ended.names[k] for k in ended.index[rows].tolist()).most_common())
 
 
 def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: int) -> float:

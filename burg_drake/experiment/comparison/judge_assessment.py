@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -28,7 +27,7 @@ from burg_drake.experiment.comparison.group_agreement import (
     OutlierGroup,
     Stopped,
     agreement_by_factor,
-    count_outcomes,
+    cross_tabulate,
     find_outlier_groups,
     outcomes_by_verdict,
 )
@@ -251,8 +250,8 @@ class Strata:
         size = np.bincount(self.index, minlength=len(self.population))
         return (self.population / np.maximum(size, 1))[self.index]
 
-    def keep(self, rows: Flags) -> Strata:
-        """Without some trials, the others standing for as many grasps as before."""
+    def select_trials(self, rows: Flags) -> Strata:
+        """The strata of some of the trials, each of which stands for as many grasps as before."""
         every = np.bincount(self.index, minlength=len(self.population))
         kept = np.bincount(self.index[rows], minlength=len(self.population))
         return Strata(self.index[rows], self.population * kept / np.maximum(every, 1))
@@ -338,7 +337,7 @@ def assess_judge(
     real: bool = False,
     seed: int = 0,
 ) -> Judgement:
-    """Works out all figures.
+    """Calculates all figures of a judgement.
 
     Args:
         pairs: verdicts and what happened.
@@ -368,7 +367,7 @@ def assess_judge(
         scenes=agreement_by_factor(pairs, pairs.scene, scenes, seed=seed),
         stages=agreement_by_factor(pairs, pairs.stage, seed=seed),
         stopped=outcomes_by_verdict(pairs),
-        outcomes=count_outcomes(pairs),
+        outcomes=cross_tabulate(pairs.simulated, pairs.ended),
         calibration=calibrate_margins(pairs.margins, pairs.actual, weight),
         placement=placement,
         disagreements=disagreements,
@@ -391,12 +390,11 @@ def _estimate_agreements(
 def _without_unpredictable(
     pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int
 ) -> Unpredictable:
-    """What some trials are, and the figures without them."""
-    kept = None if strata is None else strata.keep(~apart)
+    """The trials that are `apart`, and the figures without them."""
+    kept = None if strata is None else strata.select_trials(~apart)
     selected, represented = _estimate_agreements(pairs.take(~apart), kept, seed)
-    ended = Counter(pairs.ended.names[k] for k in pairs.ended.index[apart].tolist())
     return Unpredictable(
-        outcomes=dict(ended.most_common()),
+        outcomes=pairs.ended.count(apart),
         predicted_successes=int(pairs.predicted[apart].sum()),
         selected=selected,
         all_grasps=represented,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -119,8 +120,7 @@ class TextFactor:
     @classmethod
     def of(cls, texts: NDArray[np.str_]) -> TextFactor:
         """Finds the different texts."""
-        # Rows that are looked at first; if they have all texts, nothing is sorted.
-        sample_size = 4096
+        sample_size = 4096  # If the first rows have all texts, nothing is sorted.
         texts = np.asarray(texts, dtype=np.str_)
         if texts.ndim == 1 and len(texts) and texts.strides[0] == 0:  # one text, broadcast
             return cls((str(texts[0]),), np.zeros(len(texts), dtype=np.intp))
@@ -159,9 +159,20 @@ class TextFactor:
         text: str = self.names[self.index[row]]
         return text
 
+    def count(self, rows: Flags) -> dict[str, int]:
+        """Counts of the texts of some rows, the most frequent first."""
+        return dict(Counter(self.names[k] for k in self.index[rows].tolist()).most_common())
+
     def where(self, wanted: list[bool]) -> Flags:
         """(N,) truth values from one for each name."""
         return np.array(wanted, dtype=bool)[self.index]
+
+
+def take_rows(column: Any, rows: Values) -> Any:
+    """Some rows of a column or of several columns by name, as indices or truth values."""
+    if isinstance(column, Mapping):
+        return {name: values[rows] for name, values in column.items()}
+    return column[rows] if isinstance(column, np.ndarray) else column.take(rows)
 
 
 class StoredNumbers(Mapping[str, Values]):
@@ -211,8 +222,8 @@ class ResultTable:
         others = [name for name in names if name != "id"]
         return cls(
             IdColumn(columns["id"]),
-            {name: TextFactor.of(columns[name]) for name in others if name in TEXT_COLUMNS},
-            {name: columns[name] for name in others if name not in TEXT_COLUMNS},
+            {n: TextFactor.of(columns[n]) for n in others if n in TEXT_COLUMNS},
+            {n: columns[n] for n in others if n not in TEXT_COLUMNS},
         )
 
     @classmethod
@@ -221,12 +232,8 @@ class ResultTable:
         others = [name for name in names if name != "id"]
         return cls(
             IdColumn(rows.table.column("id")),
-            {
-                name: TextFactor.of_codes(*rows.codes(name))
-                for name in others
-                if name in TEXT_COLUMNS
-            },
-            StoredNumbers(rows, [name for name in others if name not in TEXT_COLUMNS]),
+            {n: TextFactor.of_codes(*rows.codes(n)) for n in others if n in TEXT_COLUMNS},
+            StoredNumbers(rows, [n for n in others if n not in TEXT_COLUMNS]),
         )
 
     def same(self, other: ResultTable, name: str) -> bool:
@@ -275,9 +282,8 @@ class Match:
 def match_rows(first: ResultTable, second: ResultTable) -> Match:
     """Finds the grasps that two tables have in common; of equal rows the first one counts."""
     tolerance = 1e-9  # Metres, or 1 for quaternions: tables may have been stored as text.
-    if first.id.same(second.id) and first.texts["scene_content"].same(
-        second.texts["scene_content"]
-    ):
+    scenes, other_scenes = first.texts["scene_content"], second.texts["scene_content"]
+    if first.id.same(second.id) and scenes.same(other_scenes):
         one = other = np.arange(len(first))
     else:
         _, one, other = np.intersect1d(_row_keys(first), _row_keys(second), return_indices=True)
@@ -290,13 +296,8 @@ def match_rows(first: ResultTable, second: ResultTable) -> Match:
             continue
         a, b = first.numbers[name][one], second.numbers[name][other]
         same &= (np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b))
-    return Match(
-        one[same],
-        other[same],
-        int((~same).sum()),
-        len(first) - len(one),
-        len(second) - len(other),
-    )
+    lengths = len(first) - len(one), len(second) - len(other)
+    return Match(one[same], other[same], int((~same).sum()), *lengths)
 
 
 def _row_keys(table: ResultTable) -> Values:

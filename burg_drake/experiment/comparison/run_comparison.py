@@ -141,7 +141,8 @@ def compare_trials(
     chosen, uninformative = _select_informative(sheet, tables, sorted(indices))
     left_out.update(uninformative)
     if not chosen:
-        raise InvalidInputError(_no_outcome_message(path, left_out))
+        reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
+        raise InvalidInputError(f"{path}: no trial can be compared yet ({reasons})")
     trials = [sheet.trials[k] for k in chosen]
     found = []
     for side, columns in zip(sides, tables, strict=True):
@@ -189,14 +190,11 @@ def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
     left_out: Counter[str] = Counter()
     for k in sorted(set[int]().union(*by_side)):
         reasons = [missing.get(k) for missing in by_side]
-        if len(reasons) == 1:
-            reason_texts = [f"{reasons[0]} in the run"]
-        elif reasons[0] == reasons[1]:
-            reason_texts = [f"{reasons[0]} in either run"]
-        else:
-            named = zip(reasons, ("first", "second"), strict=True)
-            reason_texts = [f"{reason} in the {which} run" for reason, which in named if reason]
-        left_out[f"grasp {' and '.join(reason_texts)}"] += 1
+        named = zip(reasons, ("first", "second"), strict=False)
+        text = " and ".join(f"{reason} in the {which} run" for reason, which in named if reason)
+        if len(set(reasons)) == 1:
+            text = f"{reasons[0]} in {'the' if len(reasons) == 1 else 'either'} run"
+        left_out[f"grasp {text}"] += 1
     return left_out
 
 
@@ -313,11 +311,6 @@ def _comparison_notes(
     return tuple(notes)
 
 
-def _no_outcome_message(path: Path, left_out: Counter[str]) -> str:
-    reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
-    return f"{path}: no trial can be compared yet ({reasons})"
-
-
 def compare_runs(
     first: Run | Campaign | str | Path,
     second: Run | Campaign | str | Path,
@@ -337,13 +330,17 @@ def compare_runs(
     with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
         one, other = pool.map(JudgedRuns.table, sides, (PREDICTION_COLUMNS, REFERENCE_COLUMNS))
     tables = one, other
-    found = match_rows(*tables)
+    found = match_rows(one, other)
     if not len(found.first):
         raise InvalidInputError(_no_common_grasps_message(sides, found))
     modes = [side.found.document.mode for side in sides]
     pairs, others, left_out = pair_runs(tables, found, success, modes[0] == modes[1])
     if not len(pairs) and modes[0] != modes[1]:
-        raise InvalidInputError(_nothing_executed_message(sides, modes))
+        raise InvalidInputError(
+            f"{sides[0].path} and {sides[1].path} were made in different modes ({modes[0]}"
+            f" and {modes[1]}), and no grasp was executed in both, so there is nothing to"
+            " compare; evaluate one of them again in the mode of the other"
+        )
     probability = predicted_probability(sides[0], pairs, robustness)
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY_MARGIN, probability)
@@ -380,8 +377,6 @@ def pair_runs(
 ) -> tuple[VerdictPairs, SecondVerdicts, dict[str, int]]:
     """Pairs of verdicts of the grasps in common, what else the second run found of them, and what
     is left out by reason: of different modes all that not both executed."""
-    # Runs of different modes ask different questions before the grip.
-    not_executed = "not executed in both runs, which have different modes"
     others = tables[1].take(found.second, (*MEASURED_MARGINS, "confidence"))
     ended, stage = others.texts["outcome"], others.texts["stage"]
     pairs = make_pairs(
@@ -399,7 +394,8 @@ def pair_runs(
             f"{k} in the {where}": rows for k, rows in rows_without_prediction(verdicts).items()
         }
     if not same_mode:
-        reasons[not_executed] = ~both_executed(pairs.stage, stage)
+        reason = "not executed in both runs, which have different modes"
+        reasons[reason] = ~both_executed(pairs.stage, stage)
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}
     for reason, rows in reasons.items():
@@ -409,14 +405,6 @@ def pair_runs(
     if keep.all():
         return pairs, second, left_out
     return pairs.take(keep), second.take(keep), left_out
-
-
-def _nothing_executed_message(sides: tuple[JudgedRuns, JudgedRuns], modes: Sequence[str]) -> str:
-    return (
-        f"{sides[0].path} and {sides[1].path} were made in different modes ({modes[0]}"
-        f" and {modes[1]}), and no grasp was executed in both, so there is nothing to"
-        " compare; evaluate one of them again in the mode of the other"
-    )
 
 
 def _no_common_grasps_message(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:

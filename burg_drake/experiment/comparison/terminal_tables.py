@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from burg_drake.core import (
     MISSING_NUMBER,
-    Stage,
     TextTable,
     format_count,
     format_number,
@@ -18,16 +17,12 @@ from burg_drake.experiment.comparison.agreement_between_runs import (
     RunAgreement,
 )
 from burg_drake.experiment.comparison.comparison import (
-    PERCENT_MEASURES,
     Comparison,
     agreement_sentence,
     bias_sentence,
-    bracketed_interval,
-    estimate_text,
     have_identical_rows,
     headline_sentence,
     margin_title,
-    measure_name,
     no_outliers_sentence,
     outcome_counts_text,
     outlier_name,
@@ -37,15 +32,22 @@ from burg_drake.experiment.comparison.comparison import (
     too_few_trials_sentence,
     unpredictable_sentence,
 )
-from burg_drake.experiment.comparison.confusion_matrix import Agreement
 from burg_drake.experiment.comparison.estimates import AGREEMENT_MEASURES
+from burg_drake.experiment.comparison.figure_tables import (
+    CONFIDENCE_HEADING,
+    Figure,
+    deciding_stages,
+    group_table,
+    measure_table,
+    named_agreements,
+    placement_groups,
+    run_agreement_table,
+    unpredictable_table,
+    verdict_table,
+)
 from burg_drake.experiment.comparison.group_agreement import FactorGroup
-from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.comparison.judge_assessment import Judgement, PlacementAgreement
 from burg_drake.experiment.comparison.margin_calibration import MarginCalibration
-
-MAX_TABLE_ROWS = 20  # Rows of a table in a terminal.
-PREDICTION_MEASURES = ("precision", "recall", "accuracy")
-"""Measures with and without unpredictable outcomes."""
 
 
 def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
@@ -58,28 +60,7 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     if words := population_difference_sentence(c):
         yield words
     for name, judged in [] if have_identical_rows(c) else _named_judgements(c):
-        of = selection_suffix(c) + name
-        yield matrix_table(c, judged, name)
-        yield figure_table(c, judged, name)
-        yield bias_sentence(c, judged)
-        if judged.unpredictable is not None:
-            yield unpredictable_sentence(judged)
-            yield unpredictable_table(judged, name)
-        if c.kind != "runs":
-            yield outlier_table(judged, name)
-        if len(judged.objects) > 1:
-            yield group_table(f"By object{of}", "object", judged.objects)
-        if len(judged.scenes) > 1:
-            yield group_table(f"By scene{of}", "scene", judged.scenes)
-        yield stopped_table(c, judged, of)
-        telling = [m for m in judged.calibration if m.auroc.value is not None]
-        if telling:
-            yield calibration_table(c, telling, name)
-        elif words := too_few_trials_sentence(c, judged):
-            yield words
-        p = judged.placement
-        if p is not None and p.within.trials + p.beyond.trials:
-            yield placement_table(judged, of)
+        yield from _judgement_tables(c, judged, name)
     yield coverage_sentences(c)
     yield from (f"differs: {text}" for text in c.settings)
     yield from (f"note: {text}" for text in c.notes)
@@ -89,6 +70,32 @@ def _named_judgements(comparison: Comparison) -> list[tuple[str, Judgement]]:
     if comparison.other is None:
         return [("", comparison.judgement)]
     return [(", first run", comparison.judgement), (", second run", comparison.other)]
+
+
+def _judgement_tables(c: Comparison, judged: Judgement, name: str) -> Iterator[TextTable | str]:
+    """Tables and sentences about one run, whose name titles end with."""
+    suffix = selection_suffix(c) + name
+    yield matrix_table(c, judged, name)
+    yield _measure_table(c, judged, name)
+    yield bias_sentence(c, judged)
+    if judged.unpredictable is not None:
+        yield unpredictable_sentence(judged)
+        title = f"With and without outcomes that the hand alone cannot predict{name}"
+        yield unpredictable_table(judged).text_table(title)
+    if c.kind != "runs":
+        yield outlier_table(judged, name)
+    for kind, groups in (("object", judged.objects), ("scene", judged.scenes)):
+        if len(groups) > 1:
+            yield group_table(kind, groups).text_table(f"By {kind}{suffix}")
+    yield verdict_table(c, judged).text_table(f"Outcomes for each verdict{suffix}")
+    telling = [m for m in judged.calibration if m.auroc.value is not None]
+    if telling:
+        yield calibration_table(c, telling, name)
+    elif words := too_few_trials_sentence(c, judged):
+        yield words
+    p = judged.placement
+    if p is not None and p.within.trials + p.beyond.trials:
+        yield _placement_table(p, suffix)
 
 
 def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
@@ -104,64 +111,22 @@ def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
     return table
 
 
-def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
-    """All figures, of the selected trials and of all grasps."""
-    table = TextTable(f"Figures{name}").texts("figure")
-    found: list[Agreement] = [judged.selected]
-    if judged.all_grasps is None:
-        table.numbers("value", "95 % CI")
-    else:
-        found.append(judged.all_grasps)
-        table.numbers("selected trials", "95 % CI", "all grasps", "95 % CI")
+def _measure_table(comparison: Comparison, judged: Judgement, name: str) -> TextTable:
+    """All measures of the selected trials and of all grasps."""
+    table = measure_table(comparison, [("", judged)]).text_table(f"Figures{name}")
+    captions = []
+    if judged.all_grasps is not None:
         grasps = format_count(round(sum(judged.all_grasps.cells)))
-        table.caption = (
-            f"selected trials: the {found[0].trials} that were compared; all grasps: the {grasps}"
-            " that they stand for, each for its share of those that it was chosen from"
+        captions.append(
+            f"selected trials: the {judged.selected.trials} that were compared; all grasps: the"
+            f" {grasps} that they stand for, each for its share of those that it was chosen from"
         )
-    for key in AGREEMENT_MEASURES:
-        cells = []
-        for agreement in found:
-            f, percent = agreement.figure(key), key in PERCENT_MEASURES
-            cells += [
-                estimate_text(f, percent=percent),
-                bracketed_interval(f, percent=percent) or "-",
-            ]
-        table.row(measure_name(comparison, key), *cells)
-    reasons = {
-        f.reason for a in found for f in (a.figure(k) for k in AGREEMENT_MEASURES) if f.reason
-    }
+    agreements = [found for _, found in named_agreements([("", judged)])]
+    reasons = {a.figure(key).reason for key in AGREEMENT_MEASURES for a in agreements} - {""}
     if reasons:
-        undefined = f"-: cannot be calculated ({'; '.join(sorted(reasons))})"
-        table.caption = f"{table.caption}\n{undefined}" if table.caption else undefined
+        captions.append(f"-: cannot be calculated ({'; '.join(sorted(reasons))})")
+    table.caption = "\n".join(captions)
     return table
-
-
-def unpredictable_table(judged: Judgement, name: str = "") -> TextTable:
-    """Figures with and without failures that the hand alone does not predict."""
-    table = TextTable(f"With and without outcomes that the hand alone cannot predict{name}")
-    table.texts("of")
-    for key in PREDICTION_MEASURES:
-        table.numbers(key, "95 % CI")
-    for title, found in rows_without_unpredictable(judged):
-        cells = []
-        for f in map(found.figure, PREDICTION_MEASURES):
-            cells += [estimate_text(f, percent=True), bracketed_interval(f, percent=True) or "-"]
-        table.row(title, *cells)
-    return table
-
-
-def rows_without_unpredictable(judged: Judgement) -> list[tuple[str, Agreement]]:
-    """Figures with and without what cannot be predicted, of trials and of all grasps."""
-    assert judged.unpredictable is not None
-    pairs = [("trials", judged.selected, judged.unpredictable.selected)]
-    if judged.all_grasps is not None and judged.unpredictable.all_grasps is not None:
-        pairs = [("selected trials", *pairs[0][1:])]
-        pairs.append(("all grasps", judged.all_grasps, judged.unpredictable.all_grasps))
-    return [
-        (title, found)
-        for of, every, without in pairs
-        for title, found in ((f"{of}, with", every), (f"{of}, without", without))
-    ]
 
 
 def outlier_table(judged: Judgement, name: str = "") -> TextTable | str:
@@ -189,44 +154,6 @@ def outlier_table(judged: Judgement, name: str = "") -> TextTable | str:
     return table
 
 
-def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTable:
-    """Counts and shares by object or scene."""
-    table = TextTable(title).names(head).numbers("trials", "TP", "FP", "FN", "TN")
-    table.numbers("right", "95 % CI", "precision", "recall")
-    for group in groups[:MAX_TABLE_ROWS]:
-        a = group.agreement
-        table.row(
-            group.name,
-            *(format_count(int(n)) for n in (a.trials, *a.cells)),
-            estimate_text(a.accuracy, percent=True),
-            bracketed_interval(a.accuracy, percent=True) or "-",
-            estimate_text(a.precision, percent=True),
-            estimate_text(a.recall, percent=True),
-        )
-    if len(groups) > MAX_TABLE_ROWS:
-        table.caption = f"the first {MAX_TABLE_ROWS} of {len(groups)}; the JSON has all"
-    return table
-
-
-def stopped_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
-    """Outcomes on the robot, or in the second run, by verdict."""
-    table = TextTable(f"Outcomes for each verdict{name}")
-    runs = comparison.kind == "runs"
-    table.texts("first run" if runs else "simulated").names("body in the way")
-    table.numbers("trials", "success in the second" if runs else "succeeded", "95 % CI")
-    for row in judged.stopped[:MAX_TABLE_ROWS]:
-        table.row(
-            outcome_label(row.outcome),
-            row.blocker,
-            format_count(row.trials),
-            estimate_text(row.successes, percent=True),
-            bracketed_interval(row.successes, percent=True) or "-",
-        )
-    if len(judged.stopped) > MAX_TABLE_ROWS:
-        table.caption = f"the first {MAX_TABLE_ROWS} of {len(judged.stopped)}; the JSON has all"
-    return table
-
-
 def calibration_table(
     comparison: Comparison, found: Sequence[MarginCalibration], name: str = ""
 ) -> TextTable:
@@ -239,8 +166,7 @@ def calibration_table(
     if weighted:
         table.numbers("AUROC, all grasps")
     for c in found:
-        cells = [format_count(c.trials), estimate_text(c.auroc, percent=False)]
-        cells.append(bracketed_interval(c.auroc, percent=False) or "-")
+        cells = [format_count(c.trials), *Figure(c.auroc, percent=False).texts]
         if weighted:
             cells.append(
                 "-" if c.auroc_weighted is None else format_number(c.auroc_weighted.value, 3)
@@ -254,22 +180,15 @@ def calibration_table(
     return table
 
 
-def placement_table(judged: Judgement, name: str = "") -> TextTable:
+def _placement_table(placement: PlacementAgreement, suffix: str) -> TextTable:
     """Agreement by placement."""
-    p = judged.placement
-    assert p is not None
-    limit = f"{p.limit_mm:g} mm"
-    groups = [
-        FactorGroup(name=f"all within {limit}", agreement=p.within),
-        FactorGroup(name="one farther off", agreement=p.beyond),
-        FactorGroup(name="not all measured", agreement=p.unmeasured),
-    ]
-    table = group_table(f"By placement of the objects{name}", "placement", groups)
-    if p.largest.auroc.value is not None:
-        table.caption = (
-            "AUROC of the largest offset for right verdicts:"
-            f" {estimate_text(p.largest.auroc, percent=False)} {bracketed_interval(p.largest.auroc, percent=False)}"
-        )
+    within = f"all within {placement.limit_mm:g} mm"
+    groups = placement_groups(placement, within, "one farther off")
+    title = f"By placement of the objects{suffix}"
+    table = group_table("placement", groups).text_table(title)
+    area = Figure(placement.largest.auroc, percent=False)
+    if area.estimate.value is not None:
+        table.caption = f"AUROC of the largest offset for right verdicts: {' '.join(area.texts)}"
     return table
 
 
@@ -286,43 +205,25 @@ def coverage_sentences(comparison: Comparison) -> str:
     return "; ".join(parts)
 
 
-CONFIDENCE_HEADING = "confidence of the first run"  # Heading of groups by confidence.
-
-
 def agreement_tables(found: RunAgreement) -> Iterator[TextTable]:
-    """What is alike by object, where the runs part by stage, and how far apart margins are; what
-    there is nothing of is left out."""
+    """Agreement by object, disagreements by stage, and differences of margins; empty tables are
+    left out."""
     if len(found.objects) > 1:
-        yield group_agreement_table("object", found.objects)
+        yield _run_agreement_table("object", found.objects)
     if found.apart:
         yield stage_table(found.apart)
     if found.parted:
         yield disagreement_table(found.parted)
     if found.confidence:
-        yield group_agreement_table(CONFIDENCE_HEADING, found.confidence)
+        yield _run_agreement_table(CONFIDENCE_HEADING, found.confidence)
     if found.margins:
         yield margin_bin_table(found.margins)
     if found.differences:
         yield margin_difference_table(found.differences)
 
 
-def group_agreement_table(head: str, groups: Sequence[FactorGroup]) -> TextTable:
-    """Held alike by what grasps have in common, such as their object."""
-    max_rows = 20  # Groups in the table; the JSON has all.
-    table = TextTable(f"Agreement on holding, by {head}").names(head)
-    table.numbers("grasps", "alike", "95 % CI", "kappa")
-    for group in groups[:max_rows]:
-        a = group.agreement
-        table.row(
-            group.name,
-            format_count(a.trials),
-            estimate_text(a.accuracy, percent=True),
-            bracketed_interval(a.accuracy, percent=True) or MISSING_NUMBER,
-            estimate_text(a.kappa, percent=False),
-        )
-    if len(groups) > max_rows:
-        table.caption = f"the first {max_rows} of {len(groups)}; the JSON has all"
-    return table
+def _run_agreement_table(head: str, groups: Sequence[FactorGroup]) -> TextTable:
+    return run_agreement_table(head, groups).text_table(f"Agreement on holding, by {head}")
 
 
 def stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
@@ -350,11 +251,6 @@ def disagreement_table(parted: Sequence[PartedGrasp]) -> TextTable:
     if len(parted) > max_rows:
         table.caption = f"{format_count(len(parted) - max_rows)} more in the JSON"
     return table
-
-
-def deciding_stages(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
-    """The stages of the second run that occur, in their order."""
-    return [stage.value for stage in Stage if any(stage.value in row for row in counts.values())]
 
 
 def margin_bin_table(margins: Sequence[MarginCalibration]) -> TextTable:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -28,36 +28,23 @@ from burg_drake.experiment.comparison.result_table import (
     IdColumn,
     ResultTable,
     TextFactor,
+    take_rows,
 )
-from burg_drake.experiment.trials.source_runs import grasp_content
+from burg_drake.experiment.trials.source_runs import grasp_contents
 from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet, is_success
 
 PREDICTION_NUMBERS = (*PREDICTOR_COLUMNS, "confidence")
 """Columns of numbers of the run that predicts."""
 PREDICTION_COLUMNS = (
-    *(
-        *GRASP_KEY_COLUMNS,
-        *GRASP_CONTENT_COLUMNS,
-        "object",
-        "outcome",
-        "stage",
-        "blocker",
-        "run",
-        "judged_again",
-    ),
-    *PREDICTION_NUMBERS,
+    *(*GRASP_KEY_COLUMNS, *GRASP_CONTENT_COLUMNS, "object", "outcome", "stage", "blocker"),
+    *("run", "judged_again", *PREDICTION_NUMBERS),
 )
 """Columns of the run that predicts."""
 MEASURED_MARGINS = tuple(name for name in PREDICTOR_COLUMNS if name != "score")
 """Margins that trials measure; a score belongs to the grasp."""
 REFERENCE_COLUMNS = (
-    *GRASP_KEY_COLUMNS,
-    *GRASP_CONTENT_COLUMNS,
-    "outcome",
-    "stage",
-    "judged_again",
-    "confidence",
-    *MEASURED_MARGINS,
+    *(*GRASP_KEY_COLUMNS, *GRASP_CONTENT_COLUMNS, "outcome", "stage", "judged_again"),
+    *("confidence", *MEASURED_MARGINS),
 )
 """Columns of the run whose verdicts count as the truth."""
 
@@ -101,19 +88,8 @@ class VerdictPairs:
 
     def take(self, rows: Values) -> VerdictPairs:
         """Some rows, as indices or truth values."""
-        factors = (
-            *("run", "scene", "object", "simulated", "stage", "blocker", "judged_again"),
-            "ended",
-        )
-        return replace(
-            self,
-            id=self.id.take(rows),
-            confidence=self.confidence[rows],
-            predicted=self.predicted[rows],
-            actual=self.actual[rows],
-            margins={name: values[rows] for name, values in self.margins.items()},
-            **{name: getattr(self, name).take(rows) for name in factors},
-        )
+        columns = {f.name: take_rows(getattr(self, f.name), rows) for f in fields(self)}
+        return VerdictPairs(**columns)
 
 
 def make_pairs(
@@ -152,11 +128,9 @@ def is_success_verdict(simulated: TextFactor, success: Success) -> Flags:
 
 def rows_without_prediction(simulated: TextFactor) -> dict[str, Flags]:
     """Which rows have a verdict that predicts nothing, by the verdict."""
-    # Verdicts without a completed simulation.
-    undecided_outcomes = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
     return {
         outcome.value: simulated.where([name == outcome.value for name in simulated.names])
-        for outcome in undecided_outcomes
+        for outcome in (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
         if outcome.value in simulated.names
     }
 
@@ -184,7 +158,14 @@ def predicted_probability(
         known |= lifted_shares(
             path, runs, None if isinstance(found, Campaign) else found.candidates.id
         )
-    return _look_up_shares(pairs, known) if places else None
+    if not places:
+        return None
+    values = np.full(len(pairs), np.nan)
+    tested = {hash for hash, _ in known}
+    rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
+    for row in rows.tolist():
+        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
+    return values
 
 
 def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
@@ -198,38 +179,17 @@ def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[st
     return [({run}, path) for run, path in own.items() if path is not None]
 
 
-def _look_up_shares(pairs: VerdictPairs, known: dict[tuple[str, str], float]) -> Array:
-    """(N,) shares of pairs by run and id."""
-    values = np.full(len(pairs), np.nan)
-    tested = {run for run, _ in known}
-    rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
-    for row in rows.tolist():
-        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
-    return values
-
-
 @dataclass(frozen=True, eq=False)
 class _TriedTable:
-    """A run with its rows by grasp."""
+    """A run with the content of the grasps that were tried, by id."""
 
     run: Run
+    contents: dict[str, str]
 
     @cached_property
     def rows(self) -> dict[str, int]:
+        """Rows of its results by grasp."""
         return {id: row for row, id in enumerate(self.run.results["id"].tolist())}
-
-    @cached_property
-    def candidates(self) -> dict[str, int]:
-        return {id: row for row, id in enumerate(self.run.candidates.id)}
-
-    def content(self, grasp: str) -> str:
-        """Hash of a grasp; empty if the run has none of this id."""
-        k = self.candidates.get(grasp)
-        if k is None:
-            return ""
-        candidates = self.run.candidates
-        instance, grasps = str(candidates.instance[k]), candidates.grasps
-        return grasp_content(instance, grasps.X_OG[k], float(grasps.width[k]))
 
 
 def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns, dict[int, str]]:
@@ -241,32 +201,32 @@ def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns
         side: the run, of one scene or of many.
 
     Returns:
-        Columns `PREDICTION_COLUMNS` for the trials that have a row, with their index in the sheet as `trial`;
-        and why others have none, by their index.
+        Columns `PREDICTION_COLUMNS` for the trials that have a row, with their index in the sheet
+        as `trial`; and why others have none, by their index.
 
     Raises:
         InvalidInputError: none has one, or a grasp is not the one that was planned with.
     """
     tables: dict[str, list[_TriedTable]] = {}
+    tried = {trial.grasp for trial in sheet.trials}
     for run in side.runs_of({source.scene.content for source in sheet.runs.values()}):
-        tables.setdefault(run.document.scene.content, []).append(_TriedTable(run))
+        table = _TriedTable(run, grasp_contents(run, tried))
+        tables.setdefault(run.document.scene.content, []).append(table)
     found: list[tuple[int, _TriedTable, int]] = []
     missing: dict[int, str] = {}
     for k, trial in enumerate(sheet.trials):
         source = sheet.runs[trial.run]
         there = tables.get(source.scene.content, [])
-        holds = [t for t in there if t.content(trial.grasp) == trial.content]
+        holds = [t for t in there if t.contents.get(trial.grasp) == trial.content]
         judged = [t for t in holds if trial.grasp in t.rows]
         if judged:
             judged.sort(key=lambda t: t.run.document.hash != source.hash)
             found.append((k, judged[0], judged[0].rows[trial.grasp]))
         else:
-            _reject_changed_grasp(
-                trial, [t for t in there if t.run.document.hash == source.hash], path
-            )
-            missing[k] = (
-                "is not judged" if holds else "is not there" if there else "is of another scene"
-            )
+            own = [t for t in there if t.run.document.hash == source.hash]
+            _reject_changed_grasp(trial, own, path)
+            elsewhere = "is not there" if there else "is of another scene"
+            missing[k] = "is not judged" if holds else elsewhere
     if not found:
         raise InvalidInputError(_no_common_grasps_message(sheet, path, side, missing))
     return _result_columns(found), missing
@@ -275,7 +235,7 @@ def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns
 def _reject_changed_grasp(trial: RealTrial, own: Sequence[_TriedTable], path: Path) -> None:
     """Refuses a trial whose own run has another grasp by its id, or none."""
     for table in own:
-        content = table.content(trial.grasp)
+        content = table.contents.get(trial.grasp)
         if content and content != trial.content:
             raise InvalidInputError(
                 f"{path}: trial {trial.number}: grasp {trial.grasp} of {table.run.path}"
@@ -292,7 +252,10 @@ def _no_common_grasps_message(
     sources = sheet.runs.values()
     if set(missing.values()) == {"is of another scene"}:
         theirs = {s.scene.content[:HASH_DIGITS]: s.scene.name for s in sources}
-        what = f"{path} is about scene {list_scene_names(theirs)}, but {side.path} holds {list_scene_names(side.scenes)}"
+        what = (
+            f"{path} is about scene {list_scene_names(theirs)}, but {side.path} holds"
+            f" {list_scene_names(side.scenes)}"
+        )
     else:
         what = f"no grasp of {path} is judged in {side.path}, which is on the same scene"
     meant = list_names([f"{source.path} ({source.hash})" for source in sources])

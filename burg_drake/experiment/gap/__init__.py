@@ -1,3 +1,3 @@
-"""Where simulation and reality part: real trials judged again, and one cause after the other.
+"""Gap between simulation and reality, step by step, and real trials judged again.
 
-Read `measurement` and `steps` first, then `rejudging`."""
+Read `gap_measurement` and `gap_steps` first, then `rejudging`."""

@@ -1,4 +1,4 @@
-"""Scenes with objects away from their planned poses: random errors, measured poses, their judge.
+"""Scenes with objects away from their planned poses, by random errors or as measured.
 
 The robot moves to the planned grasp, so X_WG stays. An object that stands elsewhere is grasped at
 X_O'G = inv(X_WO') X_WO X_OG.
@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,23 +20,17 @@ from burg_drake.core import (
     Array,
     BurgError,
     InvalidInputError,
-    Mode,
     Pose,
     Units,
-    content_hash,
     inverse,
     rng_from,
     rot_z,
     rotation_angle,
     setting,
 )
-from burg_drake.evaluation import Candidates, StationJudge, StationJudgeFactory, build_judge
+from burg_drake.evaluation import Candidates
 from burg_drake.experiment.trials.trial_sheet import ObjectPlace
 from burg_drake.scene import TOUCH_TOLERANCE, Scene, SceneIssue
-from burg_drake.station import Engine, Station
-
-if TYPE_CHECKING:
-    from burg_drake.simulation import TrialSettings
 
 
 def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
@@ -80,8 +73,7 @@ def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) 
 
 
 def candidates_as_commanded(planned: Scene, now: Scene, candidates: Candidates) -> Candidates:
-    """All grasps of a run as `grasps_as_commanded`; they keep their ids, by which they are told to be the
-    same motions of the hand."""
+    """All grasps of a run as `grasps_as_commanded`; they keep their ids."""
     X_OG = candidates.grasps.X_OG.copy()
     for name in np.unique(candidates.instance).tolist():
         of = candidates.instance == name
@@ -197,11 +189,10 @@ def draw_displaced_pose(
 def move_on_board(scene: Scene, name: str, p_S: Array, angle: float) -> Array:
     """(4, 4) pose of an object in the scene frame, moved by `p_S` (3,) [m] and turned by `angle`
     [rad] about the vertical through the middle of its box."""
-    entry, X_SO = scene.entry(name), scene.X_SO(name)
+    X_SO = scene.X_SO(name)
     if angle == 0.0 and not np.any(p_S):
         return X_SO
-    p_SM = X_SO[:3, :3] @ (np.add(entry.lower, entry.upper) / 2.0) + X_SO[:3, 3]
-    R = rot_z(angle)
+    p_SM, R = _object_center(scene, name), rot_z(angle)
     X = X_SO.copy()
     X[:3, :3] = R @ X_SO[:3, :3]
     X[:3, 3] = p_SM + R @ (X_SO[:3, 3] - p_SM) + p_S
@@ -214,13 +205,8 @@ def _objects_to_redraw(issues: Iterable[SceneIssue], movable: Iterable[str]) -> 
     return {name for pair in pairs for name in pair}.intersection(movable)
 
 
-class PoseMeasurementTolerances:
-    """Pose measurement tolerances."""
-
-    height = 0.005  # Metres above or below the planned pose that are a measuring error.
-    tilt = math.radians(5.0)  # Radians; an object with a larger tilt has fallen over.
-    separating_shift = 0.005  # Metres by which overlapping objects are moved apart at most.
-    board_overhang = 0.05  # Metres that an object may extend beyond the board, which is paper.
+MAX_HEIGHT_ERROR = 0.005  # metres from the planned height that are a measuring error
+MAX_TILT_ERROR = math.radians(5.0)  # an object with a larger tilt has fallen over
 
 
 Issues = Callable[[Scene], Iterable[SceneIssue]]
@@ -290,7 +276,7 @@ def correct_height_and_tilt(target: Array, measured: Array) -> tuple[Array, str]
     R_turned = _rotation_about_z(measured[:3, :3] @ target[:3, :3].T) @ target[:3, :3]
     tilt = float(rotation_angle(R_turned.T @ measured[:3, :3]))
     height = float(measured[2, 3] - target[2, 3])
-    if tilt > PoseMeasurementTolerances.tilt or abs(height) > PoseMeasurementTolerances.height:
+    if tilt > MAX_TILT_ERROR or abs(height) > MAX_HEIGHT_ERROR:
         return measured, ""
     X = measured.copy()
     X[:3, :3], X[2, 3] = R_turned, target[2, 3]
@@ -313,7 +299,8 @@ def _separate_objects(
     scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str]
 ) -> MeasuredScene:
     """The scene with overlapping objects moved apart, if they are within each other by little."""
-    max_iterations = 20  # Rounds of moving overlapping objects apart.
+    max_iterations = 20
+    max_shift = 0.005  # metres
     start = displaced_scene(scene, X_SO)
     now, shift = start, {name: np.zeros(3) for name in scene.instances}
     for _ in range(max_iterations):
@@ -326,17 +313,10 @@ def _separate_objects(
             half = _half_overlap(now, issue)
             shift[issue.instance] += half
             shift[issue.other] -= half
-        far = [
-            name
-            for name, p in shift.items()
-            if np.linalg.norm(p) > PoseMeasurementTolerances.separating_shift
-        ]
-        if far:
+        if any(np.linalg.norm(p) > max_shift for p in shift.values()):
             return MeasuredScene(None, tuple(notes), errors[0].message)
-        now = displaced_scene(
-            scene,
-            {n: move_on_board(start, n, shift[n], 0.0) for n in {*X_SO, *_shifted_objects(shift)}},
-        )
+        moved = {*X_SO, *_shifted_objects(shift)}
+        now = displaced_scene(scene, {n: move_on_board(start, n, shift[n], 0.0) for n in moved})
     else:
         return MeasuredScene(None, tuple(notes), errors[0].message)
     notes += [
@@ -350,8 +330,8 @@ def _is_significant(issue: SceneIssue) -> bool:
     """Whether a trial would be another one than that of the measured scene. The board is paper;
     what hovers falls, and only much of it is another scene."""
     if issue.kind == "out_of_bounds":
-        return issue.amount > PoseMeasurementTolerances.board_overhang
-    return issue.is_error or issue.amount > PoseMeasurementTolerances.height
+        return issue.amount > 0.05  # metres
+    return issue.is_error or issue.amount > MAX_HEIGHT_ERROR
 
 
 def _half_overlap(scene: Scene, issue: SceneIssue) -> Array:
@@ -370,41 +350,3 @@ def _object_center(scene: Scene, name: str) -> Array:
 
 def _shifted_objects(shift: Mapping[str, Array]) -> list[str]:
     return [name for name, p in shift.items() if np.any(p)]
-
-
-@dataclass(frozen=True)
-class SceneJudgeFactory:
-    """Builds the judge of a scene with all settings that a run has recorded.
-
-    Attributes:
-        scene, station: what to build.
-        engine, mode, settings: see `build_judge`.
-    """
-
-    scene: Scene
-    station: Station
-    engine: Engine
-    mode: Mode
-    settings: TrialSettings
-
-    def __call__(self) -> StationJudge:
-        return build_judge(
-            self.scene,
-            self.station,
-            engine=self.engine,
-            mode=self.mode,
-            settings=self.settings,
-        )
-
-    @property
-    def plain(self) -> Callable[[], StationJudge]:
-        """The usual factory, which does the same: clusters know how to send that one."""
-        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, self.settings)
-
-    @property
-    def content(self) -> str:
-        """Hash of all that decides about its verdicts, but for the versions."""
-        return content_hash(
-            *(self.scene.content, self.station.content, self.mode),
-            *(asdict(self.engine), asdict(self.settings)),
-        )

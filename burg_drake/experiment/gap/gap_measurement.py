@@ -64,6 +64,7 @@ from burg_drake.evaluation import (
     LocalExecutor,
     Run,
     StationJudge,
+    StationJudgeFactory,
     WriterLock,
     arm_settings,
     create_run,
@@ -80,9 +81,6 @@ from burg_drake.evaluation import (
     settings_numbers,
 )
 from burg_drake.experiment.gap.displaced_scenes import (
-    NoisyScene,
-    PlacementNoise,
-    SceneJudgeFactory,
     candidates_as_commanded,
     noisy_scene,
 )
@@ -125,17 +123,17 @@ def measure_gap(
     Raises:
         InvalidInputError: as `evaluate`; or the folder has other steps, or the run is incomplete.
     """
-    run = source if isinstance(source, Run) else None
-    if run is not None:
-        scene, station = run.scene(), run.station()
+    from burg_drake.station import SceneCheck
+
+    run = None
+    if isinstance(source, Run):
+        run, scene, station = source, source.scene(), source.station()
         if not run.complete:
             raise InvalidInputError(
                 f"{run.path} is not complete; finish it first with the command in its report"
             )
     else:
-        assert not isinstance(source, Run)
-        scene = as_scene(source)
-        station = as_station(station)
+        scene, station = as_scene(source), as_station(station)
     settings = settings or GapSettings()
     noise, samples, last = settings.noise, settings.samples, settings.last
     if last is None:
@@ -154,7 +152,8 @@ def measure_gap(
     extra: tuple[Run, ...] = ()
     if samples:
         run = steps[-1].runs[0]
-        scenes = list(_noisy_scenes(scene, station, noise, samples))
+        issues = SceneCheck(station, scene.library).issues
+        scenes = [noisy_scene(scene, noise, k, issues) for k in range(1, samples + 1)]
         held = [id for id, v in run.verdicts.items() if v.outcome.held]
         others = sorted({*tried}.intersection(run.candidates.id).difference(held))
         placing = _DisplacedJudging(
@@ -167,9 +166,7 @@ def measure_gap(
             redrawn=tuple(one.redrawn for one in scenes),
             kept={f"{k:03d}": one.kept for k, one in enumerate(scenes, 1) if one.kept},
         )
-    save_document(
-        document, path / GAP_DOCUMENT_FILE, GAP_DOCUMENT_HEADER
-    )  # with what was drawn, too
+    save_document(document, path / GAP_DOCUMENT_FILE, GAP_DOCUMENT_HEADER)
     return GapSteps(path, document, tuple(steps), extra)
 
 
@@ -306,16 +303,6 @@ def _start_reach_run(
             lines.append(id, verdict)
 
 
-def _noisy_scenes(
-    scene: Scene, station: Station, noise: PlacementNoise, samples: int
-) -> Iterator[NoisyScene]:
-    from burg_drake.station import SceneCheck
-
-    check = SceneCheck(station, scene.library)
-    for number in range(1, samples + 1):
-        yield noisy_scene(scene, noise, number, check.issues)
-
-
 @dataclass(frozen=True, eq=False)
 class _DisplacedJudging:
     """Judges grasps of a run in displaced scenes."""
@@ -405,7 +392,7 @@ def reach_verdicts(
     """
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     origin = origin_of(hand.document)
-    build = SceneJudgeFactory(
+    build = StationJudgeFactory(
         hand.scene(), hand.station(), origin.engine, "reach", origin.settings(f"{hand.path}: trial")
     )
     trials = {id: v for id, v in hand.verdicts.items() if _was_executed(v)}
@@ -415,7 +402,7 @@ def reach_verdicts(
     with Reporter(progress) as reporter:
         begin = Progress(STARTING_PHASE, len(known), len(hand.candidates))
         pace = ProgressMeter(reporter.show, begin, "asking the arm")
-        job = Job("reach", ReachOfHandFactory(build.plain, trials), todo)
+        job = Job("reach", ReachOfHandFactory(build, trials), todo)
         with closing(executor.judge([job])) as judged:
             for _, candidate, verdict in judged:
                 pace.step(outcome=verdict.outcome)

@@ -24,6 +24,7 @@ from burg_drake.evaluation import (
     tiles,
 )
 from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.comparison.figure_tables import named_row, number_cells
 from burg_drake.experiment.gap.gap_steps import (
     Change,
     GapSteps,
@@ -74,7 +75,7 @@ def gap_page(
         f"Where grasps are lost: {title}",
         element("style", Html(FLOW_CHART_STYLE)),
         header("Where grasps are lost", title, _subtitle(steps, success)),
-        *_paragraphs(step_sentences(steps, found, success)),
+        element("p", " ".join(step_sentences(steps, found, success)), class_="lead"),
         tiles(_tiles(steps, found)),
         flow_section(steps, found),
         objects_section(steps, success),
@@ -90,10 +91,6 @@ def _subtitle(steps: GapSteps, success: Success) -> str:
     counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
     about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
     return f"{about}; success: {counts}"
-
-
-def _paragraphs(sentences: Sequence[str]) -> list[Html]:
-    return [element("p", " ".join(sentences), class_="lead")]
 
 
 def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
@@ -157,13 +154,13 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
     """The picture of all steps."""
     if not found:
         return None
-    columns, scale = [], []
+    columns = []
     for step in steps.steps:
         outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
         plural = "" if len(step.runs) == 1 else "s"
         scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
         columns.append(FlowColumn(GAP_STEP_TITLES[step.name] + scenes, outcomes))
-        scale.append(1.0 / max(len(step.runs), 1))
+    scale = [1.0 / max(len(step.runs), 1) for step in steps.steps]
     return section(
         "From step to step",
         "How grasps end in each step; the colour of a band is that of the outcome in the"
@@ -185,8 +182,7 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
             good, all = counts.get(name, (0, 0))
             share = f"{good} of {all}" if all else "-"
             cells.append(share if step.name == "placed" else good)
-        numbers = [element("td", cell, class_="number") for cell in cells]
-        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+        rows.append(named_row(name, *number_cells(cells)))
     return section(
         "By object",
         "Grasps of each object that succeed in each step; in displaced scenes, successful trials.",
@@ -196,7 +192,6 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
 
 def change_section(change: Change) -> Html:
     """What one step changes: outcomes, objects, bodies in the way, and the grasps."""
-    title = GAP_STEP_TITLES[change.step].capitalize()
     lost, whole = len(change.lost), change.successes
     parts: list[Child] = []
     if whole:
@@ -208,6 +203,7 @@ def change_section(change: Change) -> Html:
         parts.append(element("p", left_out_sentence(change)))
     if change.lost or change.won:
         parts += [_flow_table(change), _objects_table(change), _change_list(change)]
+    title = GAP_STEP_TITLES[change.step].capitalize()
     return section(title, GAP_STEP_DESCRIPTIONS[change.step], *parts)
 
 
@@ -220,17 +216,10 @@ def _flow_table(change: Change) -> Html:
             m.blocker for m in change.moves if (m.before, m.after) == (before, after) and m.blocker
         )
         by = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
-        rows.append(
-            element(
-                "tr",
-                element("td", outcome_label(before)),
-                element("td", outcome_label(after)),
-                element("td", count, class_="number"),
-                element("td", by or "-", class_="faint"),
-            )
-        )
-    head = ["before", "after", "grasps", "in the way"]
-    return table(head, rows, numbers=(2,))
+        cells = [element("td", outcome_label(outcome)) for outcome in (before, after)]
+        cells += [*number_cells([count]), element("td", by or "-", class_="faint")]
+        rows.append(element("tr", *cells))
+    return table(["before", "after", "grasps", "in the way"], rows, numbers=(2,))
 
 
 def _objects_table(change: Change) -> Html | None:
@@ -240,10 +229,9 @@ def _objects_table(change: Change) -> Html | None:
         return None
     had = Counter(m.object for m in change.moves if m.lost or m.before.held)
     rows = [
-        element(
-            "tr",
-            element("th", name, scope="row"),
-            element("td", f"{count} of {had[name]}", class_="number"),
+        named_row(
+            name,
+            *number_cells([f"{count} of {had[name]}"]),
             element("td", ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))),
         )
         for name, count in lost.most_common()
@@ -282,16 +270,15 @@ def _change_row(move: OutcomeChange) -> Html:
 def push_section(steps: GapSteps) -> Html | None:
     """By how much the hand pushes objects before it closes."""
     arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
-    sentence = None if arm is None else count_pushes(arm.results)
-    if arm is None or sentence is None:
+    columns = {} if arm is None else arm.results
+    sentence = count_pushes(columns)
+    if sentence is None:
         return None
-    columns = arm.results
     went = np.isfinite(columns["pushed"])
+    missing = np.full(len(went), np.nan)
     target = np.array(
         [
-            columns[PUSHED_PREFIX + str(name)][k]
-            if PUSHED_PREFIX + str(name) in columns
-            else np.nan
+            columns.get(f"{PUSHED_PREFIX}{name}", missing)[k]
             for k, name in enumerate(columns["instance"])
         ]
     )
@@ -311,15 +298,14 @@ def push_section(steps: GapSteps) -> Html | None:
             f"{int((held & moved).sum())} of {int(moved.sum())}",
             f"{int((held & ~moved).sum())} of {int((~moved).sum())}",
         ]
-        numbers = [element("td", cell, class_="number") for cell in cells]
-        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+        rows.append(named_row(name, *number_cells(cells)))
     limit = f"{1e3 * MIN_PUSH:g} mm"
     head = ["object", "trials", f"pushed over {limit}", "median [mm]", "largest [mm]"]
     head += ["held if pushed", "held if not"]
     return section(
         "Pushed before the hand closes",
         f"{sentence} The table counts only the object to be grasped.",
-        table(head, rows, numbers=(1, 2, 3, 4, 5, 6)),
+        table(head, rows, numbers=range(1, 7)),
     )
 
 
@@ -329,15 +315,13 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
         return None
     rows = []
     for one in agreement:
-        cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
-        cells.append(one.unpredictable)
-        numbers = [element("td", cell, class_="number") for cell in cells]
+        cells = (f"{cell:g}" for cell in one.found.cells)
+        counts: list[Child] = [one.found.trials, *cells, one.unpredictable]
         shares = [
             element("td", _estimate_cell(one.estimated.figure(name)), class_="estimate")
             for name in ("precision", "recall", "accuracy")
         ]
-        head = element("th", GAP_STEP_TITLES[one.step], scope="row")
-        rows.append(element("tr", head, *numbers, *shares))
+        rows.append(named_row(GAP_STEP_TITLES[one.step], *number_cells(counts), *shares))
     names = ["step", "trials", "TP", "FP", "FN", "TN", "not predictable"]
     names += ["precision", "recall", "accuracy"]
     return section(
@@ -345,10 +329,9 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
         "Real trials compared with each step's verdicts on the same grasps, with 95 %"
         " intervals. Positive means: success is predicted (in displaced scenes: in more"
         f" than half of them). Here {reality_sentence(agreement)}. "
-        f"{'not predictable'.capitalize()} are trials with a failure that the step cannot"
-        " predict, for example that the arm has no path if the step judges the hand"
-        " alone.",
-        table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
+        "Not predictable are trials with a failure that the step cannot predict, for example"
+        " that the arm has no path if the step judges the hand alone.",
+        table(names, rows, numbers=range(1, 7)),
     )
 
 
@@ -360,17 +343,10 @@ def _estimate_cell(found: Estimate) -> Child:
     )
 
 
-class FlowChartLayout:
-    """Flow chart layout."""
-
-    width = 1000  # SVG units.
-    height = 430  # SVG units.
-    top = 34  # Room for the heads of columns.
-    right = 190  # Room for the names in the last column.
-    node_width = 14  # SVG units.
-    node_gap = 19  # Room for a name between two nodes.
-
-
+FLOW_CHART_SIZE = 1000, 430  # width and height in SVG units
+FLOW_CHART_TOP = 34  # room for the heads of columns
+NODE_WIDTH = 14
+NODE_GAP = 19  # room for a name between two nodes
 FLOW_CHART_STYLE = """
 .flow { width: 100%; min-width: 680px; height: auto; }
 .flow text { font-size: 13px; fill: var(--ink); paint-order: stroke; stroke: var(--paper);
@@ -409,12 +385,10 @@ def flow_chart(
     """
     whole = max((c.counts.total() * s for c, s in zip(columns, scale, strict=True)), default=1.0)
     rows = max(len(_count_by_group(column)) for column in columns)
-    unit = (FlowChartLayout.height - FlowChartLayout.top - FlowChartLayout.node_gap * rows) / max(
-        whole, 1e-9
-    )
-    step = (FlowChartLayout.width - FlowChartLayout.right - FlowChartLayout.node_width) / max(
-        len(columns) - 1, 1
-    )
+    width, height = FLOW_CHART_SIZE
+    unit = (height - FLOW_CHART_TOP - NODE_GAP * rows) / max(whole, 1e-9)
+    names_width = 190  # of the last column
+    step = (width - names_width - NODE_WIDTH) / max(len(columns) - 1, 1)
     places = [_node_tops(c, s * unit) for c, s in zip(columns, scale, strict=True)]
     bands: list[Html] = []
     for k, flow in enumerate(flows):
@@ -428,7 +402,7 @@ def flow_chart(
         "svg",
         *bands,
         *nodes,
-        viewBox=f"0 0 {FlowChartLayout.width} {FlowChartLayout.height}",
+        viewBox=f"0 0 {width} {height}",
         class_="flow",
         role="img",
         aria_label="Flow of grasps between outcomes; the tables below have the numbers",
@@ -442,10 +416,10 @@ def _count_by_group(column: FlowColumn) -> dict[str, int]:
 
 def _node_tops(column: FlowColumn, unit: float) -> dict[str, float]:
     """Upper edge of each group's node."""
-    y, places = float(FlowChartLayout.top), {}
+    y, places = float(FLOW_CHART_TOP), {}
     for name, count in _count_by_group(column).items():
         places[name] = y
-        y += count * unit + FlowChartLayout.node_gap
+        y += count * unit + NODE_GAP
     return places
 
 
@@ -460,17 +434,14 @@ def _draw_nodes(column: FlowColumn, places: dict[str, float], x: float, unit: fl
                 *("rect", tip),
                 x=f"{x:.1f}",
                 y=f"{y:.1f}",
-                width=FlowChartLayout.node_width,
+                width=NODE_WIDTH,
                 height=f"{height:.1f}",
                 class_=GROUP_CLASSES[name],
             )
         )
         middle = f"{y + height / 2 + 4.5:.1f}"
-        parts.append(
-            element(
-                "text", f"{count} {name}", x=f"{x + FlowChartLayout.node_width + 6:.1f}", y=middle
-            )
-        )
+        label = element("text", f"{count} {name}", x=f"{x + NODE_WIDTH + 6:.1f}", y=middle)
+        parts.append(label)
     return parts
 
 
@@ -492,9 +463,7 @@ def _draw_bands(
         first, second = pair
         thick = pairs[pair] * unit
         tip = element("title", f"{pairs[pair]}: {first} → {second}")
-        shape = _band_path(
-            x + FlowChartLayout.node_width, starts[first], x + step, ends[second], thick
-        )
+        shape = _band_path(x + NODE_WIDTH, starts[first], x + step, ends[second], thick)
         parts.append(element("path", tip, d=shape, class_=GROUP_CLASSES[second]))
         starts[first] += thick
         ends[second] += thick

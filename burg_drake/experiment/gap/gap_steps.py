@@ -1,4 +1,4 @@
-"""The steps of a gap measurement, the changes between them, and their agreement with real trials."""
+"""The steps of a gap measurement, the changes between them, and agreement with real trials."""
 
 from __future__ import annotations
 
@@ -196,15 +196,12 @@ def gap_changes(steps: GapSteps, success: Success) -> tuple[Change, ...]:
         steps: all steps.
         success: what counts.
     """
-    return tuple(
-        _make_change(before.runs[0], step, success) for before, step in pairwise(steps.steps)
-    )
-
-
-def _make_change(before: Run, step: GapStep, success: Success) -> Change:
-    moves = list(_outcome_changes(before, step.runs, success))
-    judged = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
-    return Change(step.name, judged, success, len(moves) - len(judged))
+    changes = []
+    for before, step in pairwise(steps.steps):
+        moves = list(_outcome_changes(before.runs[0], step.runs, success))
+        judged = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
+        changes.append(Change(step.name, judged, success, len(moves) - len(judged)))
+    return tuple(changes)
 
 
 def _outcome_changes(

@@ -45,9 +45,10 @@ def left_out_sentence(change: Change) -> str:
     """What is said of grasps that a step leaves out; empty if there are none."""
     if not change.failed:
         return ""
+    counts = "counts" if change.failed == 1 else "count"
     return (
-        f"{GAP_STEP_TITLES[change.step].capitalize()}: {change.failed} could not be simulated here or in the"
-        f" step before, and {'counts' if change.failed == 1 else 'count'} as neither lost nor won."
+        f"{GAP_STEP_TITLES[change.step].capitalize()}: {change.failed} could not be simulated here"
+        f" or in the step before, and {counts} as neither lost nor won."
     )
 
 
@@ -60,31 +61,25 @@ def _change_sentence(change: Change, document: GapDocument) -> str:
     share = f" ({format_percent(lost / whole)})"
     left = whole - lost + len(change.won)
     won = f", {len(change.won)} {_is_or_are(len(change.won))} won" if change.won else ""
-    if change.step == "reach":
+    outcomes = _failure_outcomes(change)
+    if change.step != "placed":
+        cause = "to the arm" if change.step == "reach" else "when the whole arm executes them"
         return (
-            f"Of these {whole}, {lost}{share} {_is_or_are(lost)} lost to the arm{_failure_outcomes(change)}{won};"
+            f"Of these {whole}, {lost}{share} {_is_or_are(lost)} lost {cause}{outcomes}{won};"
             f" {left} {_is_or_are(left)} left."
-        )
-    if change.step == "arm":
-        return (
-            f"Of these {whole}, {lost}{share} {_is_or_are(lost)} lost when the whole arm executes them"
-            f"{_failure_outcomes(change)}{won}; {left} {_is_or_are(left)} left."
         )
     low, high = change.share_lost
     return (
-        f"When objects stand {_noise_text(document)} from where they should be (standard deviations),"
+        f"When objects stand {document.place_mm:g} mm along x and y and {document.turn_deg:g}"
+        " degrees from where they should be (standard deviations),"
         f" {format_percent(lost / whole)} of the {whole} trials of these grasps in"
-        f" {document.samples} displaced scenes fail{_failure_outcomes(change)}; the 95 % interval is"
-        f" {100 * low:.0f} to {100 * high:.0f} %."
+        f" {document.samples} displaced scenes fail{outcomes}; the 95 % interval"
+        f" is {100 * low:.0f} to {100 * high:.0f} %."
     )
 
 
 def _is_or_are(count: int) -> str:
     return "is" if count == 1 else "are"
-
-
-def _noise_text(document: GapDocument) -> str:
-    return f"{document.place_mm:g} mm along x and y and {document.turn_deg:g} degrees"
 
 
 def _failure_outcomes(change: Change) -> str:
@@ -145,7 +140,7 @@ def _caption(steps: GapSteps) -> str:
 
 def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     """What each step does to the agreement with the robot."""
-    measures = ("precision", "recall", "accuracy")  # Measures in the table.
+    measures = ("precision", "recall", "accuracy")
     table = TextTable(
         "Compared with the robot",
         caption=f"{reality_sentence(agreement)}; positive: success predicted",
@@ -175,8 +170,8 @@ def gap_json(
     success: Success,
 ) -> dict[str, Any]:
     """All figures, and the grasps that change."""
-    results = {"arm": next((s.runs[0].results for s in steps.steps if s.name == "arm"), None)}
-    pushed = None if results["arm"] is None else count_pushes(results["arm"])
+    arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
+    pushed = None if arm is None else count_pushes(arm.results)
     return {
         "success": success,
         "asked": plain_data(steps.document),

@@ -91,7 +91,7 @@ class Rejudged:
         return None if failed or self.verdict is None else self.verdict.outcome
 
     @property
-    def why_not(self) -> str:
+    def failure_reason(self) -> str:
         """Why it could not be judged; empty if it was."""
         if self.outcome is not None:
             return ""
@@ -229,8 +229,8 @@ def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
 
 
 def match_runs_to_sources(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
-    """Which of some runs stands for each run of a sheet: itself, or else one of the same scene,
-    that which has most of the grasps.
+    """The run that stands for each run of a sheet: itself, or else the run of the same scene that
+    has most of the grasps.
 
     Args:
         sheet: the trials.
@@ -326,8 +326,9 @@ def rejudging_json(found: Rejudging) -> dict[str, Any]:
         "judged": len(found.judged),
         "unpredictable": found.causes["unpredictable"],
         "agree": {
-            name: _share_json(*found.agreement(measured=measured), count)
+            name: {"count": right, "of": count, "low": low, "high": high}
             for name, measured in (("planned", False), ("measured", True))
+            for right, low, high in [found.agreement(measured=measured)]
         },
         "precision": {
             name: {
@@ -349,10 +350,6 @@ def rejudging_json(found: Rejudging) -> dict[str, Any]:
     }
 
 
-def _share_json(count: int, low: float, high: float, whole: int) -> dict[str, float]:
-    return {"count": count, "of": whole, "low": low, "high": high}
-
-
 def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
     return {
         "number": trial.number,
@@ -363,6 +360,6 @@ def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
         "planned": trial.planned.value,
         "measured": None if trial.outcome is None else trial.outcome.value,
         "cause": trial.cause(found.success),
-        "why_not": trial.why_not,
+        "why_not": trial.failure_reason,
         "notes": list(trial.notes),
     }

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,12 +37,12 @@ from burg_drake.evaluation import (
     Journal,
     LocalExecutor,
     Run,
+    StationJudgeFactory,
     origin_of,
     read_journal,
     require_engine_for,
 )
 from burg_drake.experiment.gap.displaced_scenes import (
-    SceneJudgeFactory,
     grasps_as_commanded,
     measured_scene,
 )
@@ -63,10 +63,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class _RejudgeTask:
-    """A trial that is to be judged again; without a judge where its scene cannot be."""
+    """A trial that is to be judged again; without a judge if its scene cannot be built.
+
+    `judge_content` is a hash of all that decides about the verdicts of the judge, but for the
+    versions of the software.
+    """
 
     trial: Rejudged
-    factory: SceneJudgeFactory | None
+    factory: StationJudgeFactory | None = None
+    judge_content: str = ""
 
 
 def rejudge(
@@ -175,19 +180,23 @@ def _rejudge_task(
         reason=measured.reason,
     )
     if measured.scene is None:
-        return _RejudgeTask(trial, None)
+        return _RejudgeTask(trial)
     settings = origin.settings(f"{run.path}: trial")
-    factory = SceneJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
+    factory = StationJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
     X_OG = grasps_as_commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
+    judge_content = content_hash(
+        *(measured.scene.content, station.content, origin.mode),
+        *(asdict(origin.engine), asdict(settings)),
+    )
     packages = origin.engine.packages
     versions = software_versions({**JUDGING_PACKAGES, **packages})
     key = content_hash(
-        *(real.number, factory.content, grasp.instance, X_OG, grasp.width),
+        *(real.number, judge_content, grasp.instance, X_OG, grasp.width),
         *(versions[name] for name in ("burg_drake", "drake", *packages)),
     )
     id = f"{real.number}:{key[:12]}"
     candidate = Candidate(id, grasp.instance, X_OG, width=grasp.width)
-    return _RejudgeTask(replace(trial, candidate=candidate), factory)
+    return _RejudgeTask(replace(trial, candidate=candidate), factory, judge_content)
 
 
 def _with_verdict(
@@ -222,9 +231,9 @@ def _judge_tasks(
             continue
         total += 1
         if one.trial.candidate.id not in known:
-            key = one.factory.content
+            key = one.judge_content
             held = jobs[key].candidates if key in jobs else ()
-            jobs[key] = Job(key, one.factory.plain, (*held, one.trial.candidate))
+            jobs[key] = Job(key, one.factory, (*held, one.trial.candidate))
     if not jobs:
         return
     todo = sum(len(job.candidates) for job in jobs.values())

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from burg_drake.core import Stage, TextTable, format_percent, outcome_label
 from burg_drake.evaluation import command, interval_mark, section, table
+from burg_drake.experiment.comparison.figure_tables import named_row, number_cells
 from burg_drake.experiment.gap.rejudged_trials import (
     DISAGREEMENT_CAUSES,
     REJUDGED_TABLE_FILE,
@@ -102,18 +103,14 @@ def rejudged_view(found: Rejudging) -> TextTable:
 
 def rejudged_section(found: Rejudging) -> Html:
     """Counts, the table of both verdicts and reality, and the trials that changed."""
+    tables = _agreement_table(found), _verdict_table(found), _trial_list(found)
     return section(
         "Judged again where objects stood",
         " ".join(rejudged_sentences(found)),
-        *_space_tables(_agreement_table(found), _verdict_table(found), _trial_list(found)),
+        *(element("div", part, style="margin-top:20px") for part in tables if part is not None),
         element("p", f"Rows of {REJUDGED_TABLE_FILE} can be replayed in the scene as measured:"),
         command(replay_line(found, 1)),
     )
-
-
-def _space_tables(*parts: Html | None) -> list[Html]:
-    """Tables with some room between them."""
-    return [element("div", part, style="margin-top:20px") for part in parts if part is not None]
 
 
 def _agreement_table(found: Rejudging) -> Html:
@@ -129,14 +126,8 @@ def _agreement_table(found: Rejudging) -> Html:
             share = join(
                 interval_mark(count / whole, low, high), f" {format_percent(count / whole)}"
             )
-        rows.append(
-            element(
-                "tr",
-                element("th", name, scope="row"),
-                element("td", f"{count} of {whole}", class_="number"),
-                element("td", share, class_="estimate"),
-            )
-        )
+        counts = number_cells([f"{count} of {whole}"])
+        rows.append(named_row(name, *counts, element("td", share, class_="estimate")))
     return table(["verdict", "right", "share with 95 % interval"], rows, numbers=(1,))
 
 
@@ -146,15 +137,11 @@ def _verdict_table(found: Rejudging) -> Html:
     for planned in (True, False):
         for measured in (True, False):
             counts = [found.table[planned, measured, real] for real in (True, False)]
-            cells = [element("td", count, class_="number") for count in counts]
-            texts = [element("td", _outcome_word(value)) for value in (planned, measured)]
-            rows.append(element("tr", *texts, *cells))
+            words = ("success" if value else "failure" for value in (planned, measured))
+            texts = [element("td", word) for word in words]
+            rows.append(element("tr", *texts, *number_cells(counts)))
     head = ["as planned", "as measured", "robot: success", "robot: failure"]
     return table(head, rows, numbers=(2, 3))
-
-
-def _outcome_word(success: bool) -> str:
-    return "success" if success else "failure"
 
 
 def _trial_list(found: Rejudging) -> Html | None:
@@ -182,17 +169,12 @@ def _trial_rows(trials: Sequence[Rejudged], head: str) -> list[Html]:
     rows = []
     for k, trial in enumerate(trials[:max_rows]):
         more = f" (first {max_rows} of {len(trials)})" if len(trials) > max_rows else ""
-        measured = outcome_label(trial.outcome) if trial.outcome else trial.why_not
+        measured = outcome_label(trial.outcome) if trial.outcome else trial.failure_reason
         planned, real = outcome_label(trial.planned), outcome_label(trial.real)
         cells: list[Child] = [trial.object, planned, measured, real, "; ".join(trial.notes)]
-        rows.append(
-            element(
-                "tr",
-                element("th", f"{head}{more}" if k == 0 else "", scope="row"),
-                element("td", trial.number, class_="number"),
-                *(element("td", cell) for cell in cells),
-            )
-        )
+        name = "" if k else f"{head}{more}"
+        texts = (element("td", cell) for cell in cells)
+        rows.append(named_row(name, *number_cells([trial.number]), *texts))
     return rows
 
 

@@ -1,1 +1,1 @@
-"""Pages and pictures for the person at the robot: the trial protocol and where grasps are seen from."""
+"""Pages and pictures for the person at the robot: the trial protocol and the lab page."""

@@ -134,7 +134,6 @@ class LabCamera:
         Raises:
             BurgError: there is no picture with a pose, or a check is at work.
         """
-        picture_timeout = 5.0  # Seconds to wait for a picture.
         self.watch(number)
         with self._lock:
             if self.is_checking:
@@ -143,13 +142,13 @@ class LabCamera:
             assert view is not None
             stale = view.live.request_pictures()
             picture = view.live.picture if not stale else None
-            picture = picture or view.live.next_picture(stale, picture_timeout)
+            picture = picture or view.live.next_picture(stale, seconds=5.0)
             if picture is None or not picture.located.estimate.valid:
                 raise InvalidInputError(
                     "the board is not seen in the picture; move the camera or the light,"
                     " then check again"
                 )
-            refusal = self._refusal(number) if keep else ""
+            refusal = self._why_not_kept(number) if keep else ""
             self._measuring = (number, keep and not refusal)
             self._check = threading.Thread(
                 target=self._measure,
@@ -178,19 +177,19 @@ class LabCamera:
             "valid": picture is not None and picture.located.estimate.valid,
             "line": line,
             "checking": self.is_checking,
-            "measuring": self._measured_now(),
+            "measuring": self._running_check(),
             "drawn": self._drawn,
             "check": self._checked,
         }
 
-    def _measured_now(self) -> dict[str, Any] | None:
+    def _running_check(self) -> dict[str, Any] | None:
         """Which trial a check is at work for, and whether it is kept."""
         measuring = self._measuring
         if measuring is None or not self.is_checking:
             return None
         return {"number": measuring[0], "keep": measuring[1]}
 
-    def _refusal(self, number: int) -> str:
+    def _why_not_kept(self, number: int) -> str:
         """Why a photo that is taken now is not kept; empty if it is."""
         try:
             self._lab.require_open(number)
@@ -215,7 +214,7 @@ class LabCamera:
             report["objects"] = {n: _offset_row(p) for n, p in check.instances.items()}
             report["problem"] = check.reason or refusal
             if keep and not report["problem"]:
-                self._keep(number, located, check)
+                self._save(number, located, check)
                 report["kept"] = True
         except BurgError as error:
             report["problem"] = str(error)
@@ -226,7 +225,7 @@ class LabCamera:
         report["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
         self._checked = report
 
-    def _keep(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:
+    def _save(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
         path = self._lab.runs.path
         with tempfile.TemporaryDirectory() as folder:

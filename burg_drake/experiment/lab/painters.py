@@ -178,7 +178,7 @@ def _hand_body(station: Station, number: int, visual: HandVisual) -> DrawnBody:
 
 
 def count_bodies(pictures: Sequence[Sequence[PlacedBody]]) -> dict[str, tuple[DrawnBody, int]]:
-    """What pictures show: each body, and how often one of them shows it at most."""
+    """Each body in some pictures, and how often it is in a single picture at most."""
     found: dict[str, tuple[DrawnBody, int]] = {}
     for picture in pictures:
         counts: dict[str, int] = {}
@@ -223,8 +223,8 @@ class Painting:
     color: NDArray[np.uint8]
     owner: NDArray[np.int32]
 
-    def shows(self, placed: Sequence[PlacedBody], name: str) -> NDArray[np.bool_]:
-        """(H, W) which pixels show the bodies of a name."""
+    def visible_pixels(self, placed: Sequence[PlacedBody], name: str) -> NDArray[np.bool_]:
+        """(H, W) whether each pixel shows a body of this name."""
         mine = [i for i, one in enumerate(placed) if one.name == name]
         return np.isin(self.owner, mine)
 

@@ -22,7 +22,6 @@ from burg_drake.experiment.lab.trial_pictures import (
 from burg_drake.experiment.lab.tried_grasps import (
     MAIN_OUTCOMES,
     TriedRuns,
-    TriedScene,
     approach_text,
     closing_text,
     format_time,
@@ -43,15 +42,13 @@ def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated
         picture: JPEG of its grasp.
         show_simulated: whether it tells what was simulated.
     """
-    address = f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}"
-    width, height = GRASP_PICTURE_SIZE
     alt = f"the hand at the grasp of trial {trial.number}, on {trial.instance}"
     name = trial.instance
     if trial.object != trial.instance:
         name = f"{trial.instance} ({trial.object})"
     return element(
         "article",
-        element("figure", element("img", src=address, alt=alt, width=width, height=height)),
+        element("figure", _image(picture, alt, GRASP_PICTURE_SIZE)),
         element(
             "div",
             element("h3", element("b", trial.number), name),
@@ -80,18 +77,16 @@ def _grasp_description(trial: RealTrial, runs: TriedRuns, show_simulated: bool) 
 
 def _outcome_boxes(outcome: RealOutcome | None) -> Html:
     """A box for each outcome of the short list, and a line for others."""
-    tick_mark = "✕"  # In the box of the recorded outcome.
-    items = []
-    for known, (label, _) in MAIN_OUTCOMES.items():
-        chosen = known is outcome
-        box = element("i", tick_mark if chosen else "")
-        items.append(element("li", box, label, class_="chosen" if chosen else None))
-    other = outcome is not None and outcome not in MAIN_OUTCOMES
-    text = outcome_label(outcome) if other and outcome is not None else ""
-    line = element("span", text, class_="line")
-    items.append(
-        element("li", element("i", tick_mark if other else ""), "other:", line, class_="other")
-    )
+    ticked, empty = element("i", "✕"), element("i", "")
+    items = [
+        element("li", ticked, label, class_="chosen")
+        if known is outcome
+        else element("li", empty, label)
+        for known, (label, _) in MAIN_OUTCOMES.items()
+    ]
+    other = "" if outcome is None or outcome in MAIN_OUTCOMES else outcome_label(outcome)
+    line = element("span", other, class_="line")
+    items.append(element("li", ticked if other else empty, "other:", line, class_="other"))
     return element("ul", *items, class_="boxes")
 
 
@@ -139,13 +134,12 @@ def sheet_page(
     """
     options = options or SheetOptions()
     blocks = trials_by_block(runs.sheet)
-    style = page_style("burg_drake.experiment.lab", "sheet_page.css")
     sections = [
         _block_section(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]
     return html_document(
         f"Trials on the robot: {runs.path.name}",
-        style,
+        page_style("burg_drake.experiment.lab", "sheet_page.css"),
         _header(runs, blocks),
         *sections,
         element("footer", f"Written by burg_drake {burg_drake.__version__}."),
@@ -153,7 +147,6 @@ def sheet_page(
 
 
 def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Html:
-    # How to carry out the trials.
     instructions = (
         "Carry out the trials in the order of their numbers. Each block has one scene: set"
         " it up on its printed board as the pictures show, and again after every trial.",
@@ -166,7 +159,7 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
         " go on; repeat the trial at the end if there is time.",
     )
     sheet, tried = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
-    robots = list(dict.fromkeys(_robot_name(one) for one in tried))
+    robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in tried))
     scenes = list(dict.fromkeys(one.scene.name for one in tried))
     done = sum(trial.outcome is not None for trial in sheet.trials)
     count = len(sheet.trials)
@@ -184,10 +177,6 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
         element("ul", *(element("li", text) for text in instructions), class_="how"),
         _outcome_list(),
     )
-
-
-def _robot_name(tried: TriedScene) -> str:
-    return f"{tried.station.name} ({tried.station.hand.name})"
 
 
 def _outcome_list() -> Html:
@@ -210,7 +199,11 @@ def _block_section(
     which = f"trial {first}" if len(trials) == 1 else f"trials {first} to {last}"
     seen = pictures.setup(trials[0])
     figures = [
-        _figure(picture, f"{scene.name} {where}", where)
+        element(
+            "figure",
+            _image(picture, f"{scene.name} {where}", SETUP_PICTURE_SIZE),
+            element("figcaption", where),
+        )
         for picture, where in zip(seen, ("from above", "from the front"), strict=True)
     ]
     cards = [
@@ -227,16 +220,13 @@ def _block_section(
     return element("section", top, *cards, class_="block", id=f"block-{number}")
 
 
-def _figure(data: bytes, alt: str, caption: str) -> Html:
-    width, height = SETUP_PICTURE_SIZE
+def _image(data: bytes, alt: str, size: tuple[int, int]) -> Html:
     address = f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"
-    image = element("img", src=address, alt=alt, width=width, height=height)
-    return element("figure", image, element("figcaption", caption))
+    return element("img", src=address, alt=alt, width=size[0], height=size[1])
 
 
 def _placement_table(scene: Scene) -> Html:
     """Where each object stands."""
-    heads = ("object", "x [mm]", "y [mm]", "turned [°]", "height [mm]")
     rows = []
     for name in (*scene.background, *scene.instances):
         X_SO, thing = scene.X_SO(name), scene.instance(name).object
@@ -244,14 +234,13 @@ def _placement_table(scene: Scene) -> Html:
         p_SQ = transform_points(X_SO, np.asarray(surface.vertices))
         x, y, _ = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2.0
         turn = math.degrees(math.atan2(X_SO[1, 0], X_SO[0, 0]))
-        height = p_SQ[:, 2].max()
-        cells = (1e3 * x, 1e3 * y, turn, 1e3 * height)
+        cells = (1e3 * x, 1e3 * y, turn, 1e3 * p_SQ[:, 2].max())
         text = name if name == thing else f"{name} ({thing})"
         numbers = (element("td", f"{value:.0f}", class_="number") for value in cells)
         rows.append(element("tr", element("th", text, scope="row"), *numbers))
     head = [
         element("th", text, scope="col", class_="number" if k else None)
-        for k, text in enumerate(heads)
+        for k, text in enumerate(("object", "x [mm]", "y [mm]", "turned [°]", "height [mm]"))
     ]
     body = join(element("thead", element("tr", *head)), element("tbody", *rows))
     return element("div", element("table", body, class_="places"), class_="scroll")

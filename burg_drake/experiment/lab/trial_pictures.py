@@ -27,6 +27,7 @@ from burg_drake.experiment.lab.painters import (
     RayPainter,
     SceneBodies,
     Viewpoint,
+    VtkPainter,
     count_bodies,
 )
 from burg_drake.experiment.lab.tried_grasps import TriedRuns, trials_by_block
@@ -39,7 +40,7 @@ PICTURE_HALF_VIEW = 0.24  # Tangent of half the vertical angle of view.
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class ViewedGrasp:
     """A grasp to be looked at, in S [m].
 
     Attributes:
@@ -70,7 +71,7 @@ def camera_direction(azimuth: float, elevation: float) -> Array:
 
 
 def grasp_viewpoint(
-    subject: Subject, scene: RayCaster, hand: RayCaster, X_HS: Array, size: tuple[int, int]
+    subject: ViewedGrasp, scene: RayCaster, hand: RayCaster, X_HS: Array, size: tuple[int, int]
 ) -> Viewpoint:
     """The viewpoint from which a grasp shows most.
 
@@ -109,7 +110,7 @@ def _nearest_viewpoint(
 
 
 def _viewpoint_score(
-    subject: Subject,
+    subject: ViewedGrasp,
     scene: RayCaster,
     hand: RayCaster,
     X_HS: Array,
@@ -135,7 +136,7 @@ def _viewpoint_score(
     )
 
 
-def _finger_points(subject: Subject) -> Array:
+def _finger_points(subject: ViewedGrasp) -> Array:
     """(N, 3) points of both fingers."""
     half = subject.width / 2.0 + 0.005
     along = -np.linspace(0.0, 0.04, 6)
@@ -157,7 +158,7 @@ def mark_target(painting: Painting, placed: Sequence[PlacedBody], target: str) -
     """(H, W, 3) the picture with a rim around what is seen of the target, and others paler."""
     rim_width_share = 1 / 150  # Of the picture's height.
     fading = 0.45  # Blend towards white of bodies other than the target and the hand.
-    mine, hand = painting.shows(placed, target), painting.shows(placed, HAND_BODY)
+    mine, hand = painting.visible_pixels(placed, target), painting.visible_pixels(placed, HAND_BODY)
     faded = painting.color + fading * (255.0 - painting.color)
     image = np.where((mine | hand)[..., None], painting.color, np.round(faded)).astype(np.uint8)
     width = max(2, round(rim_width_share * image.shape[0]))
@@ -185,7 +186,7 @@ def write_names(
     for name in dict.fromkeys(
         one.name for one in placed if one.name not in (GROUND_BODY, HAND_BODY)
     ):
-        body = painting.shows(placed, name)
+        body = painting.visible_pixels(placed, name)
         bodies |= body
         rows, columns = np.nonzero(body)
         if len(rows) >= min_pixels:
@@ -204,7 +205,7 @@ def add_shadows(
     size = np.array([view.intrinsics.width, view.intrinsics.height])
     ahead = [hull for hull in hulls if _is_before_camera(hull, view)]
     light = painted_shadow(ahead, view.X_SC, view.intrinsics.focal[0], size)
-    ground = painting.shows(placed, GROUND_BODY)
+    ground = painting.visible_pixels(placed, GROUND_BODY)
     light = np.where(ground, light, 1.0)[..., None]
     return Painting(np.round(painting.color * light).astype(np.uint8), painting.owner)
 
@@ -254,8 +255,6 @@ class TrialPictures:
         if rays or missing_render_libraries():
             self._painter = RayPainter()
         else:
-            from burg_drake.experiment.lab.painters import VtkPainter
-
             self._painter = VtkPainter(count_bodies(shown))
 
     def paint_grasp(
@@ -311,7 +310,7 @@ class _Scenery:
             surface = scene.library.surface(scene.instance(instance).object)
             corners = np.asarray(surface.triangles_center)
             self._surfaces[instance] = transform_points(scene.X_SO(instance), corners)
-        subject = Subject(X_SG, width, self._surfaces[instance], self.bodies.corners(X_SG))
+        subject = ViewedGrasp(X_SG, width, self._surfaces[instance], self.bodies.corners(X_SG))
         return grasp_viewpoint(subject, self._rays, self._hand_rays, inverse(X_SG), size)
 
     @cached_property
@@ -345,7 +344,7 @@ class _Scenery:
 
 
 class PictureCache:
-    """Holds the pictures; makes them from the moment on that somebody asks for one. `close` it.
+    """Makes pictures in a thread, from the first request on, and keeps them. `close` it.
 
     Pictures are called `grasp/NUMBER`, of a trial, and `above/BLOCK` and `front/BLOCK`.
 
@@ -361,7 +360,7 @@ class PictureCache:
         self._wanted: deque[str] = deque()
         self._changed = threading.Condition()
         self._closed, self._fault = False, ""
-        self._thread = threading.Thread(target=self._work, name="pictures", daemon=True)
+        self._thread = threading.Thread(target=self._make_pictures, name="pictures", daemon=True)
 
     @property
     def names(self) -> list[str]:
@@ -396,12 +395,12 @@ class PictureCache:
         if len(number) > 9 or int(number) not in known:
             return None
         with self._changed:
-            if not self._over and self._thread.ident is None:
+            if not self._has_ended and self._thread.ident is None:
                 self._thread.start()
             if name not in self._made:
                 self._wanted.append(name)
                 self._changed.notify_all()
-            self._changed.wait_for(lambda: name in self._made or self._over, seconds)
+            self._changed.wait_for(lambda: name in self._made or self._has_ended, seconds)
             return self._made.get(name)
 
     @property
@@ -410,23 +409,23 @@ class PictureCache:
         return self._fault
 
     @property
-    def _over(self) -> bool:
+    def _has_ended(self) -> bool:
         return self._closed or bool(self._fault)
 
-    def _work(self) -> None:
+    def _make_pictures(self) -> None:
         try:
             pictures = TrialPictures(self._runs)
             ahead = deque(self.names)
-            while (name := self._next(ahead)) is not None:
+            while (name := self._next_name(ahead)) is not None:
                 if name not in self._made:
-                    self._keep(self._make(pictures, name))
+                    self._store(self._make(pictures, name))
             del pictures  # the renderer ends in the thread that it began in
         except BurgError as error:
             with self._changed:
                 self._fault = str(error)
                 self._changed.notify_all()
 
-    def _next(self, ahead: deque[str]) -> str | None:
+    def _next_name(self, ahead: deque[str]) -> str | None:
         """The picture to be made next; waits until one is wanted. None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._wanted or ahead)
@@ -435,15 +434,13 @@ class PictureCache:
             return self._wanted.pop() if self._wanted else ahead.popleft()
 
     def _make(self, pictures: TrialPictures, name: str) -> dict[str, bytes]:
-        grasp_size = (880, 660)  # Width and height in pixels.
-        setup_size = (900, 592)  # Width and height in pixels.
         kind, _, number = name.partition("/")
         if kind == "grasp":
-            return {name: pictures.grasp(self._trials[int(number)], grasp_size)}
-        above, front = pictures.setup(self._blocks[int(number)], setup_size)
+            return {name: pictures.grasp(self._trials[int(number)], size=(880, 660))}
+        above, front = pictures.setup(self._blocks[int(number)], size=(900, 592))
         return {f"above/{number}": above, f"front/{number}": front}
 
-    def _keep(self, made: dict[str, bytes]) -> None:
+    def _store(self, made: dict[str, bytes]) -> None:
         with self._changed:
             self._made |= made
             self._changed.notify_all()

@@ -8,30 +8,29 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from burg_drake.core import Array, InvalidInputError, RealOutcome, outcome_label as outcome_label
+from burg_drake.core import Array, InvalidInputError, RealOutcome, outcome_label
 from burg_drake.evaluation import Candidate, Run
 from burg_drake.experiment.trials.source_runs import load_sources
 from burg_drake.experiment.trials.trial_sheet import RealTrial, TrialSheet, load_trials
 from burg_drake.scene import Scene
 from burg_drake.station import Station
 
-_OUTCOME_MEANINGS: dict[RealOutcome, str] = {
-    RealOutcome.LIFTED: "held at the end of the lift, nothing else moved",
-    RealOutcome.LIFTED_DISTURBED: "held at the end of the lift, but another object was moved",
-    RealOutcome.LIFTED_TURNED: "held at the end of the lift, but turned or slid in the hand",
-    RealOutcome.SLIPPED: "gripped, and lost during the lift",
-    RealOutcome.DROPPED: "lifted, and lost while it was held",
-    RealOutcome.CLOSED_EMPTY: "the fingers closed without the object",
-    RealOutcome.HAND_COLLISION_APPROACH: "the hand hit something before it closed",
-    RealOutcome.PROTECTIVE_STOP: "the robot stopped by itself",
-    RealOutcome.PERCEPTION_FAILED: (
-        "the scene was not seen well enough to try; does not count for the grasp"
-    ),
-    RealOutcome.NOT_ATTEMPTED: "nobody tried; does not count for the grasp",
-}
-"""Meaning of each outcome, for operators."""
 MAIN_OUTCOMES: dict[RealOutcome, tuple[str, str]] = {
-    outcome: (outcome_label(outcome), meaning) for outcome, meaning in _OUTCOME_MEANINGS.items()
+    outcome: (outcome_label(outcome), meaning)
+    for outcome, meaning in {
+        RealOutcome.LIFTED: "held at the end of the lift, nothing else moved",
+        RealOutcome.LIFTED_DISTURBED: "held at the end of the lift, but another object was moved",
+        RealOutcome.LIFTED_TURNED: "held at the end of the lift, but turned or slid in the hand",
+        RealOutcome.SLIPPED: "gripped, and lost during the lift",
+        RealOutcome.DROPPED: "lifted, and lost while it was held",
+        RealOutcome.CLOSED_EMPTY: "the fingers closed without the object",
+        RealOutcome.HAND_COLLISION_APPROACH: "the hand hit something before it closed",
+        RealOutcome.PROTECTIVE_STOP: "the robot stopped by itself",
+        RealOutcome.PERCEPTION_FAILED: (
+            "the scene was not seen well enough to try; does not count for the grasp"
+        ),
+        RealOutcome.NOT_ATTEMPTED: "nobody tried; does not count for the grasp",
+    }.items()
 }
 """Label and meaning of the outcomes with the keys 1 to 9 and 0."""
 VERTICAL_TOLERANCE = math.radians(8.0)
@@ -40,18 +39,9 @@ VERTICAL_TOLERANCE = math.radians(8.0)
 
 def approach_text(X_SG: Array) -> str:
     """From where the hand of a grasp (4, 4) in S comes, in words."""
-    # Radians from vertical from which an approach is from the side.
-    min_side_tilt = math.radians(75.0)
-    # Side of the board, in steps of 45 degrees from +x.
-    sides = (
-        "right",
-        "far right",
-        "far side",
-        "far left",
-        "left",
-        "near left",
-        "near side",
-        "near right",
+    sides = (  # in steps of 45 degrees from +x
+        *("right", "far right", "far side", "far left"),
+        *("left", "near left", "near side", "near right"),
     )
     approach_S = X_SG[:3, 2]
     tilt = math.acos(max(-1.0, min(1.0, float(-approach_S[2]))))
@@ -61,7 +51,7 @@ def approach_text(X_SG: Array) -> str:
     degrees = round(math.degrees(tilt))
     if tilt > math.pi / 2 + VERTICAL_TOLERANCE:
         return f"from below, from the {side}, {degrees}° from straight down"
-    if tilt > min_side_tilt:
+    if tilt > math.radians(75.0):
         return f"from the {side}, level ({degrees}° from straight down)"
     return f"from above, {degrees}° from the {side}"
 
@@ -129,7 +119,7 @@ class TriedRuns:
             raise InvalidInputError(
                 f"{path} has no trials; burg-drake trials plan makes a file with trials"
             )
-        used = {trial.run: None for trial in self.sheet.trials}
+        used = dict.fromkeys(trial.run for trial in self.sheet.trials)
         runs = load_sources(self.sheet, path, moved=moved, only=used)
         self._tried = {
             key: TriedScene(run, run.scene(), run.station()) for key, run in runs.items()

@@ -1,3 +1,3 @@
-"""The trials on the robot: which grasps, in which order, and what became of each.
+"""The trials on the robot: which grasps, in which order, and how each trial ended.
 
-Read `sheet` first, then `entries` and `export`."""
+Read `trial_sheet` first, then `trial_book` and `motion_export`."""

@@ -7,7 +7,7 @@ depend on the order of the runs, and a smaller selection is a part of a larger o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ from burg_drake.evaluation import (
     lifted_shares,
     load_runs,
 )
-from burg_drake.experiment.trials.source_runs import grasp_content
+from burg_drake.experiment.trials.source_runs import grasp_contents
 from burg_drake.experiment.trials.trial_sheet import Selection, Stratum, is_success
 
 
@@ -77,7 +77,7 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
     runs: dict[str, Run] = {}
     places = []
     for one in given:
-        for run in _load_runs(one):
+        for run in _open_runs(one):
             places.append(str(run.path))
             if not run.document.hash or not len(run.results["id"]):
                 continue
@@ -122,7 +122,7 @@ def list_eligible_grasps(
         pool = _make_pool(key, run, among, notes)
         world = (run.document.scene.content, run.document.station.content)
         if world in shared:
-            own = content_by_id(run)
+            own = grasp_contents(run)
             twice = np.isin(pool.cells("id"), [id for id, c in own.items() if c in owned[world]])
             owned[world].update(own.values())
             if twice.any():
@@ -135,18 +135,7 @@ def list_eligible_grasps(
     return sorted((p for p in pools if len(p.rows)), key=lambda p: p.key), notes
 
 
-def content_by_id(run: Run, only: Collection[str] | None = None) -> dict[str, str]:
-    """Content of the grasps of a run, or of some of them, by id."""
-    grasps = run.candidates.grasps
-    cells = zip(run.candidates.id, run.candidates.instance, grasps.X_OG, grasps.width, strict=True)
-    return {
-        id: grasp_content(str(name), X_OG, float(width))
-        for id, name, X_OG, width in cells
-        if only is None or id in only
-    }
-
-
-def _load_runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
+def _open_runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
     if isinstance(one, Run):
         return [one]
     return one.runs if isinstance(one, Campaign) else load_runs(one)
@@ -177,14 +166,13 @@ def _shared_worlds(runs: dict[str, Run]) -> set[tuple[str, str]]:
 
 def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
     """Keys for runs on scenes of the same name."""
-    min_digits = 4  # Digits of a hash in a key.
     if len(runs) == 1:
         return [name]
     modes = [run.document.mode for run in runs]
     if len(set(modes)) == len(modes):
         return [f"{name}-{mode}" for mode in modes]
     hashes = [run.document.hash for run in runs]
-    digits = min_digits
+    digits = 4
     while len({hash[:digits] for hash in hashes}) < len(hashes):
         digits += 1
     return [f"{name}-{hash[:digits]}" for hash in hashes]
@@ -266,12 +254,6 @@ def allocate_to_strata(
     return chosen
 
 
-def divide_evenly(labels: Sequence[str], wanted: int) -> dict[str, int]:
-    """How many of each stratum are asked for, the first ones one more."""
-    share, more = divmod(wanted, len(labels))
-    return {label: share + (k < more) for k, label in enumerate(labels)}
-
-
 def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
     if name not in pool.run.results or name not in MarginNames.all:
         there = [margin for margin in MarginNames.all if margin in pool.run.results]
@@ -329,23 +311,17 @@ def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
     missing = [s for s in strata if s.selected < s.wanted]
     if not missing:
         return []
-    total = sum(stratum.selected for stratum in strata)
+    total, first = sum(stratum.selected for stratum in strata), strata[0]
     labels = " and ".join(s.label for s in missing)
     counts = ", ".join(f"{s.selected} of {s.wanted}" for s in missing)
     description = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
-    first = strata[0]
     if total == wanted:
         rest = "; others make up for it"
-        return [
-            Shortfall(
-                first.run, first.object, f"too few with {labels}{rest}", counts, description + rest
-            )
-        ]
+        kind = f"too few with {labels}{rest}"
+        return [Shortfall(first.run, first.object, kind, counts, description + rest)]
+    rest = f"; {total} of {wanted} in all"
     kind = f"too few with {labels}, and in all"
-    in_all = f"{total} of {wanted} in all"
-    return [
-        Shortfall(first.run, first.object, kind, f"{counts}; {in_all}", f"{description}; {in_all}")
-    ]
+    return [Shortfall(first.run, first.object, kind, counts + rest, description + rest)]
 
 
 def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
@@ -355,9 +331,9 @@ def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
         kinds[one.kind].append(one)
     lines = [_shortfall_line(kind, members) for kind, members in kinds.items()]
     more = len(lines) - MAX_SHORTFALL_ITEMS
-    return (
-        lines if more <= 0 else [*lines[:MAX_SHORTFALL_ITEMS], f"and {more} more such shortfalls"]
-    )
+    if more > 0:
+        lines[MAX_SHORTFALL_ITEMS:] = [f"and {more} more such shortfalls"]
+    return lines
 
 
 def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
@@ -443,7 +419,8 @@ def _make_strata(
     """Strata of one object, with how many of each are chosen."""
     seed = selection.seed
     first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
-    asked = divide_evenly(first, selection.per_object)
+    share, more = divmod(selection.per_object, len(first))
+    asked = {label: share + (k < more) for k, label in enumerate(first)}
     taken = allocate_to_strata({k: len(v) for k, v in members.items()}, selection.per_object, first)
     return {
         f"{pool.key}/{held}/{label}": Stratum(
@@ -465,5 +442,4 @@ def _balancing_quantity(selection: Selection) -> str:
 def _random_order(pool: EligibleGrasps, members: Sequence[int], seed: int) -> list[int]:
     """Places in a random order that follows from the grasps themselves."""
     ids = pool.cells("id")
-    world = pool.scene
-    return sorted(members, key=lambda k: content_hash(seed, "grasp", world, str(ids[k])))
+    return sorted(members, key=lambda k: content_hash(seed, "grasp", pool.scene, str(ids[k])))

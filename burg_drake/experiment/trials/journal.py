@@ -62,7 +62,6 @@ def lock_trials_file(sheet_path: Path) -> Iterator[None]:
 
 
 def _acquire_lock(file: int, sheet_path: Path) -> None:
-    poll_interval = 0.01  # Seconds between attempts to lock.
     until = time.monotonic() + TRIALS_LOCK_TIMEOUT
     while True:
         try:
@@ -72,10 +71,10 @@ def _acquire_lock(file: int, sheet_path: Path) -> None:
             raise missing_locks_error(sheet_path, error) from error
         if time.monotonic() > until:
             raise InvalidInputError(
-                f"{sheet_path} has been locked by another process for {TRIALS_LOCK_TIMEOUT:g} s; nothing"
-                " was recorded"
+                f"{sheet_path} has been locked by another process for {TRIALS_LOCK_TIMEOUT:g} s;"
+                " nothing was recorded"
             )
-        time.sleep(poll_interval)
+        time.sleep(0.01)
 
 
 How = Literal["recorded", "corrected", "again", "restored", "kept"]
@@ -93,8 +92,8 @@ class Entry:
         number, grasp, content: of the trial.
         at: when it was recorded, ISO 8601.
         how: what was done.
-        before, after: values of `JOURNAL_FIELDS` in the file, as plain data; those at their default are
-            left out.
+        before, after: values of `JOURNAL_FIELDS` in the file, as plain data, without those at
+            their default.
     """
 
     number: int
@@ -140,9 +139,8 @@ def replace_entered_values(trial: RealTrial, values: Mapping[str, Any]) -> RealT
     """
     plain = plain_data(trial) | dict(values)
     text = dump_document({name: value for name, value in plain.items() if value is not None})
-    found: RealTrial = Reader("the journal").read(
-        parse_yaml_node(text, "the journal"), RealTrial, ""
-    )
+    name = "the journal"
+    found: RealTrial = Reader(name).read(parse_yaml_node(text, name), RealTrial, "")
     return found
 
 
@@ -173,7 +171,7 @@ def damaged_lines(path: Path) -> list[int]:
 
 def _read_lines(path: Path) -> Iterator[tuple[int, Entry | None]]:
     """The lines of a journal with their numbers; None for one that cannot be read."""
-    max_line_size = 1 << 24  # Bytes.
+    max_line_size = 1 << 24  # bytes
     if not path.exists():
         return
     with open_regular(path) as stream:
@@ -257,9 +255,8 @@ def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingV
         missing = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
         if differing:
             edited = tuple(name for name in differing if name not in missing)
-            found.append(
-                MissingValues(trial.number, {name: last.get(name) for name in missing}, edited)
-            )
+            values = {name: last.get(name) for name in missing}
+            found.append(MissingValues(trial.number, values, edited))
     return found
 
 
@@ -286,8 +283,7 @@ def parse_real_outcome(name: str) -> RealOutcome:
 
 
 def check_entry(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """An entry whose fields exist, with the outcome as such and without blanks around words."""
-    text_fields = ("operator", "note")  # Fields that people write.
+    """Checks the fields of an entry, parses its outcome, and strips blanks around texts."""
     for name, value in entry.items():
         if name not in EMPTY_ENTRY:
             raise UnknownNameError(
@@ -295,17 +291,17 @@ def check_entry(entry: Mapping[str, Any]) -> dict[str, Any]:
             )
         if isinstance(value, str) and "\0" in value:
             raise InvalidInputError(f"{name} has a NUL character: {quote_value(value)}")
-    outcome = entry.get("outcome")
-    words = {name: entry[name].strip() for name in text_fields if isinstance(entry.get(name), str)}
-    return {
-        **entry,
-        **words,
-        **({} if outcome is None else {"outcome": parse_real_outcome(outcome)}),
-    }
+    checked = dict(entry)
+    for name in ("operator", "note"):
+        if isinstance(entry.get(name), str):
+            checked[name] = entry[name].strip()
+    if entry.get("outcome") is not None:
+        checked["outcome"] = parse_real_outcome(entry["outcome"])
+    return checked
 
 
 def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, Any]:
-    """With a report of the robot that has what is told besides what is known."""
+    """Adds the robot's report of a trial to fields of the report in an entry."""
     robot = given.get("robot")
     if not isinstance(robot, Mapping):
         return dict(given)
@@ -313,7 +309,7 @@ def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, 
 
 
 def contains_value(value: Any, present: Any) -> bool:
-    """Whether a value says all that is there."""
+    """Whether a new value repeats the present one, or all fields that a report has so far."""
     if isinstance(value, RobotReport) and isinstance(present, RobotReport):
         return all(v in (None, getattr(value, k)) for k, v in vars(present).items())
     return bool(value == present)

@@ -1,6 +1,6 @@
 """Timed robot motions of the trials: one file for each trial, named by its number.
 
-017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plans`
+017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plan_files`
 index.csv                    all trials with their files, or the reason why there is no motion
 runs/KEY/                    the verdicts on the grasps of each run; a repeated call reuses them
 """

@@ -73,16 +73,16 @@ class SheetText:
         sheet = read_document(root, TrialSheet, name)
         return cls(name, text, sheet, *_locate_trials(root, text))
 
-    def after(self, text: str) -> SheetText:
-        """Reads another text, of which this one may be an earlier state.
+    def read_changed(self, text: str) -> SheetText:
+        """Reads a later text of the file; where one trial has changed, only its lines.
 
         Raises:
             DocumentError: it does not fit the schema.
         """
         if text == self.text:
             return self
-        place = self._changed(text)
-        found = None if place is None else self._after_change_of(place, text)
+        place = self._find_changed_trial(text)
+        found = None if place is None else self._replace_trial_lines(place, text)
         return found or SheetText.read(text, self.name)
 
     def with_trial(self, new: RealTrial) -> SheetText:
@@ -101,13 +101,15 @@ class SheetText:
             line = self.text.count("\n", 0, start) + node.start_mark.line
         else:
             start, end = 0, len(self.text)
-            node = _find_trial_nodes(parse_yaml_node(self.text, self.name)).value[place]
+            root = parse_yaml_node(self.text, self.name)
+            trials_node = next(value for key, value in root.value if key.value == "trials")
+            node = trials_node.value[place]
             line = node.start_mark.line
         own = self.text[start:end]
         try:
             changed = _apply_edits(own, _list_edits(_LineIndex(own), node, old, new))
             text = self.text[:start] + changed + self.text[end:]
-            found = self._after_change_of(place, text) or SheetText.read(text, self.name)
+            found = self._replace_trial_lines(place, text) or SheetText.read(text, self.name)
             if found.sheet == dataclasses.replace(self.sheet, trials=tuple(trials)):
                 return found
         except (InvalidInputError, yaml.YAMLError):
@@ -117,7 +119,7 @@ class SheetText:
             " cannot change; write it as 'key: value' lines, without aliases"
         )
 
-    def _after_change_of(self, place: int, text: str) -> SheetText | None:
+    def _replace_trial_lines(self, place: int, text: str) -> SheetText | None:
         """Another text that differs in the lines of one trial; None if all of it has to be read."""
         if not self.starts:
             return None
@@ -133,7 +135,7 @@ class SheetText:
             return None
         return SheetText(self.name, text, sheet, starts, self.column)
 
-    def _changed(self, text: str) -> int | None:
+    def _find_changed_trial(self, text: str) -> int | None:
         """The place of the one trial within whose lines another text differs; None if it may differ
         elsewhere."""
         if not self.starts:
@@ -240,11 +242,6 @@ class _LineIndex:
         """Where the line of an offset ends, before its break."""
         found = _LINE_BREAK.search(self.text, offset)
         return found.start() if found else len(self.text)
-
-
-def _find_trial_nodes(root: yaml.Node) -> yaml.Node:
-    node: yaml.Node = next(value for key, value in root.value if key.value == "trials")
-    return node
 
 
 def _list_edits(text: _LineIndex, node: yaml.Node, old: RealTrial, new: RealTrial) -> list[Edit]:

@@ -1,4 +1,4 @@
-"""The runs from which the grasps of a trials file were chosen; checks that they have not changed."""
+"""The runs from which the grasps of a trials file were chosen, and checks for changes."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
     return content_hash(instance, pose, float(width))[:HASH_DIGITS]
 
 
-def grasp_contents(run: Run, ids: Iterable[str]) -> dict[str, str]:
-    """`grasp_content` of those of some grasps that a run has, by id."""
-    grasps, instances, wanted = run.candidates.grasps, run.candidates.instance, {*ids}
+def grasp_contents(run: Run, ids: Iterable[str] | None = None) -> dict[str, str]:
+    """`grasp_content` of the grasps of a run by id; of those in `ids` if it is given."""
+    grasps, instances = run.candidates.grasps, run.candidates.instance
+    wanted = None if ids is None else {*ids}
     return {
         id: grasp_content(str(instances[k]), grasps.X_OG[k], float(grasps.width[k]))
         for k, id in enumerate(run.candidates.id)
-        if id in wanted
+        if wanted is None or id in wanted
     }
 
 
@@ -92,7 +93,10 @@ def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
         `run` is the hash of the run, as in the table.
     """
     names = list(dict.fromkeys(name for run in runs.values() for name in run.results))
-    rows = {key: _rows_by_id(run) for key, run in runs.items()}
+    rows = {
+        key: {id: row for row, id in enumerate(run.results["id"].tolist())}
+        for key, run in runs.items()
+    }
     columns: Columns = {}
     for name in names:
         cells = [
@@ -103,10 +107,6 @@ def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
         missing = "" if text else np.nan
         columns[name] = np.array([missing if cell is None else cell for cell in cells])
     return columns
-
-
-def _rows_by_id(run: Run) -> dict[str, int]:
-    return {id: row for row, id in enumerate(run.results["id"].tolist())}
 
 
 def _load_source(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:

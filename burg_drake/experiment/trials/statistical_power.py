@@ -118,7 +118,7 @@ def effective_trials(strata: Mapping[str, Stratum]) -> float:
 
 def power_table(sheet: TrialSheet) -> TextTable:
     """How wide 95 % intervals will be, a row a figure."""
-    shares = (0.5, 0.8, 0.95)  # Success rates of the table's columns; at 0.5 intervals are widest.
+    shares = (0.5, 0.8, 0.95)  # intervals are widest at 0.5
     table = TextTable("Half-width of the 95 % interval if the share turns out to be").names("share")
     table.numbers("trials", *(f"{100 * share:.0f} %" for share in shares))
     for row in expected_estimates(sheet):
@@ -135,9 +135,8 @@ def power_table(sheet: TrialSheet) -> TextTable:
 
 def detectable_difference_sentence(trials: int) -> str:
     """Which difference between two methods will show, in a sentence."""
-    # Shares of trials in which only the method that is worse overall is right.
-    reversed_shares = (0.0, 0.05, 0.1)
-    found = {worse: smallest_difference(trials, worse) for worse in reversed_shares}
+    # By the share of trials in which only the method that is worse overall is right.
+    found = {worse: smallest_difference(trials, worse) for worse in (0.0, 0.05, 0.1)}
     if all(math.isnan(size) for size in found.values()):
         return (
             f"{trials} trials are too few for McNemar's exact test (5 %) to tell two"

@@ -81,14 +81,14 @@ class TrialBook:
         Raises:
             InvalidInputError: there is none.
         """
-        return self._chosen(self.sheet(), number)
+        return self._find_trial(self.sheet(), number)
 
     def entries(self) -> list[Entry]:
         """All that was ever recorded, in order."""
         return read_entries(journal_path(self.path))
 
     def damage(self) -> str:
-        """Damaged lines of the journal, and what to do about them; "" if there are none."""
+        """A message about damaged lines of the journal; empty if there are none."""
         journal = journal_path(self.path)
         lines = damaged_lines(journal)
         if not lines:
@@ -100,7 +100,7 @@ class TrialBook:
         )
 
     def missing_values(self) -> list[MissingValues]:
-        """What the file lacks of that; see `entries.missing_values`."""
+        """Entries that the file lacks; see `journal.missing_values`."""
         return missing_values(self.sheet(), self.entries())
 
     def record(
@@ -150,7 +150,7 @@ class TrialBook:
             return new
 
         how: How = "again" if again else "corrected" if correct else "recorded"
-        return self._change(number, change, how)
+        return self._record_change(number, change, how)
 
     def restore(self, numbers: Sequence[int] | None = None) -> list[RealTrial]:
         """Enters again what the file lacks; what was edited by hand stays.
@@ -162,7 +162,7 @@ class TrialBook:
             The trials that were changed.
         """
         return [
-            self._change(lost.number, lambda trial: self._restored(trial), "restored")
+            self._record_change(lost.number, self._restore_values, "restored")
             for lost in self.missing_values()
             if lost.values and (numbers is None or lost.number in numbers)
         ]
@@ -177,12 +177,12 @@ class TrialBook:
             These trials.
         """
         return [
-            self._change(found.number, lambda trial: trial, "kept")
+            self._record_change(found.number, lambda trial: trial, "kept")
             for found in self.missing_values()
             if numbers is None or found.number in numbers
         ]
 
-    def _restored(self, trial: RealTrial) -> RealTrial:
+    def _restore_values(self, trial: RealTrial) -> RealTrial:
         """With the last entry's value of each field that has an older one; under the lock."""
         lost = [found.values for found in self.missing_values() if found.number == trial.number]
         return replace_entered_values(trial, lost[0]) if lost else trial
@@ -217,13 +217,13 @@ class TrialBook:
                     " whether this corrects it, or whether the trial was done again"
                 ).about("correct", "again")
 
-    def _change(
+    def _record_change(
         self, number: int | Literal["next"], change: Callable[[RealTrial], RealTrial], how: How
     ) -> RealTrial:
         with lock_trials_file(self.path):
             while True:
                 before = self._read()
-                old = self._chosen(before.sheet, number)
+                old = self._find_trial(before.sheet, number)
                 new = change(old)
                 if new == old and how != "kept":
                     return old
@@ -241,7 +241,7 @@ class TrialBook:
                 self._known = after
         return new
 
-    def _chosen(self, sheet: TrialSheet, number: int | Literal["next"]) -> RealTrial:
+    def _find_trial(self, sheet: TrialSheet, number: int | Literal["next"]) -> RealTrial:
         if number != "next":
             try:
                 return sheet.trial(number)
@@ -252,9 +252,9 @@ class TrialBook:
         return sheet.next
 
     def _read(self) -> SheetText:
-        """What the file holds now; read anew is only what has changed since the last look."""
-        text, known, name = read_text(self.path), self._known, str(self.path)
-        known = SheetText.read(text, name) if known is None else known.after(text)
+        """What the file holds now; only what has changed since the last call is parsed."""
+        text, known = read_text(self.path), self._known
+        known = SheetText.read(text, str(self.path)) if known is None else known.read_changed(text)
         self._known = known
         return known
 

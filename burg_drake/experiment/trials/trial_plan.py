@@ -31,14 +31,13 @@ from burg_drake.evaluation import Campaign, Run
 from burg_drake.experiment.trials.grasp_selection import (
     Chosen,
     EligibleGrasps,
-    content_by_id,
     draw_scenes,
     gather_runs,
     list_eligible_grasps,
     select_grasps,
 )
 from burg_drake.experiment.trials.journal import entered_values, journal_path, read_entries
-from burg_drake.experiment.trials.source_runs import make_source_run
+from burg_drake.experiment.trials.source_runs import grasp_contents, make_source_run
 from burg_drake.experiment.trials.trial_sheet import (
     Balance,
     RealTrial,
@@ -223,8 +222,8 @@ def require_unused(path: str | Path) -> None:
 def _shuffle_trials(
     chosen: Chosen, selection: Selection
 ) -> list[tuple[int, EligibleGrasps, int, str]]:
-    """With the number of the block in front: blocks of a scene in a random order, and grasps in a
-    random order in each."""
+    """Grasps with the number of their block: blocks of a scene, and grasps of a block, in a random
+    order."""
     seed = selection.seed
     by_scene: defaultdict[str, list[tuple[str, EligibleGrasps, int, str]]] = defaultdict(list)
     for pool, k, key in chosen:
@@ -250,12 +249,8 @@ def _make_trials(
     ordered: Sequence[tuple[int, EligibleGrasps, int, str]], strata: Mapping[str, Stratum]
 ) -> tuple[RealTrial, ...]:
     pools = {pool.key: pool for _, pool, _, _ in ordered}
-    hashes = {
-        key: content_by_id(
-            pool.run, {str(pool.cells("id")[k]) for _, p, k, _ in ordered if p is pool}
-        )
-        for key, pool in pools.items()
-    }
+    tried = {str(pool.cells("id")[k]) for _, pool, k, _ in ordered}
+    hashes = {key: grasp_contents(pool.run, tried) for key, pool in pools.items()}
     cells = {
         key: {name: pool.cells(name) for name in ("id", "instance", "object", "outcome")}
         for key, pool in pools.items()

@@ -333,13 +333,12 @@ def is_success(outcome: Outcome | RealOutcome, success: Success) -> bool:
 
 
 def load_trials(path: str | Path) -> TrialSheet:
-    """Reads a trials file; see `core.documents.load_document`."""
+    """Reads a trials file; see `load_document`."""
     return load_document(path, TrialSheet)
 
 
 def save_trials(sheet: TrialSheet, path: str | Path) -> None:
-    """Writes a trials file anew; see `core.documents.save_document`."""
-    # Comment at the top of the file.
+    """Writes a trials file; see `save_document`."""
     header = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the
 rest by hand, or with burg-drake trials record and burg-drake trials serve."""
     save_document(sheet, path, header)

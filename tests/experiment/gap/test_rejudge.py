@@ -132,7 +132,7 @@ def test_each_trial_is_judged_where_its_objects_stood(run: Run, found: Rejudging
     assert differences(planned, as_planned.verdict) == []
     assert as_planned.notes == () and as_planned.outcome is Outcome.LIFTED
     assert away.verdict.outcome.value in MISSED
-    assert within.outcome is None and "overlap" in within.why_not
+    assert within.outcome is None and "overlap" in within.failure_reason
     assert other_away.outcome is Outcome.LIFTED
     assert "mug as planned (not seen)" in other_away.notes
     assert "box as planned (not measured)" in other_away.notes
@@ -271,7 +271,7 @@ def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
 
     found = rejudge(sheet, "trials.yaml", tmp_path, executor=Failing(), progress=False)  # type: ignore[arg-type]
     assert found.judged == () and found.paired.p_value is None
-    assert found.trials[0].why_not == "SimulationError: no such world"
+    assert found.trials[0].failure_reason == "SimulationError: no such world"
     assert "None of the trials could be judged again." in rejudged_sentences(found)[0]
     assert "no such world" in rejudged_section(found)
 

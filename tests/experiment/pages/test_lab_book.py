@@ -69,9 +69,7 @@ def test_a_late_copy_does_not_undo_a_correction(lab: LabBook, trials: Path) -> N
 def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     mine, theirs = entry(lab, 1, "lifted"), entry(lab, 1, "slipped", operator="CD")
     lab.enter(theirs)
-    with pytest.raises(
-        EntryConflict, match="trial 1 was changed by someone else: it now has slipped by CD"
-    ):
+    with pytest.raises(EntryConflict, match="now has slipped by CD"):
         lab.enter(mine)
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
     lab.enter(replace(mine, replaces=trial_state_hash(load_trials(trials).trial(1))))

@@ -25,9 +25,9 @@ def test_both_painters_see_the_same(
         )
         assert np.array_equal(view.X_SC, other.X_SC)
         for name in (HAND_BODY, *runs.of(trial).scene.instances):
-            a, b = one.shows(placed, name), two.shows(also, name)
+            a, b = one.visible_pixels(placed, name), two.visible_pixels(also, name)
             assert (a ^ b).sum() <= 0.02 * max(a.sum(), 1) + 40, name
-        assert one.shows(placed, HAND_BODY).sum() > 1500
+        assert one.visible_pixels(placed, HAND_BODY).sum() > 1500
 
 
 def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: TrialPictures) -> None:
@@ -36,7 +36,7 @@ def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: Trial
         # A projection of its own: pinhole, pixel centres at integers, S to C.
         R, p = view.X_SC[:3, :3], view.X_SC[:3, 3]
         X_SG, half = runs.X_SG(trial), runs.width(trial) / 2 + 0.006
-        hand = painting.shows(placed, HAND_BODY)
+        hand = painting.visible_pixels(placed, HAND_BODY)
         away = cv2.distanceTransform((~hand).astype(np.uint8), cv2.DIST_L2, 5)
         for side in (-half, half):
             x, y, z = R.T @ ((X_SG @ [side, 0.0, -0.02, 1.0])[:3] - p)
@@ -45,7 +45,7 @@ def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: Trial
             v = focal * y / z + (SMALL[1] - 1) / 2
             assert 0 <= u < SMALL[0] and 0 <= v < SMALL[1]
             assert away[round(v), round(u)] < 12, trial.grasp
-        target = painting.shows(placed, trial.instance)
+        target = painting.visible_pixels(placed, trial.instance)
         assert target.sum() > 400, trial.grasp
         assert (painting.owner == NO_BODY).mean() < 0.6
 
@@ -56,7 +56,7 @@ def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
     data = np.frombuffer(pictures.grasp(trial, SMALL), np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
     orange = np.abs(image - TARGET_RIM_COLOR).max(axis=2) < 70
-    mask = painting.shows(placed, trial.instance).astype(np.uint8)
+    mask = painting.visible_pixels(placed, trial.instance).astype(np.uint8)
     near = cv2.dilate(mask, np.ones((9, 9))) > 0
     assert orange[near].sum() > 60
     assert orange[~near].sum() < 0.1 * orange[near].sum()
