@@ -153,7 +153,8 @@ def sizes() -> None:
     print(
         f"a chunk of {ChunkSettings.max_grasps} grasps: {there} bytes there"
         f" ({empty} without grasps), {back} bytes back;"
-        f" {there / ChunkSettings.max_grasps:.0f} and {back / ChunkSettings.max_grasps:.0f} a grasp",
+        f" {there / ChunkSettings.max_grasps:.0f} and"
+        f" {back / ChunkSettings.max_grasps:.0f} a grasp",
         flush=True,
     )
 

@@ -2,8 +2,8 @@
 
 Drake's wheel brings everything but a few libraries of the operating system. Without GLib pydrake
 cannot be imported; without Mesa's driver a first rendering ends the process with a segmentation
-fault, hence the look beforehand. Only the standard library is imported here: the set-up runs this
-file before anything else is known to work.
+fault, so this is checked first. Only the standard library is imported here, since
+tools/setup/set_up.sh runs this file before anything else is known to work.
 """
 
 from __future__ import annotations
@@ -18,16 +18,15 @@ from pathlib import Path
 
 
 class SystemLibrary:
-    """System library."""
+    """Shared libraries of the operating system, by what is loaded."""
 
     glib = "libglib-2.0.so.0"  # Needed to import pydrake.
     egl = "libEGL.so.1"  # Needed to render.
-    mesa_egl = "libEGL_mesa.so.0"
-    mesa_driver = "swrast_dri.so"
+    mesa_egl = "libEGL_mesa.so.0"  # Mesa's EGL, for machines without a graphics driver.
+    mesa_driver = "swrast_dri.so"  # Mesa's software renderer.
     atomic = "libatomic.so.1"  # Lets a faster memory allocator load.
 
 
-# Debian's and Ubuntu's package for each of them.
 _DEBIAN_PACKAGES = {
     SystemLibrary.glib: "libglib2.0-0",
     SystemLibrary.egl: "libegl1",
@@ -36,12 +35,8 @@ _DEBIAN_PACKAGES = {
     SystemLibrary.atomic: "libatomic1",
 }
 """Packages of Debian and Ubuntu by library."""
-# Releases with at least this glibc (Ubuntu 24.04, Debian 13) have the 64-bit time_t names.
-_DEBIAN_T64_PACKAGES = _DEBIAN_PACKAGES | {
-    SystemLibrary.glib: "libglib2.0-0t64"
-}  # Packages of releases with 64-bit time.
-
-# EGL implementations of graphics drivers that need nothing of Mesa.
+_DEBIAN_T64_PACKAGES = _DEBIAN_PACKAGES | {SystemLibrary.glib: "libglib2.0-0t64"}
+"""Likewise for releases with a 64-bit time_t, such as Ubuntu 24.04 and Debian 13."""
 
 
 def missing_import_libraries() -> list[str]:
@@ -63,7 +58,7 @@ def missing_render_libraries() -> list[str]:
     missing = missing_import_libraries()
     if not _can_load(SystemLibrary.egl):
         missing.append(SystemLibrary.egl)
-    if any(_can_load(vendor) for vendor in ("libEGL_nvidia.so.0",)):
+    if _can_load("libEGL_nvidia.so.0"):  # it needs nothing of Mesa
         return missing
     if not _can_load(SystemLibrary.mesa_egl):
         missing.append(SystemLibrary.mesa_egl)
@@ -73,8 +68,8 @@ def missing_render_libraries() -> list[str]:
 
 
 def missing_useful_libraries() -> list[str]:
-    """System libraries that nothing needs, but for which trials run faster: without libatomic the
-    allocator of the package cmeel-mimalloc cannot be loaded."""
+    """Optional system libraries that make trials faster: without libatomic the allocator of the
+    package cmeel-mimalloc cannot be loaded."""
     return (
         [SystemLibrary.atomic]
         if sys.platform == "linux" and not _can_load(SystemLibrary.atomic)
@@ -83,7 +78,7 @@ def missing_useful_libraries() -> list[str]:
 
 
 def apt_packages(missing: Sequence[str]) -> list[str]:
-    """Debian and Ubuntu packages, named as in this release, that bring the `missing` libraries."""
+    """Debian and Ubuntu packages with the `missing` libraries, by the names of this release."""
     t64_glibc = (2, 39)  # First glibc of releases with 64-bit time.
     version = platform.libc_ver()[1] or "0"
     glibc = tuple(int(part) for part in version.split(".")[:2])
@@ -144,8 +139,8 @@ def _has_mesa_driver() -> bool:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Says what is missing; with `--packages` prints names of Debian's packages only, those of
-    useful libraries among them.
+    """Prints what is missing; with `--packages` only Debian's packages, those of optional libraries
+    as well.
 
     Returns:
         0 if nothing is missing, 1 if images cannot be rendered, 2 if pydrake cannot be imported.

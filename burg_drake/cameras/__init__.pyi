@@ -224,9 +224,9 @@ from .source_opening import (
 )
 from .text_tags import (
     draw_notice as draw_notice,
-    place_tags as place_tags,
+    draw_tags as draw_tags,
+    find_tag_corners as find_tag_corners,
     render_tag as render_tag,
-    write_tags as write_tags,
 )
 from .top_view import (
     BoardObservation as BoardObservation,

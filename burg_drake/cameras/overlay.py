@@ -22,7 +22,7 @@ from burg_drake.cameras.scene_projection import (
     clip_lines,
     visible_lines,
 )
-from burg_drake.cameras.text_tags import TEXT_COLOR, draw_notice, render_tag, write_tags
+from burg_drake.cameras.text_tags import TEXT_COLOR, draw_notice, draw_tags, render_tag
 from burg_drake.core import (
     CATEGORY_COLORS,
     Array,
@@ -253,7 +253,7 @@ class Overlay:
                 # Fraction of the image's height.
                 plates.append(render_tag("  ".join(words), color, round(0.028 * len(drawn))))
         if plates:
-            write_tags(drawn, np.array(boxes), plates, owner != NO_OWNER)
+            draw_tags(drawn, np.array(boxes), plates, owner != NO_OWNER)
 
 
 def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:

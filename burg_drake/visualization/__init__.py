@@ -1,7 +1,7 @@
 """Meshcat views and pictures: scenes, grasps coloured by outcome, replays.
 
-Read `scene_view` and `grasp_view` first. `colors` and `html_page` are shared by all views and pages,
-`meshcat_drawing` by those in Meshcat.
+Read `scene_view` and `grasp_view` first. All views and pages share `colors` and `html_page`; those in
+Meshcat share `meshcat_drawing`.
 """
 
 import lazy_loader

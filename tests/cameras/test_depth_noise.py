@@ -317,9 +317,7 @@ def test_images_that_do_not_fit_are_refused() -> None:
     small = replace(CAMERA, width=320, height=240)
     with pytest.raises(InvalidInputError, match="the depth image has 640 x 480 pixels, but"):
         noisy_depth(wall(), noise, small, np.random.default_rng(0))
-    with pytest.raises(
-        InvalidInputError, match=r"shape \(480, 640\) and type uint16; expected \(H, W\)"
-    ):
+    with pytest.raises(InvalidInputError, match=r"\(480, 640\) and type uint16; expected \(H, W\)"):
         measured(np.ones(SHAPE, np.uint16), noise)  # type: ignore[arg-type]
     broken = wall()
     broken[7, 9] = np.nan

@@ -27,8 +27,8 @@ from burg_drake.cameras import (
     build_scene_mesh,
     correction_mark,
     draw_notice,
+    find_tag_corners,
     instance_labels,
-    place_tags,
     rasterize_lines,
     visible_lines,
 )
@@ -411,7 +411,7 @@ def test_tags_lie_beside_each_other() -> None:
     low = rng.uniform((0, 0), (560, 420), (7, 2))
     boxes = np.stack([low, low + rng.uniform(10, 60, (7, 2))], axis=1)
     sizes = [(int(w), 20) for w in rng.integers(40, 110, 7)]
-    corners = place_tags(boxes, sizes, np.zeros((480, 640), bool))
+    corners = find_tag_corners(boxes, sizes, np.zeros((480, 640), bool))
     taken = np.zeros((480, 640), int)
     for (x, y), (w, h) in zip(corners, sizes, strict=True):
         assert 0 <= x <= 640 - w and 0 <= y <= 480 - h
@@ -424,11 +424,11 @@ def test_tags_lie_on_no_body() -> None:
     that of a bar at the upper edge, which has no room above, below it."""
     bodies = np.ones((480, 640), bool)
     bodies[:, 500:] = False
-    (corner,) = place_tags(np.array([[[400.0, 200.0], [495.0, 260.0]]]), [(80, 20)], bodies)
+    (corner,) = find_tag_corners(np.array([[[400.0, 200.0], [495.0, 260.0]]]), [(80, 20)], bodies)
     assert corner[0] >= 499 and 180 <= corner[1] <= 270
     bar = np.zeros((480, 640), bool)
     bar[:30, 100:400] = True
-    (corner,) = place_tags(np.array([[[100.0, 0.0], [399.0, 29.0]]]), [(80, 20)], bar)
+    (corner,) = find_tag_corners(np.array([[[100.0, 0.0], [399.0, 29.0]]]), [(80, 20)], bar)
     assert not bar[corner[1] : corner[1] + 20, corner[0] : corner[0] + 80].any()
 
 

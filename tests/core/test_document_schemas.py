@@ -185,7 +185,7 @@ def test_all_documents_with_a_version_have_a_schema() -> None:
 
 
 def test_a_kind_that_does_not_exist() -> None:
-    with pytest.raises(UnknownNameError, match="there is no document 'scen'; did you mean 'scene'"):
+    with pytest.raises(UnknownNameError, match=r"'scen'; .*'scene'"):
         json_schema("scen")
 
 

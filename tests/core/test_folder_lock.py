@@ -61,7 +61,5 @@ def test_a_file_system_without_locks_is_named(
         raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(
-        InvalidInputError, match=r"is on a file system without file locks \(Op.* not"
-    ):
+    with pytest.raises(InvalidInputError, match="file system without file locks"):
         FolderLock(tmp_path)

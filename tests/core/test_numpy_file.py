@@ -78,9 +78,7 @@ def test_entries_are_looked_at_before_they_are_unpacked(
             file.array("other").read("f")
         with pytest.raises(InvalidInputError, match=r"other has shape .*; expected \(3,\)"):
             file.array("other").read("f", (3,))
-        with pytest.raises(
-            InvalidInputError, match="rare is compressed in a way that numpy does not use"
-        ):
+        with pytest.raises(InvalidInputError, match="rare is compressed"):
             file.array("rare")
 
 

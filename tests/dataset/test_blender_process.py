@@ -19,7 +19,7 @@ def test_no_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, "no_such_blender")
     with pytest.raises(
         MissingDependencyError,
-        match=r"'no_such_blender', which is not an executable: pip install 'burg",
+        match=r"'no_such_blender'.*pip install",
     ):
         burg.render("tabletop_six", "panda_tabletop", renderer="blender")
     recipe = burg.dataset.DatasetRecipe(renderer="blender", views=1)
@@ -76,8 +76,7 @@ def test_a_crash_is_told_with_the_last_lines() -> None:
     )
     with pytest.raises(
         SimulationError,
-        match=r"^Blender ended by SIGABRT while loading a scene; its last lines: first \| out"
-        r" of memory$",
+        match=r"SIGABRT while loading a scene; .*first \| out of memory$",
     ):
         image_of(dying, EMPTY)
     assert not dying.alive

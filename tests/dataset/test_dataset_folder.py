@@ -59,9 +59,7 @@ def test_the_index_is_that_of_wids(tmp_path: Path) -> None:
         }
     before = (tmp_path / "index.json").read_bytes()
     (tmp_path / "index.json").unlink()
-    with pytest.raises(
-        InvalidInputError, match=r"has no index\.json, so the data set is not finished"
-    ):
+    with pytest.raises(InvalidInputError, match=r"has no index\.json"):
         load_dataset(tmp_path)
     write_index(tmp_path)
     assert (tmp_path / "index.json").read_bytes() == before
@@ -91,9 +89,7 @@ def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
     assert [one.key for one in dataset[1:3]] == ["000012_001", "000013_000"]
     with pytest.raises(IndexError, match="has no sample 4; it has 4"):
         dataset[4]
-    with pytest.raises(
-        UnknownNameError, match="samples have no part 'colour'; did you mean 'color'"
-    ):
+    with pytest.raises(UnknownNameError, match=r"'colour'; .*'color'"):
         dataset.read(0, ["colour"])
 
 

@@ -166,7 +166,7 @@ def test_the_same_call_continues_after_the_cluster_was_lost(folder: Path, tmp_pa
 
     there = tmp_path / "set"
     try:
-        with pytest.raises(ClusterError, match=r"results so far are kept: .* run the same command"):
+        with pytest.raises(ClusterError, match=r"are kept: .* the same command"):
             burg.generate_dataset(
                 SCENES, STATION, there, RECIPE, cluster=nodes.address, progress=kill
             )

@@ -103,9 +103,7 @@ def test_the_arm_is_where_the_view_has_it(meshcat: Meshcat) -> None:
     home = transform(meshcat, "/drake/visualizer/arm/panda_link7")
     turn = home[:3, :3].T @ turned[:3, :3]
     assert np.arccos((np.trace(turn) - 1) / 2) == pytest.approx(0.5)
-    with pytest.raises(
-        InvalidInputError, match="joint positions of 3 joints; the arm of the station has 7"
-    ):
+    with pytest.raises(InvalidInputError, match=r"3 joints; .* has 7"):
         show_sample(sample(view=drawn.view()), drawn.scene(), STATION, meshcat)
 
 

@@ -273,7 +273,7 @@ def test_another_run_is_not_mixed_in(
             settings=EvaluationSettings(grasps_per_object=5, blind=True, mode="hand"),
             progress=False,
         )
-    with pytest.raises(InvalidInputError, match=r"sampled blind there, 5 an object, clear of the"):
+    with pytest.raises(InvalidInputError, match="blind there, 5 an object, clear"):
         evaluate(
             scene, station, run, settings=EvaluationSettings(grasps_per_object=5), progress=False
         )
@@ -283,9 +283,7 @@ def test_another_run_is_not_mixed_in(
     whole = evaluate(scene, station, run, **asked(only=["bar", "cube"], **blind))
     assert whole.complete
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
-    with pytest.raises(
-        InvalidInputError, match="5 an object, sampled blind there, 1 given here"
-    ) as error:
+    with pytest.raises(InvalidInputError, match="blind there, 1 given here") as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
     assert "approach angle" not in str(error.value)  # it goes with the sampling
 
@@ -437,7 +435,7 @@ def test_bad_input_is_said_before_any_work(
         evaluate_in("run", workers=0)
     with pytest.raises(InvalidInputError, match="'xlsx' does not exist"):
         evaluate_in("run", table="xlsx")
-    with pytest.raises(UnknownNameError, match="engine 'standart' does not exist; did you mean"):
+    with pytest.raises(UnknownNameError, match="engine 'standart'"):
         evaluate_in("run", engine="standart")
     with pytest.raises(InvalidInputError, match=r"^grasps_per_object is 0; give 1 or more$"):
         evaluate_in("run", grasps_per_object=0)

@@ -41,9 +41,7 @@ def test_short_forms() -> None:
 
 @pytest.mark.parametrize("host", ["10.0.0.1", "head.example.org", "[2001:db8::1]", "0.0.0.0"])
 def test_plain_tcp_beyond_this_machine_is_refused(host: str) -> None:
-    with pytest.raises(
-        ClusterError, match="is not encrypted: whoever reaches this port can run programs"
-    ):
+    with pytest.raises(ClusterError, match="is not encrypted"):
         require_safe_address(f"tcp://{host}:8786")
     require_safe_address(f"tls://{host}:8786")
 

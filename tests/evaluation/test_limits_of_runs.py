@@ -77,7 +77,7 @@ def test_other_limits_are_another_run(limited: Run) -> None:
     assert f"limit in the hand is {there} there, tilt 40 degrees, slip 5 mm here" in str(
         caught.value
     )
-    with pytest.raises(InvalidInputError, match="approach of the hand is not simulated there, sim"):
+    with pytest.raises(InvalidInputError, match="approach of the hand is not simulated there"):
         judged(limited.path, **limit_settings(limited.document.trial) | {"approach": True})
     assert judged(limited.path, **limit_settings(limited.document.trial)).complete
 
@@ -108,7 +108,7 @@ def test_a_run_of_a_release_without_limits_has_none(unlimited: Run, tmp_path: Pa
         SCENE, load_station("panda_tabletop"), read_trial(row, "row"), read_origin(row, "row")
     )
     assert verdict.outcome is Outcome.LIFTED
-    with pytest.raises(InvalidInputError, match="limit in the hand is none there, tilt 30 degrees"):
+    with pytest.raises(InvalidInputError, match="none there, tilt 30 degrees"):
         judged(tmp_path)
 
 
@@ -148,7 +148,7 @@ def test_what_is_no_limit(settings: dict[str, float], message: str) -> None:
 
 def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
     asked = EvaluationSettings(mode="arm", approach=True)
-    with pytest.raises(InvalidInputError, match="mode arm, in which the whole arm approaches anyw"):
+    with pytest.raises(InvalidInputError, match="mode arm"):
         evaluate(SCENE, "panda_tabletop", tmp_path, settings=asked, grasps=GRASPS)
     assert not dataclasses.replace(asked, approach=False).approach
 

@@ -44,7 +44,7 @@ def test_the_least_moved_come_first_and_only_lifted_ones_count() -> None:
 def test_rows_of_a_grasp_are_all_of_its_rows() -> None:
     columns = {"id": np.array(["mug-a", "mug-b", "mug-a"])}
     assert rows_of(columns, "mug-a", "a.csv") == [0, 2] and rows_of(columns, "mug-b", "") == [1]
-    with pytest.raises(UnknownNameError, match=r"^a.csv has no judged grasp 'mug-c'; did you mean"):
+    with pytest.raises(UnknownNameError, match=r"^a.csv .* 'mug-c'"):
         rows_of(columns, "mug-c", "a.csv")
 
 

@@ -140,7 +140,7 @@ def test_what_is_no_run_is_said(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="nowhere is not the folder of a run"):
         load_run(tmp_path / "nowhere")
     (tmp_path / "results.csv").write_text("")
-    with pytest.raises(InvalidInputError, match=r"results.csv is a file; give the folder of a run"):
+    with pytest.raises(InvalidInputError, match=r"results.csv is a file"):
         load_run(tmp_path / "results.csv")
     (tmp_path / "run.yaml").write_text("version: 1\nsceen: {}\n")
     with pytest.raises(DocumentError, match=r"run.yaml:1: not a run document"):

@@ -177,5 +177,5 @@ def test_what_cannot_be_scored(library: ObjectLibrary, station: Station, scene: 
     with pytest.raises(InvalidInputError, match="has 0 instances of 'mug'; add a column"):
         scored_set(sampled(library, "mug"), library, station, scene)
     named = grasps.with_columns(instance=np.full(16, "can_2"))
-    with pytest.raises(UnknownNameError, match="on instance 'can_2', which is not in scene 'two'"):
+    with pytest.raises(UnknownNameError, match=r"'can_2', .* 'two'"):
         scored_set(named, library, station, scene)

@@ -146,9 +146,7 @@ def test_a_file_system_without_locks_is_named(
 ) -> None:
     book = TrialBook(write_sheet(tmp_path))
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(
-        InvalidInputError, match=r"trials.yaml is on a file system without file locks"
-    ):
+    with pytest.raises(InvalidInputError, match=r"trials.yaml .* without file locks"):
         book.record(1, outcome="lifted")
     assert book.entries() == [] and book.sheet() == make_sheet()
 
@@ -503,9 +501,7 @@ def test_wrong_calls_are_refused_and_leave_nothing(tmp_path: Path) -> None:
         book.record(1, outcome="sliped")
     with pytest.raises(UnknownNameError, match="no entry 'notes'; did you mean 'note'"):
         book.record(1, notes="x")
-    with pytest.raises(
-        InvalidInputError, match=r"trials.yaml: there is no trial 9; they have 1 to"
-    ):
+    with pytest.raises(InvalidInputError, match=r"trials.yaml: .* no trial 9"):
         book.record(9, outcome="lifted")
     with pytest.raises(InvalidInputError, match="NUL"):
         book.record(1, note="a\0b")

@@ -34,7 +34,7 @@ def test_a_name_of_the_station_is_refused(scene: Scene, station: Station) -> Non
 
 
 def test_an_unknown_format(scene: Scene, tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="format 'mjfc' does not exist; did you mean 'mjcf'"):
+    with pytest.raises(UnknownNameError, match=r"'mjfc' .* 'mjcf'"):
         burg.export_scene(scene, tmp_path / "out", "mjfc")
     assert not (tmp_path / "out").exists()
 

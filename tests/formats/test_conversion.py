@@ -49,9 +49,7 @@ def test_objects_are_renamed_with_what_files_said_of_them() -> None:
 def test_names_that_do_not_fit_are_refused(both: GraspSet) -> None:
     with pytest.raises(UnknownNameError, match=r"object 'mag'; did you mean 'mug'"):
         with_objects_renamed(both, {"mag": "cup"})
-    with pytest.raises(
-        InvalidInputError, match=r"of 2 objects \(1a/2b, mug\); say which of them is 'cup'"
-    ):
+    with pytest.raises(InvalidInputError, match=r"\(1a/2b, mug\); .* 'cup'"):
         with_objects_renamed(both, {"": "cup"})
 
 
@@ -83,6 +81,6 @@ def test_two_objects_never_share_a_file(
     tmp_path: Path, both: GraspSet, random_grasps: Callable[..., GraspSet]
 ) -> None:
     clash = GraspSet.concatenate([both, random_grasps(1, 3, object="1a_2b", success=True)])
-    with pytest.raises(InvalidInputError, match="'1a/2b' and of '1a_2b' would both be written to"):
+    with pytest.raises(InvalidInputError, match="'1a/2b' and of '1a_2b'"):
         write_each_object(clash, tmp_path, GRASP_FORMATS["graspgen"], PANDA_GRIPPER)
     assert not list(tmp_path.iterdir())

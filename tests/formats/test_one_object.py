@@ -106,7 +106,5 @@ def test_names_of_hands() -> None:
     assert check_gripper_name("panda_hand", PANDA_GRIPPER, "a.h5") == ()
     assert check_gripper_name("mine", replace(PANDA_GRIPPER, name="mine"), "a.h5") == ()
     assert len(check_gripper_name("robotiq", PANDA_GRIPPER, "a.h5")) == 1
-    with pytest.raises(
-        InvalidInputError, match=r"a.h5: the grasps were made for hand 'panda_hand', but hand"
-    ):
+    with pytest.raises(InvalidInputError, match=r"a.h5: .* hand 'panda_hand', but hand"):
         check_gripper_name("panda", replace(PANDA_GRIPPER, name="wsg_50"), "a.h5")

@@ -205,8 +205,6 @@ def test_rules(household: ObjectLibrary, tabletop: Station) -> None:
     )
     away = scene(("can", "can", (3.0, 0.2, 0.0), 0.0))
     assert scene_sampling.find_broken_rule(away, tabletop, asked) == scene_sampling.HIDDEN_REASON
-    with pytest.raises(
-        InvalidInputError, match="within_reach needs an arm, but station 'wsg_tabletop' has none"
-    ):
+    with pytest.raises(InvalidInputError, match=r"within_reach .* 'wsg_tabletop'"):
         reach = replace(PLACED, within_reach=True)
         SceneSampler(reach, household, load_station("wsg_tabletop"))

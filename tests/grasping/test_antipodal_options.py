@@ -218,7 +218,5 @@ def test_where_there_are_few_the_diverse_are_these():
 
 
 def test_less_than_once_as_many():
-    with pytest.raises(
-        InvalidInputError, match="diverse is 0; give a factor of 1 or more: so many times n"
-    ):
+    with pytest.raises(InvalidInputError, match="diverse is 0"):
         grasp(lumpy(), diverse=0)

@@ -161,7 +161,7 @@ def test_a_shape_that_the_screen_does_not_know_is_named() -> None:
     geometry = graph.RegisterAnchoredGeometry(source, tip)
     with pytest.raises(
         InvalidInputError,
-        match=r"'tip' is a Capsule; .* clearance check of the hand supports boxes, cylinders",
+        match=r"'tip' is a Capsule; .* boxes, cylinders",
     ):
         shape_of(graph.model_inspector(), geometry, np.eye(4))
 

@@ -174,5 +174,5 @@ def test_bad_settings(wrong: dict[str, object], message: str) -> None:
 
 
 def test_a_station_without_an_arm() -> None:
-    with pytest.raises(InvalidInputError, match=r"'wsg_tabletop' .* has no arm; add an 'arm:' sec"):
+    with pytest.raises(InvalidInputError, match=r"'wsg_tabletop' .* has no arm"):
         map_reachability(empty_scene(), load_station("wsg_tabletop"))

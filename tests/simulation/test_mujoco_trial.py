@@ -327,9 +327,7 @@ def test_a_fatal_error_of_mujoco_is_an_outcome(make_scene) -> None:
 
 
 def test_an_engine_runs_its_own_trials(scene: Scene) -> None:
-    with pytest.raises(
-        InvalidInputError, match="'mujoco' is mujoco, which simulates the hand alone"
-    ):
+    with pytest.raises(InvalidInputError, match=r"'mujoco' .* the hand alone"):
         HandTrial(scene, make_station(), engine="mujoco")
     with pytest.raises(
         InvalidInputError, match="'standard' has simulator drake; a MujocoTrial needs"

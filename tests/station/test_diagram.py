@@ -327,7 +327,7 @@ def test_home_that_does_not_fit(
 
 def test_no_arm(scene: Scene, station: Station) -> None:
     changed = replace(station, document=replace(station.document, arm=None))
-    with pytest.raises(InvalidInputError, match=r"station 'panda_tabletop' .* has no arm; add an"):
+    with pytest.raises(InvalidInputError, match=r"'panda_tabletop' .* has no arm"):
         build_station_diagram(scene, changed)
     assert build_station_diagram(scene, changed, robot="hand").robot == "hand"
 
@@ -355,7 +355,7 @@ def test_meshcat_shows_the_instances(scene: Scene, station: Station) -> None:
 
 def test_unknown_robot_and_incomplete_library(tmp_path: Path) -> None:
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
-    with pytest.raises(UnknownNameError, match="robot 'arms' does not exist; did you mean 'arm'"):
+    with pytest.raises(UnknownNameError, match=r"'arms' .* 'arm'"):
         build_station_diagram(scene, station, robot="arms")  # type: ignore[arg-type]
     library = tmp_path / "library"
     shutil.copytree(scene.library.root, library)

@@ -67,7 +67,7 @@ def test_opening_is_closing_the_other_way_round(built: StationDiagram) -> None:
 
 def test_other_robots_are_refused(built: StationDiagram) -> None:
     alone = build_station_diagram(built.scene, built.station, robot="hand")
-    with pytest.raises(InvalidInputError, match="was built with robot='hand'; build it with 'arm'"):
+    with pytest.raises(InvalidInputError, match=r"robot='hand'; .*'arm'"):
         MountedHand(alone)
-    with pytest.raises(InvalidInputError, match="was built with robot='arm'; build it with 'hand'"):
+    with pytest.raises(InvalidInputError, match=r"robot='arm'; .*'hand'"):
         FloatingHand(built)

@@ -189,9 +189,7 @@ def test_refusals(check: SceneCheck, scene: MakeScene) -> None:
     with pytest.raises(InvalidInputError, match="name the instances to move"):
         check.travel(one, [], DOWN, 1.0)
     for direction in ((0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (1.0, 0.0)):
-        with pytest.raises(
-            InvalidInputError, match="three finite numbers, at least one of them not 0"
-        ):
+        with pytest.raises(InvalidInputError, match="three finite numbers"):
             check.travel(one, ["can"], direction, 1.0)
     for limit in (-1.0, math.nan):
         with pytest.raises(InvalidInputError, match=r"at least 0 \[m\]"):

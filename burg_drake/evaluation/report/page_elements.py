@@ -1,4 +1,4 @@
-"""Page frame, style sheet, blocks and outcome colours that reports share."""
+"""Page frame, style sheet, HTML blocks and outcome colours that reports share."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from burg_drake.visualization import (
 )
 
 GROUP_CLASSES = {group.name: f"g{i}" for i, group in enumerate(OUTCOME_GROUPS)}
-"""CSS class of each outcome group."""
+"""CSS class of each outcome group, as style.css uses it."""
 _THEMED_COLOURS = {
     "hand collides": ("#9aa2a9", "#6b747b"),
     "arm has no path": ("#1a3373", "#8fa6e8"),
@@ -44,9 +44,9 @@ def style_sheet() -> str:
 def _group_rule(group: str, colour: str) -> str:
     # Yellow lines cannot be seen on white: a darker tone of the same hue.
     stroke_colours = {OUTCOME_GROUPS[1].hex: "#b59f00"}
-    # Colours of numbers: the one with more contrast is taken.
+    # Text is dark or white, whichever has more contrast.
     text_colours = ("#101418", "#ffffff")
-    text = max(text_colours, key=lambda text: contrast_ratio(text, colour))
+    text = max(text_colours, key=lambda shade: contrast_ratio(shade, colour))
     name = GROUP_CLASSES[group]
     fill = f".{name} {{ background: {colour}; fill: {colour}; color: {text}; }}"
     return f"{fill} .grasp.{name} {{ stroke: {stroke_colours.get(colour, colour)}; }}\n"
@@ -63,7 +63,7 @@ def html_page(title: str, *content: Child) -> str:
 
 
 def header(kind: str, title: str, about: str) -> Html:
-    """The top of a page: what kind of page it is, of what, and a line about it."""
+    """The top of a page: kind of page, title, and one line of explanation."""
     return element(
         "header",
         element("p", kind, class_="kind"),
@@ -73,7 +73,7 @@ def header(kind: str, title: str, about: str) -> Html:
 
 
 def tiles(entries: list[tuple[str, Child, str]]) -> Html:
-    """Large figures in a row: name, figure, note of each."""
+    """Large numbers in a row; each has a name, a value and a note."""
     figures = [
         element("div", element("dt", name), element("dd", value, element("small", note)))
         for name, value, note in entries
@@ -81,13 +81,13 @@ def tiles(entries: list[tuple[str, Child, str]]) -> Html:
     return element("dl", *figures, class_="tiles")
 
 
-def closing_section(*sections: Child) -> Html:
+def closing_sections(*sections: Child) -> Html:
     """The folded sections at the end; on paper they begin a new page."""
     return element("div", *sections, class_="closer")
 
 
 def section(title: str, text: str, *content: Child) -> Html:
-    """A headed part of the page with one sentence on what it shows."""
+    """A part of the page with a heading and one sentence on what it shows."""
     return element("section", element("h2", title), element("p", text), *content)
 
 
@@ -109,7 +109,7 @@ def table(
 
 
 def number_cells(values: Iterable[Child]) -> list[Html]:
-    """Cells of a table, aligned to the right; a centred dot, which stands for none, is fainter."""
+    """Cells of a table, aligned to the right; "·", for no value, is drawn fainter."""
     return [element("td", v, class_="number zero" if v == "·" else "number") for v in values]
 
 
@@ -126,7 +126,7 @@ def command(line: str) -> Html:
 
 
 def folded_section(title: str, text: str, *content: Child) -> Html:
-    """A part of the page for those who look for it: closed on the screen, open on paper."""
+    """A part of the page that is collapsed on the screen and open on paper."""
     summary = element("summary", element("h2", title))
     return element("section", element("details", summary, element("p", text), *content))
 
@@ -134,21 +134,21 @@ def folded_section(title: str, text: str, *content: Child) -> Html:
 GROUP_INDICES = {outcome: k for k, group in enumerate(OUTCOME_GROUPS) for outcome in group.outcomes}
 """Index into `OUTCOME_GROUPS` of each outcome."""
 LIFTED_GROUP = GROUP_INDICES[Outcome.LIFTED]
-"""Index of the group that is success."""
+"""Index of the group of lifted grasps."""
 
 
 def group_indices(outcomes: NDArray[np.str_]) -> NDArray[np.int8]:
-    """Index into `OUTCOME_GROUPS` (N,) of each outcome (N,); one pass an outcome, not one a row."""
-    return groups_of_codes(member_codes(outcomes, tuple(Outcome)))
+    """Index into `OUTCOME_GROUPS` (N,) of each outcome (N,)."""
+    return group_indices_of_codes(member_codes(outcomes, tuple(Outcome)))
 
 
-def groups_of_codes(outcomes: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Index into `OUTCOME_GROUPS` (N,) of outcomes that are given by their places in `Outcome`."""
-    return np.array([GROUP_INDICES[outcome] for outcome in Outcome], dtype=np.int8)[outcomes]
+def group_indices_of_codes(codes: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Index into `OUTCOME_GROUPS` (N,) of outcomes, given by their places in `Outcome`."""
+    return np.array([GROUP_INDICES[outcome] for outcome in Outcome], dtype=np.int8)[codes]
 
 
 def present_groups(groups: NDArray[np.int8]) -> list[int]:
-    """Which groups there are, best first."""
+    """Indices of the groups that occur, best first; -1 is skipped."""
     counts = np.bincount(groups[groups >= 0], minlength=len(OUTCOME_GROUPS))
     return np.flatnonzero(counts).tolist()
 

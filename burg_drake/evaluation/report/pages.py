@@ -46,10 +46,10 @@ from burg_drake.evaluation.report.outcome_sections import (
     worst_first,
 )
 from burg_drake.evaluation.report.page_elements import (
-    closing_section,
+    closing_sections,
     command,
     group_indices,
-    groups_of_codes,
+    group_indices_of_codes,
     header,
     html_page,
     number_cells,
@@ -109,7 +109,7 @@ def report_page(run: Run) -> str:
         reachability_section(run),
         execution_section(summary, columns),
         repeat_section(run),
-        closing_section(
+        closing_sections(
             best_section(run),
             count_section(summary),
             arm_section(summary, columns),
@@ -171,7 +171,7 @@ def campaign_page(campaign: Campaign) -> str:
     names = {*MAIN_MARGINS, *FURTHER_MARGINS, *CAUSE_MARGINS, *text_columns, *DRAWN_COLUMNS}
     stored = campaign.rows(sorted(names))
     outcomes = _member_indices(stored, "outcome", list(Outcome))
-    groups = groups_of_codes(outcomes)
+    groups = group_indices_of_codes(outcomes)
     executed = _member_indices(stored, "stage", list(Stage)) == list(Stage).index(Stage.EXECUTED)
     tried = {n: stored.column(n)[executed] for n in (*MAIN_MARGINS, *FURTHER_MARGINS)}
     return html_page(
@@ -189,7 +189,7 @@ def campaign_page(campaign: Campaign) -> str:
         causes_section(_cause_rows(campaign, stored, outcomes)),
         margin_section(tried, groups[executed], document.trial),
         repeat_campaign_section(campaign),
-        closing_section(
+        closing_sections(
             count_section(summary),
             further_margins(tried, groups[executed]),
             cost_section(summary),

@@ -16,7 +16,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from burg_drake.cameras import Intrinsics, render_tag, write_tags
+from burg_drake.cameras import Intrinsics, draw_tags, render_tag
 from burg_drake.core import Array, BurgError, Bytes, inverse, make_pose, transform_points
 from burg_drake.experiment.lab.painters import (
     GROUND_BODY,
@@ -194,7 +194,7 @@ def write_names(
             color = (255, 205, 120) if name in marked else (255, 255, 255)
             plates.append(render_tag(name, color, round(letter_height_share * image.shape[0])))
     if plates:
-        write_tags(image, np.array(boxes, float), plates, bodies)
+        draw_tags(image, np.array(boxes, float), plates, bodies)
     return image
 
 
