@@ -1,7 +1,7 @@
 """Meshcat views and pictures: scenes, grasps coloured by outcome, replays.
 
-Read `scene_view` and `grasp_view` first. All views and pages share `colors` and `html_page`; those in
-Meshcat share `meshcat_drawing`.
+Read `scene_view` and `grasp_view` first. All views and pages share `colors` and `html_page`;
+those in Meshcat share `meshcat_drawing`.
 """
 
 import lazy_loader
