@@ -6,6 +6,7 @@ They live in a module of their own because worker processes import them.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import resource
 import signal
@@ -20,7 +21,6 @@ from typing import Any
 
 from burg_drake.core import InvalidInputError, Outcome, Stage
 from burg_drake.evaluation import Candidate, Decide, Decision, Screen
-from tests.evaluation.scenes_here import ScenesHere
 
 TOPPLED = 0.0185
 """What is moved by more than this lies afterwards [m]."""
@@ -282,6 +282,8 @@ def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause:
     for module in ("cascade", "scene_tasks"):
         setattr(f"burg_drake.evaluation.{module}.require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this
-    setattr("burg_drake.evaluation.many_scenes.SceneProcesses", ScenesHere)
+    beside = f"{__package__}.scenes_here" if __package__ else "scenes_here"  # no package in workers
+    scenes_here = importlib.import_module(beside).ScenesHere
+    setattr("burg_drake.evaluation.many_scenes.SceneProcesses", scenes_here)
     # the chart of the arm's reach takes longer than all else
     setattr("burg_drake.evaluation.report.pages.reachability_section", lambda *_: None)
