@@ -21,7 +21,7 @@ import numpy as np
 
 from burg_drake.generation import SampledScene, SceneSampler, sample_scenes
 from burg_drake.objects import load_library
-from burg_drake.scene import LAYOUTS, Board, LayoutName, SceneRecipe
+from burg_drake.scene import LAYOUT_NAMES, Board, LayoutName, SceneRecipe
 from burg_drake.simulation import is_still, stillness
 from burg_drake.station import Station, load_station
 
@@ -62,7 +62,7 @@ def by_layout(scenes: int, still: int) -> None:
     """CPU time of one core, median and largest, with and without settling."""
     library, station = load_library("household"), load_station("panda_tabletop")
     print("layout     placed [s]     settled [s]    accepted  attempts  refused")
-    for layout in LAYOUTS:
+    for layout in LAYOUT_NAMES:
         times: dict[bool, list[float]] = {}
         for settle in (False, True):
             sampler = SceneSampler(replace(recipe_of(layout), settle=settle), library, station)

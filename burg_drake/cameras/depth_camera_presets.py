@@ -252,7 +252,7 @@ ZIVID_TWO = Sensor(
 )
 """Zivid 2 M70: coded light, colour and depth through the same lens."""
 
-KINECT = Sensor(
+KINECT_SENSOR = Sensor(
     name="kinect",
     color=_scaled_images("kinect color", (640, 480), (525.0, 525.0), (319.5, 239.5)),
     depth=_scaled_images("kinect depth", (640, 480), (586.3, 586.3), (319.5, 239.5)),
@@ -263,7 +263,9 @@ KINECT = Sensor(
 )
 """Microsoft Kinect, the first: projected dots."""
 
-SENSOR_PRESETS = {preset.name: preset for preset in (D435, D455, AZURE_KINECT, ZIVID_TWO, KINECT)}
+SENSOR_PRESETS = {
+    preset.name: preset for preset in (D435, D455, AZURE_KINECT, ZIVID_TWO, KINECT_SENSOR)
+}
 """Depth cameras by name."""
 
 

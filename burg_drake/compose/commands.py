@@ -10,7 +10,7 @@ from typing import ClassVar, Protocol
 from burg_drake.compose.scene_checker import Surroundings
 from burg_drake.compose.state import State
 from burg_drake.core import InvalidInputError, UnknownNameError, suggest_names
-from burg_drake.printout import PAPERS
+from burg_drake.printout import PAPER_SIZES
 from burg_drake.scene import Board
 
 MAX_COORDINATE = 100.0
@@ -80,7 +80,7 @@ def require_coordinate(value: float, what: str) -> float:
     return require_number(value, what, -MAX_COORDINATE, MAX_COORDINATE, "m")
 
 
-BOARD_SIZES = {name: size for name, size in PAPERS.items() if name.startswith("A")}
+BOARD_SIZES = {name: size for name, size in PAPER_SIZES.items() if name.startswith("A")}
 """Short and long side in metres by name of the paper, A4 to A0."""
 
 

@@ -137,7 +137,6 @@ from .grasp_set import (
     GraspSet as GraspSet,
     GraspSetFormat as GraspSetFormat,
 )
-from .number_rows import format_rows as format_rows, round_to_grid as round_to_grid
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,
     format_count as format_count,

@@ -26,7 +26,7 @@ from burg_drake.evaluation.trial_origin import (
 
 SETTINGS_TOPIC = "settings of engine, trial and arm"
 """A topic of `run_identity`."""
-SIDES = ("there", "here")
+COMPARED_RUN_NAMES = ("there", "here")
 """What two runs are called in messages: the one in a folder, and the one that is asked for."""
 
 
@@ -96,7 +96,10 @@ def run_differences(there: OneRunDocument, here: OneRunDocument) -> list[str]:
     if isinstance(there, CampaignDocument) and isinstance(here, CampaignDocument):
         return request_differences(there, here) + _scenes_differences(there, here)
     assert isinstance(there, RunDocument) and isinstance(here, RunDocument)
-    words = {"scene": [_scene_difference(there, here)], **_difference_words(there, here, SIDES)}
+    words = {
+        "scene": [_scene_difference(there, here)],
+        **_difference_words(there, here, COMPARED_RUN_NAMES),
+    }
     return identity_differences(run_identity(there), run_identity(here), words)
 
 
@@ -116,7 +119,7 @@ def _scenes_differences(there: CampaignDocument, here: CampaignDocument) -> list
 
 
 def request_differences(
-    there: AnyRunDocument, here: AnyRunDocument, sides: Sequence[str] = SIDES
+    there: AnyRunDocument, here: AnyRunDocument, sides: Sequence[str] = COMPARED_RUN_NAMES
 ) -> list[str]:
     """The same of what is asked, whatever the scene.
 
@@ -132,7 +135,7 @@ def identity_differences(
     there: Mapping[str, str],
     here: Mapping[str, str],
     words: Mapping[str, Sequence[str]],
-    sides: Sequence[str] = SIDES,
+    sides: Sequence[str] = COMPARED_RUN_NAMES,
 ) -> list[str]:
     """Topics that two identities have in common and differ in, in words.
 
@@ -151,7 +154,11 @@ def identity_differences(
 
 
 def input_difference(
-    topic: str, there: Input, here: Input, sides: Sequence[str] = SIDES, behind: str = "models"
+    topic: str,
+    there: Input,
+    here: Input,
+    sides: Sequence[str] = COMPARED_RUN_NAMES,
+    behind: str = "models",
 ) -> str:
     """How two documents with different contents differ, in words.
 
@@ -167,7 +174,9 @@ def input_difference(
 
 
 def setting_differences(
-    there: Mapping[str, object], here: Mapping[str, object], sides: Sequence[str] = SIDES
+    there: Mapping[str, object],
+    here: Mapping[str, object],
+    sides: Sequence[str] = COMPARED_RUN_NAMES,
 ) -> list[str]:
     """Settings that differ by name, with both values."""
     names = [k for k in {**there, **here} if there.get(k) != here.get(k)]
@@ -194,7 +203,9 @@ def _scene_difference(there: RunDocument, here: RunDocument) -> str:
     return input_difference("scene", there.scene, here.scene, behind="objects")
 
 
-def grasp_differences(there: Grasps, here: Grasps, sides: Sequence[str] = SIDES) -> list[str]:
+def grasp_differences(
+    there: Grasps, here: Grasps, sides: Sequence[str] = COMPARED_RUN_NAMES
+) -> list[str]:
     """How the grasps of two runs differ, in words."""
     found = []
     if there.correction != here.correction:

@@ -76,7 +76,7 @@ from .quality_metrics import (
     score_of as score_of,
 )
 from .set_comparison import (
-    QUANTILES as QUANTILES,
+    DISTRIBUTION_QUANTILES as DISTRIBUTION_QUANTILES,
     Distribution as Distribution,
     Matches as Matches,
     ObjectComparison as ObjectComparison,

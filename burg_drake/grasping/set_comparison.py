@@ -187,7 +187,7 @@ def nearest_grasps(grasps: GraspSet, others: GraspSet, *, lever: float = DISTANC
 
 Mask = NDArray[np.bool_]
 
-QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # Quantiles of a `Distribution`.
+DISTRIBUTION_QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # Quantiles of a `Distribution`.
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ class Distribution:
         count: finite numbers.
         missing: others.
         mean: of the finite ones; NaN if there are none.
-        quantiles: at `QUANTILES`, least to greatest; NaN likewise.
+        quantiles: at `DISTRIBUTION_QUANTILES`, least to greatest; NaN likewise.
     """
 
     count: int
@@ -209,7 +209,7 @@ class Distribution:
     @property
     def median(self) -> float:
         """The middle of the quantiles."""
-        return self.quantiles[QUANTILES.index(0.5)]
+        return self.quantiles[DISTRIBUTION_QUANTILES.index(0.5)]
 
 
 @dataclass(frozen=True)
@@ -299,8 +299,8 @@ def distribution(values: ArrayLike) -> Distribution:
     finite = all_values[np.isfinite(all_values)]
     missing = len(all_values) - len(finite)
     if not len(finite):
-        return Distribution(0, missing, np.nan, (np.nan,) * len(QUANTILES))
-    quantiles = tuple(np.quantile(finite, QUANTILES).tolist())
+        return Distribution(0, missing, np.nan, (np.nan,) * len(DISTRIBUTION_QUANTILES))
+    quantiles = tuple(np.quantile(finite, DISTRIBUTION_QUANTILES).tolist())
     return Distribution(len(finite), missing, float(finite.mean()), quantiles)
 
 

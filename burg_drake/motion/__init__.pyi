@@ -65,7 +65,7 @@ from .panda_ik import (
     PandaPostures as PandaPostures,
     panda_forward as panda_forward,
 )
-from .plan_files import Plan as Plan, load_plan as load_plan
+from .plan_files import Plan as Plan, format_rows as format_rows, load_plan as load_plan
 from .planner import Planner as Planner, plan as plan
 from .polyline_timing import (
     Cubics as Cubics,
@@ -112,9 +112,10 @@ from .station_check import (
 )
 from .station_proposal import find_built_in as find_built_in, propose_station as propose_station
 from .trajectory import (
-    PHASES as PHASES,
+    MOTION_PHASES as MOTION_PHASES,
     Motion as Motion,
     PlanOrigin as PlanOrigin,
     Trajectory as Trajectory,
+    round_to_grid as round_to_grid,
 )
 from .usable_arm import require_usable_arm as require_usable_arm

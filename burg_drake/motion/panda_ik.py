@@ -29,8 +29,8 @@ from burg_drake.geometry import Poses
 from burg_drake.motion.numeric_ik import ArmKinematics
 
 SHOULDER_HEIGHT = 0.333  # Metres above the base.
-UPPER_ARM = 0.316  # Metres from shoulder to elbow, along the link.
-FOREARM = 0.384  # Metres from elbow to wrist, along the link.
+UPPER_ARM_LENGTH = 0.316  # Metres from shoulder to elbow, along the link.
+FOREARM_LENGTH = 0.384  # Metres from elbow to wrist, along the link.
 ELBOW_OFFSET = 0.0825  # Metres from the elbow's axis to both links.
 WRIST_OFFSET = 0.088  # Metres from the wrist to the last axis.
 FLANGE_LENGTH = 0.107  # Metres along the last axis to the flange.
@@ -188,9 +188,9 @@ class _Wrist(_PoseParameterPairs):
 
     def elbows(self) -> Iterator[tuple[int, Array, _Wrist]]:
         """Joint 4, from the length of the triangle's side opposite to the elbow."""
-        p = UPPER_ARM * FOREARM - ELBOW_OFFSET**2
-        q = -ELBOW_OFFSET * (UPPER_ARM + FOREARM)
-        straight = 2.0 * ELBOW_OFFSET**2 + UPPER_ARM**2 + FOREARM**2
+        p = UPPER_ARM_LENGTH * FOREARM_LENGTH - ELBOW_OFFSET**2
+        q = -ELBOW_OFFSET * (UPPER_ARM_LENGTH + FOREARM_LENGTH)
+        straight = 2.0 * ELBOW_OFFSET**2 + UPPER_ARM_LENGTH**2 + FOREARM_LENGTH**2
         cosine = (_dot(self.v, self.v) - straight) / (2.0 * np.hypot(p, q))
         reached = np.flatnonzero(np.abs(cosine) <= 1.0)
         some, half = self.some(reached), np.arccos(cosine[reached])
@@ -204,8 +204,8 @@ class _Wrist(_PoseParameterPairs):
         the axis of joint 5, is perpendicular to the axis of joint 6.
         """
         c4, s4 = np.cos(q4), np.sin(q4)
-        across = ELBOW_OFFSET - ELBOW_OFFSET * c4 - UPPER_ARM * s4
-        h = ELBOW_OFFSET * s4 - UPPER_ARM * c4 - FOREARM
+        across = ELBOW_OFFSET - ELBOW_OFFSET * c4 - UPPER_ARM_LENGTH * s4
+        h = ELBOW_OFFSET * s4 - UPPER_ARM_LENGTH * c4 - FOREARM_LENGTH
         x, y, z = self.along
         radius = np.sqrt(x * x + y * y)
         possible = np.flatnonzero(np.abs(h) <= radius)
@@ -263,9 +263,9 @@ def _dot(a: Array, b: Array) -> Array:
 PANDA_DH_PARAMETERS = (
     (0.0, SHOULDER_HEIGHT, 0.0),
     (0.0, 0.0, -np.pi / 2),
-    (0.0, UPPER_ARM, np.pi / 2),
+    (0.0, UPPER_ARM_LENGTH, np.pi / 2),
     (ELBOW_OFFSET, 0.0, np.pi / 2),
-    (-ELBOW_OFFSET, FOREARM, -np.pi / 2),
+    (-ELBOW_OFFSET, FOREARM_LENGTH, -np.pi / 2),
     (0.0, 0.0, np.pi / 2),
     (WRIST_OFFSET, 0.0, np.pi / 2),
 )

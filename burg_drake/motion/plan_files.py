@@ -32,14 +32,13 @@ from burg_drake.core import (
     atomic_write_all,
     check_pose,
     csv_metadata,
-    format_rows,
     load_json,
     metadata_path,
     quote_value,
     read_rows,
     suppress_numpy_warnings,
 )
-from burg_drake.motion.trajectory import PHASES, PlanOrigin, Trajectory
+from burg_drake.motion.trajectory import MOTION_PHASES, PlanOrigin, Trajectory, round_to_grid
 
 if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
@@ -79,11 +78,13 @@ class Plan:
 
     @property
     def phases(self) -> dict[str, Trajectory]:
-        """Those of `PHASES` that there are, in their order; each begins with the row that the last
-        one ends with."""
+        """Those of `MOTION_PHASES` that there are, in their order; each begins with the row that
+        the last one ends with."""
         close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
         parts = (self.transfer, self.approach, close, self.retreat, self.lift)
-        return {name: part for name, part in zip(PHASES, parts, strict=True) if part is not None}
+        return {
+            name: part for name, part in zip(MOTION_PHASES, parts, strict=True) if part is not None
+        }
 
     def __repr__(self) -> str:
         phases = ", ".join(f"{name} {part.duration:.2f} s" for name, part in self.phases.items())
@@ -233,7 +234,7 @@ class PlanDescription:
 
 def _is_hand_closed(phase: str) -> bool:
     """Whether the hand closes, or is closed, in a phase."""
-    return PHASES.index(phase) >= PHASES.index("close")
+    return MOTION_PHASES.index(phase) >= MOTION_PHASES.index("close")
 
 
 def _joint_names(plan: Plan) -> tuple[str, ...]:
@@ -376,15 +377,17 @@ def _assemble_plan(
 
 def _require_spans(spans: Spans, count: int) -> None:
     """The phases cover all samples without a gap, in their order."""
-    missing = [name for name in PHASES if name not in spans and name != "retreat"]
+    missing = [name for name in MOTION_PHASES if name not in spans and name != "retreat"]
     if missing:
         raise InvalidInputError(f"phase {missing[0]!r} is missing")
     end = 0
-    for name in (phase for phase in PHASES if phase in spans):
+    for name in (phase for phase in MOTION_PHASES if phase in spans):
         first, last = spans[name]
-        complete = name != PHASES[-1] or last == count - 1
+        complete = name != MOTION_PHASES[-1] or last == count - 1
         if not (first == end < last < count and complete):
-            wanted = "to a later one" if name != PHASES[-1] else f"to the last one, {count - 1}"
+            wanted = (
+                "to a later one" if name != MOTION_PHASES[-1] else f"to the last one, {count - 1}"
+            )
             raise InvalidInputError(
                 f"phase {name!r} has points {first} to {last}; it must go from point {end} {wanted}"
             )
@@ -497,7 +500,7 @@ def _plan_from_document(document: dict[str, Any]) -> Plan:
     description = _read_plan_description(document, joints)
     with _document_part(document, "phases") as phases:
         spans: Spans = {name: (first, last) for name, (first, last) in phases.items()}
-        if spans.keys() - set(PHASES):
+        if spans.keys() - set(MOTION_PHASES):
             raise KeyError(spans)
         return _assemble_plan(description, t, spans, rows)
 
@@ -608,9 +611,10 @@ def _read_spans(rows: CsvRows) -> dict[str, tuple[int, int]]:
     spans: dict[str, tuple[int, int]] = {}
     for k, (line, row) in enumerate(rows):
         name = row[1]
-        if name not in PHASES:
+        if name not in MOTION_PHASES:
             raise InvalidInputError(
-                f"line {line} has phase {quote_value(name)}; expected one of {', '.join(PHASES)}"
+                f"line {line} has phase {quote_value(name)}; expected one of"
+                f" {', '.join(MOTION_PHASES)}"
             )
         if name in spans and spans[name][1] != k - 1:
             raise InvalidInputError(f"phase {name!r} starts a second time in line {line}")
@@ -657,7 +661,7 @@ def _column_meanings(joints: Sequence[str]) -> dict[str, tuple[str, Column]]:
     }
     return {
         "t": ("double", Column("s", "time since the plan's beginning")),
-        "phase": ("string", Column(TEXT_UNIT, f"one of {', '.join(PHASES)}")),
+        "phase": ("string", Column(TEXT_UNIT, f"one of {', '.join(MOTION_PHASES)}")),
         **moves,
         "width": ("double", Column("m", "wanted distance between the pads; 0: closed")),
     }
@@ -667,3 +671,19 @@ def _quote_cell(text: str) -> str:
     """A text of the header, quoted where that is needed."""
     quotes = any(sign in text for sign in ',"\n\r')
     return '"' + text.replace('"', '""') + '"' if quotes else text
+
+
+def format_rows(values: Array, separator: str = ",") -> list[str]:
+    """Each row of finite numbers (T, n) as text, which reads back bit by bit.
+
+    Rows on the grid, see `round_to_grid`, are plain decimals; others are as Python has them.
+    """
+    on_grid = (np.abs(values) <= 9000.0) & (round_to_grid(values) == values)
+    on_grid &= (values != 0.0) | ~np.signbit(values)
+    rows = zip(values.tolist(), on_grid.all(axis=1).tolist(), strict=True)
+    return [separator.join(map(_decimal_text if plain else repr, row)) for row, plain in rows]
+
+
+def _decimal_text(value: float) -> str:
+    text = f"{value:.12f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text

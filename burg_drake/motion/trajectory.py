@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from burg_drake.core import Array, round_to_grid
+from burg_drake.core import Array
 
 if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
@@ -128,7 +128,7 @@ class Trajectory:
         return motion
 
 
-PHASES = ("transfer", "approach", "close", "retreat", "lift")
+MOTION_PHASES = ("transfer", "approach", "close", "retreat", "lift")
 """What happens one after the other; while the hand closes the arm rests, and without a retreat the
 lift follows at once."""
 
@@ -154,3 +154,15 @@ class PlanOrigin:
     scene_content: str
     instance: str
     X_WG: Array
+
+
+def round_to_grid(values: Array) -> Array:
+    """The nearest numbers with 12 decimals; what is beyond 9000 in size stays as it is.
+
+    Multiples of the grid are exact up to there: text and number read back with the same bits, as
+    both are the floating-point number nearest to the same decimal.
+    """
+    grid_scale = 1e12  # steps in a unit: a thousandth of a nanometre or nanoradian
+    small = np.abs(values) <= 9000.0
+    units = np.rint(np.where(small, values, 0.0) * grid_scale)
+    return np.where(small, units / grid_scale + 0.0, values)  # no negative zeros

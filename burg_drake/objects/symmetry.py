@@ -19,7 +19,7 @@ SURFACE_POINTS = 16000  # Points that represent the surface.
 PROBE_POINTS = 1000  # Points that are rotated and compared.
 COARSE_POINTS = 100  # Points of the first comparison.
 NORMAL_WEIGHT = 0.025  # Share of the diagonal per unit difference of normals.
-SECTORS = 72  # Angles about an axis in the first search.
+FIRST_SEARCH_ANGLES = 72  # Angles about an axis in the first search.
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,30 +195,37 @@ class SymmetrySearch:
             return
         match = np.fft.irfft(
             (np.fft.rfft(profile_b, axis=0) * np.conj(np.fft.rfft(profile_a, axis=0))).sum(axis=1),
-            SECTORS,
+            FIRST_SEARCH_ANGLES,
         )
         R_Ba, R_Bb = rotation_from_down(a), rotation_from_down(b)
         chosen: list[int] = []
         for k in np.argsort(-match, kind="stable").tolist():
-            if all(min((k - c) % SECTORS, (c - k) % SECTORS) > 2 for c in chosen):
+            if all(
+                min((k - c) % FIRST_SEARCH_ANGLES, (c - k) % FIRST_SEARCH_ANGLES) > 2
+                for c in chosen
+            ):
                 chosen.append(k)
-                yield R_Bb.T @ rot_z(2.0 * np.pi * k / SECTORS) @ R_Ba
+                yield R_Bb.T @ rot_z(2.0 * np.pi * k / FIRST_SEARCH_ANGLES) @ R_Ba
             if len(chosen) == max_angles:
                 return
 
     def _area_profile(self, down: Array) -> Array:
         """(SECTORS, bins) area by azimuth, height and radius, about the vertical."""
         p = self._sample @ rotation_from_down(down).T
-        azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * SECTORS
+        azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * FIRST_SEARCH_ANGLES
         radius = np.hypot(p[:, 0], p[:, 1]) / self.diagonal
         height = p[:, 2] / self.diagonal + 1.0
         bins = (
-            azimuth.astype(int) % SECTORS,
+            azimuth.astype(int) % FIRST_SEARCH_ANGLES,
             np.clip((height * 8).astype(int), 0, 16),
             np.clip((radius * 8).astype(int), 0, 8),
         )
-        flat = np.ravel_multi_index(bins, (SECTORS, 17, 9))
-        return np.bincount(flat, minlength=SECTORS * 17 * 9).reshape(SECTORS, -1).astype(float)
+        flat = np.ravel_multi_index(bins, (FIRST_SEARCH_ANGLES, 17, 9))
+        return (
+            np.bincount(flat, minlength=FIRST_SEARCH_ANGLES * 17 * 9)
+            .reshape(FIRST_SEARCH_ANGLES, -1)
+            .astype(float)
+        )
 
     def _refine_rotation(self, R: Array) -> Array | None:
         """The rotation near R (3, 3) that lays the surface closest onto itself; None if that is

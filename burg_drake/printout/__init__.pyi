@@ -5,10 +5,10 @@ from .board_printout import (
 )
 from .object_drawings import (
     BT601_LUMA_WEIGHTS as BT601_LUMA_WEIGHTS,
-    FIXED_HUE as FIXED_HUE,
-    HUES as HUES,
+    FIXED_TINT_COLOR as FIXED_TINT_COLOR,
     MIN_LUMA as MIN_LUMA,
     OUTLINE_RESOLUTION as OUTLINE_RESOLUTION,
+    TINT_COLORS as TINT_COLORS,
     HeightMap as HeightMap,
     ObjectDrawing as ObjectDrawing,
     SheetGrid as SheetGrid,
@@ -25,7 +25,7 @@ from .object_drawings import (
 from .page_tiling import (
     BLEED as BLEED,
     MAX_FLAP_WIDTH as MAX_FLAP_WIDTH,
-    PAPERS as PAPERS,
+    PAPER_SIZES as PAPER_SIZES,
     Paper as Paper,
     Tile as Tile,
     Tiling as Tiling,
@@ -36,10 +36,10 @@ from .page_tiling import (
 )
 from .print_settings import PrintSettings as PrintSettings
 from .sheet import (
-    BLACK as BLACK,
+    BLACK_RGB as BLACK_RGB,
     BOLD_FONT as BOLD_FONT,
-    INK as INK,
-    POINT as POINT,
+    METRES_PER_POINT as METRES_PER_POINT,
+    TEXT_RGB as TEXT_RGB,
     FreeSpace as FreeSpace,
     Pen as Pen,
     Sheet as Sheet,

@@ -15,7 +15,7 @@ from reportlab.pdfgen.canvas import Canvas
 from burg_drake.core import Array, InvalidInputError, atomic_write
 from burg_drake.printout.guide import BoardFacts, Guide, draw_guide, guide_steps
 from burg_drake.printout.object_drawings import (
-    FIXED_HUE,
+    FIXED_TINT_COLOR,
     MAX_TINT_HEIGHT,
     ObjectDrawing,
     draw_arrows,
@@ -26,7 +26,7 @@ from burg_drake.printout.object_drawings import (
 from burg_drake.printout.page_tiling import (
     BLEED,
     BOTTOM_STRIP,
-    PAPERS,
+    PAPER_SIZES,
     Paper,
     Tile,
     Tiling,
@@ -36,10 +36,10 @@ from burg_drake.printout.page_tiling import (
 from burg_drake.printout.print_settings import PrintSettings
 from burg_drake.printout.sheet import (
     BOLD_FONT,
-    FAINT,
-    INK,
-    POINT,
-    WHITE,
+    FAINT_LINE_RGB,
+    METRES_PER_POINT,
+    TEXT_RGB,
+    WHITE_RGB,
     Pen,
     Sheet,
     alignment_marks,
@@ -187,11 +187,14 @@ def _draw_map(
         upper = (left + scale * xs[other.column + 1], bottom + scale * ys[other.row])
         here = other.number == tile.number
         if here:
-            pen.area([rectangle(lower, upper)], INK)
-        pen.outline([rectangle(lower, upper)], THIN_LINE, INK)
-        text = min(6.0, 0.6 * (upper[1] - lower[1]) / POINT)
-        middle = (lower[0] + upper[0]) / 2, (lower[1] + upper[1]) / 2 - 0.35 * text * POINT
-        pen.text(*middle, str(other.number), text, align=0.5, color=WHITE if here else INK)
+            pen.area([rectangle(lower, upper)], TEXT_RGB)
+        pen.outline([rectangle(lower, upper)], THIN_LINE, TEXT_RGB)
+        text = min(6.0, 0.6 * (upper[1] - lower[1]) / METRES_PER_POINT)
+        middle = (
+            (lower[0] + upper[0]) / 2,
+            (lower[1] + upper[1]) / 2 - 0.35 * text * METRES_PER_POINT,
+        )
+        pen.text(*middle, str(other.number), text, align=0.5, color=WHITE_RGB if here else TEXT_RGB)
 
 
 def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
@@ -207,7 +210,7 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
     edges = LEGEND_WIDTH * np.arange(steps + 1) / steps
     for k in range(steps):
         luma = luma_at(MAX_TINT_HEIGHT * (k + 0.5) / steps)
-        r, g, b = tint_colors(FIXED_HUE, luma).tolist()
+        r, g, b = tint_colors(FIXED_TINT_COLOR, luma).tolist()
         end = min(edges[k + 1] + 0.1e-3, edges[-1])  # over the next one, against hairs of white
         corners = at(edges[k], 0.0), at(end, 0.0), at(end, 2.0e-3), at(edges[k], 2.0e-3)
         pen.area([np.array(corners)], (r, g, b))
@@ -232,7 +235,7 @@ def _draw_cuts(
             continue
         at = tile.p_PS[axis] + cut
         start, end = ((at, y0), (at, y1)) if axis == 0 else ((x0, at), (x1, at))
-        pen.line(start, end, width=THIN_LINE, color=FAINT, dash=1.2e-3)
+        pen.line(start, end, width=THIN_LINE, color=FAINT_LINE_RGB, dash=1.2e-3)
         places = np.array([0.0, size[1 - axis], *_mark_positions(marks, axis, cut)])
         words = _cut_label(trimmed, tile.number + (columns if axis else 1), tiling.flap)
         crossed = tile.p_PS[1 - axis] + places
@@ -271,7 +274,7 @@ def _label_cut(
     for there in np.sort(crossed)[::-1]:
         if along - length - mark_clearance < there < along + mark_clearance:
             along = there - mark_clearance
-    off = BLEED + 1.0e-3 if trimmed else -(BLEED + 1.0e-3 + 0.72 * text_size * POINT)
+    off = BLEED + 1.0e-3 if trimmed else -(BLEED + 1.0e-3 + 0.72 * text_size * METRES_PER_POINT)
     at = (end[0] - off, along) if turned else (along, end[1] + off)
     pen.text(*at, words, text_size, font=BOLD_FONT, align=1.0, turned=turned)
 
@@ -467,7 +470,7 @@ def _multiple_pages_warning(
         return False
 
     margin = next((m for m in smaller_margins if m < settings.margin and on_one(margin=m)), None)
-    page = next((name for name in PAPERS if on_one(page=name)), None)
+    page = next((name for name in PAPER_SIZES if on_one(page=name)), None)
     changes = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
     changes += [f"page {page}"] if page else []
     remedy = f"; {' or '.join(changes)} would fit on one" if changes else ""
@@ -503,7 +506,7 @@ def _make_pdf(
     """The PDF, and how many pages of instructions it begins with."""
     print_scale, paper = _scale_correction(settings), tiling.paper
     stream = io.BytesIO()
-    page_size = tuple((print_scale * [paper.width, paper.height] / POINT).tolist())
+    page_size = tuple((print_scale * [paper.width, paper.height] / METRES_PER_POINT).tolist())
     canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)
     canvas.setTitle(f"Board of {scene.name}")
     canvas.setSubject(f"scene {scene.name}, content {scene.content}")
@@ -515,7 +518,9 @@ def _make_pdf(
     if settings.instructions:
         guide, (x, y) = _make_guide(scene, sheet, tiling, settings, losses), print_scale.tolist()
         first = draw_guide(pen, tiling.paper, guide, scale_page=(x, y))
-    canvas.beginForm("board", 0.0, 0.0, sheet.size[0] / POINT, sheet.size[1] / POINT)
+    canvas.beginForm(
+        "board", 0.0, 0.0, sheet.size[0] / METRES_PER_POINT, sheet.size[1] / METRES_PER_POINT
+    )
     draw_sheet(pen, sheet)
     canvas.endForm()
     for tile in tiling.tiles:
@@ -562,7 +567,7 @@ def _draw_tile(pen: Pen, sheet: Sheet, tile: Tile) -> None:
     cover_width = 2e-3  # Metres of white around the part that a page shows.
     canvas = pen.canvas
     canvas.saveState()
-    canvas.translate(tile.p_PS[0] / POINT, tile.p_PS[1] / POINT)
+    canvas.translate(tile.p_PS[0] / METRES_PER_POINT, tile.p_PS[1] / METRES_PER_POINT)
     # Covered, not clipped, where the page's part ends: along a clip, viewers blend what is below
     # the white frames of markers into hairs.
     lower, upper = np.array(tile.lower), np.array(tile.upper)
@@ -572,7 +577,9 @@ def _draw_tile(pen: Pen, sheet: Sheet, tile: Tile) -> None:
     draw_board_edge(pen, tile, sheet.size)
     draw_origin(pen, tile, float(sheet.layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0).max()))
     canvas.restoreState()
-    pen.area([rectangle(lower - cover_width, upper + cover_width), rectangle(lower, upper)], WHITE)
+    pen.area(
+        [rectangle(lower - cover_width, upper + cover_width), rectangle(lower, upper)], WHITE_RGB
+    )
     canvas.restoreState()
 
 

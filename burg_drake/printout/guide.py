@@ -14,11 +14,11 @@ from burg_drake.printout.object_drawings import ObjectDrawing
 from burg_drake.printout.page_tiling import Paper, Tiling
 from burg_drake.printout.sheet import (
     BOLD_FONT,
-    FAINT,
-    INK,
-    POINT,
+    FAINT_LINE_RGB,
+    METRES_PER_POINT,
     REGULAR_FONT,
-    WHITE,
+    TEXT_RGB,
+    WHITE_RGB,
     Pen,
     draw_arrow,
     rectangle,
@@ -51,7 +51,7 @@ def draw_scale(pen: Pen) -> None:
             for row in (-1, 0, 1):
                 at = middle + share * 5.2e-3 * np.array([column, row])
                 half = share * 1.9e-3
-                pen.area([rectangle(at - half, at + half)], INK)
+                pen.area([rectangle(at - half, at + half)], TEXT_RGB)
         _draw_tick_or_cross(pen, (x + 18.5e-3, 15e-3), good=good)
         pen.text(
             x + 17.5e-3,
@@ -86,12 +86,12 @@ def draw_cutting(pen: Pen) -> None:
     low, high = np.array([22e-3, 2e-3]), np.array([60e-3, 25e-3])
     cut = np.array([low[0] + 6e-3, high[1] - 6e-3])
     pen.area([rectangle(low, high), rectangle((cut[0], low[1]), (high[0], cut[1]))], SHADE_COLOR)
-    pen.outline([rectangle(low, high)], 0.2e-3, INK)
+    pen.outline([rectangle(low, high)], 0.2e-3, TEXT_RGB)
     pen.line((cut[0], low[1]), (cut[0], high[1]), width=THICK_LINE, color=BAD_COLOR, dash=1.5e-3)
     pen.line((low[0], cut[1]), (high[0], cut[1]), width=THICK_LINE, color=BAD_COLOR, dash=1.5e-3)
     x, y = high[0] - 5e-3, low[1] + 5e-3
     for start, end in (((x, low[1]), (x, cut[1])), ((cut[0], y), (high[0], y))):
-        pen.line(start, end, width=0.2e-3, color=FAINT, dash=1.2e-3)
+        pen.line(start, end, width=0.2e-3, color=FAINT_LINE_RGB, dash=1.2e-3)
     _draw_scissors(pen, (float(high[0]) + 1.5e-3, float(cut[1])))
     pen.text(
         float(cut[0]) + 7e-3,
@@ -119,10 +119,10 @@ def draw_gluing(pen: Pen, flap: float) -> None:
     start = seam + 8e-3
     _draw_box(pen, (start, 6e-3), (start + 30e-3, 25e-3))
     for x, y in ((seam, 13.5e-3), (start, 15.5e-3)):
-        pen.circle(x, y, 1.8e-3, INK, 0.25e-3)
+        pen.circle(x, y, 1.8e-3, TEXT_RGB, 0.25e-3)
         pen.line((x - 2.8e-3, y), (x + 2.8e-3, y), width=0.25e-3)
         pen.line((x, y - 2.8e-3), (x, y + 2.8e-3), width=0.25e-3)
-    _draw_sketch_arrow(pen, (start - 1.5e-3, 9.0e-3), (seam + 0.8e-3, 7.0e-3), INK)
+    _draw_sketch_arrow(pen, (start - 1.5e-3, 9.0e-3), (seam + 0.8e-3, 7.0e-3), TEXT_RGB)
     pen.text(19e-3, 12e-3, "1", 16, font=BOLD_FONT, align=0.5)
     pen.text(start + 17e-3, 14e-3, "2", 16, font=BOLD_FONT, align=0.5)
     pen.text(8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge", LABEL_SIZE)
@@ -139,7 +139,7 @@ def draw_plan(
     for tile in tiling.tiles:
         lower = shift + scale * np.array([xs[tile.column], ys[tile.row + 1]])
         upper = shift + scale * np.array([xs[tile.column + 1], ys[tile.row]])
-        _draw_box(pen, lower, upper, PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE)
+        _draw_box(pen, lower, upper, PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE_RGB)
     for drawing in objects:
         loops = [shift + scale * loop for loop in (*drawing.outline, *drawing.raised)]
         pen.outline(loops, 0.3e-3, drawing.outline_color)
@@ -159,7 +159,7 @@ def draw_flatness(pen: Pen) -> None:
     _draw_tick_or_cross(pen, (17e-3, 17e-3), good=True)
     x = np.linspace(44e-3, 78e-3, 60)
     y = 11e-3 + 2.0e-3 * np.sin((x - 44e-3) / 34e-3 * 4 * np.pi)
-    pen.line((44e-3, 8e-3), (78e-3, 8e-3), width=0.3e-3, color=FAINT)
+    pen.line((44e-3, 8e-3), (78e-3, 8e-3), width=0.3e-3, color=FAINT_LINE_RGB)
     pen.line(*zip(x.tolist(), y.tolist(), strict=True), width=0.8e-3)
     pen.text(61e-3, 2.5e-3, "waves, curls", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (59e-3, 17e-3), good=False)
@@ -173,13 +173,13 @@ def draw_lighting(pen: Pen) -> None:
         _draw_box(pen, (left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3), SHADE_COLOR)
     pen.area([rectangle((6e-3, 23.5e-3), (32e-3, 25.5e-3))], lamp_color)
     for x in (8e-3, 15e-3, 22e-3, 29e-3):
-        _draw_sketch_arrow(pen, (x, 22.5e-3), (x, 16e-3), FAINT)
+        _draw_sketch_arrow(pen, (x, 22.5e-3), (x, 16e-3), FAINT_LINE_RGB)
     pen.text(19e-3, 0.5e-3, "wide, soft light", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (34.5e-3, 20e-3), good=True)
     lamp = 48e-3, 22e-3
     pen.area([_ellipse_outline(lamp, 2.2e-3)], lamp_color)
-    _draw_sketch_arrow(pen, (50e-3, 20.5e-3), (57e-3, 13.5e-3), FAINT)
-    pen.area([rectangle((64e-3, 5.2e-3), (73e-3, 6.0e-3))], INK)
+    _draw_sketch_arrow(pen, (50e-3, 20.5e-3), (57e-3, 13.5e-3), FAINT_LINE_RGB)
+    pen.area([rectangle((64e-3, 5.2e-3), (73e-3, 6.0e-3))], TEXT_RGB)
     pen.text(61e-3, 0.5e-3, "lamp, hard shadow", LABEL_SIZE, align=0.5)
     _draw_tick_or_cross(pen, (72e-3, 20e-3), good=False)
 
@@ -198,9 +198,15 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
     around = np.radians(np.linspace(-tilt_deg, tilt_deg, 30))
     rays = np.column_stack([np.sin(around), np.cos(around)])
     pen.area([np.concatenate([foot + reach * rays, foot + 0.5 * reach * rays[::-1]])], range_color)
-    pen.line((40e-3, 3e-3), (40e-3, 25e-3), width=0.2e-3, color=FAINT, dash=1e-3)
+    pen.line((40e-3, 3e-3), (40e-3, 25e-3), width=0.2e-3, color=FAINT_LINE_RGB, dash=1e-3)
     edge = foot + 1.1 * reach * rays[-1]
-    pen.line((40e-3, 3e-3), (float(edge[0]), float(edge[1])), width=0.2e-3, color=FAINT, dash=1e-3)
+    pen.line(
+        (40e-3, 3e-3),
+        (float(edge[0]), float(edge[1])),
+        width=0.2e-3,
+        color=FAINT_LINE_RGB,
+        dash=1e-3,
+    )
     at = foot + 0.78 * reach * rays[8]
     along = -rays[8]
     across = np.array([-along[1], along[0]])
@@ -208,7 +214,7 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
         ((-2.0, 2.0), (-2.0, -2.0), (1.0, -2.0), (1.0, 2.0)),
         ((1.0, 1.0), (1.0, -1.0), (2.6, -1.6), (2.6, 1.6)),
     ):
-        pen.area([np.array([at + 1e-3 * (a * along + b * across) for a, b in shape])], INK)
+        pen.area([np.array([at + 1e-3 * (a * along + b * across) for a, b in shape])], TEXT_RGB)
     pen.text(58.5e-3, 17e-3, f"{tilt_deg:g}°", LABEL_SIZE)
     pen.text(2e-3, 18e-3, f"{distances[0]:.1f} to {distances[1]:.1f} m", LABEL_SIZE, font=BOLD_FONT)
 
@@ -217,7 +223,7 @@ def draw_placing(pen: Pen) -> None:
     """An object that is set down on its silhouette."""
     sheet = np.array([[8e-3, 3e-3], [62e-3, 3e-3], [72e-3, 14e-3], [18e-3, 14e-3]])
     pen.area([sheet], PAPER_COLOR)
-    pen.outline([sheet], 0.25e-3, INK)
+    pen.outline([sheet], 0.25e-3, TEXT_RGB)
     shape = _ellipse_outline((40e-3, 8.5e-3), 8e-3, 0.42)
     pen.area([shape], (0.72, 0.82, 0.90))
     pen.outline([shape], 0.3e-3, (0.25, 0.45, 0.60))
@@ -225,8 +231,8 @@ def draw_placing(pen: Pen) -> None:
     base, top = 15.5e-3, 22.5e-3
     pen.area([rectangle((34e-3, base), (46e-3, top))], SHADE_COLOR)
     pen.area([_ellipse_outline((40e-3, base), 6e-3, 0.25)], SHADE_COLOR)
-    pen.area([_ellipse_outline((40e-3, top), 6e-3, 0.25)], WHITE)
-    pen.outline([_ellipse_outline((40e-3, top), 6e-3, 0.25)], 0.25e-3, INK)
+    pen.area([_ellipse_outline((40e-3, top), 6e-3, 0.25)], WHITE_RGB)
+    pen.outline([_ellipse_outline((40e-3, top), 6e-3, 0.25)], 0.25e-3, TEXT_RGB)
     pen.line((34e-3, top), (34e-3, base), width=0.25e-3)
     pen.line((46e-3, top), (46e-3, base), width=0.25e-3)
     _draw_sketch_arrow(pen, (52e-3, 21e-3), (52e-3, 12e-3), GOOD_COLOR)
@@ -240,7 +246,7 @@ def _draw_box(
     line_width: float = 0.25e-3,
 ) -> None:
     pen.area([rectangle(lower, upper)], color)
-    pen.outline([rectangle(lower, upper)], line_width, INK)
+    pen.outline([rectangle(lower, upper)], line_width, TEXT_RGB)
 
 
 def _draw_tick_or_cross(pen: Pen, at: Spot, *, good: bool) -> None:
@@ -262,7 +268,7 @@ def _draw_scissors(pen: Pen, at: Spot) -> None:
     x, y = at
     for side in (1.0, -1.0):
         pen.line((x - 4e-3, y + side * 1.2e-3), (x + 5e-3, y - side * 1.6e-3), width=THICK_LINE)
-        pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, INK, THICK_LINE)
+        pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, TEXT_RGB, THICK_LINE)
 
 
 def _ellipse_outline(middle: Spot, radius: float, flat: float = 1.0) -> Array:
@@ -481,7 +487,7 @@ def draw_guide(pen: Pen, paper: Paper, guide: Guide, *, scale_page: tuple[float,
     for page in range(pages):
         canvas = pen.canvas
         canvas.scale(*scale_page)
-        canvas.translate(edge / POINT, edge / POINT)
+        canvas.translate(edge / METRES_PER_POINT, edge / METRES_PER_POINT)
         canvas.scale(scale, scale)
         width, height = (side - 2 * edge for side in (paper.width, paper.height))
         _draw_header(pen, guide, height / scale, width / scale)
@@ -530,7 +536,7 @@ def step_height(step: GuideStep, width: float) -> float:
     """What a step takes of a column [m]."""
     lines = sum(len(wrap_text(words, width)) for words in step.words)
     sketch = step.height + 2e-3 if step.draw else 0.0
-    return LINE_SPACING * POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE) + sketch
+    return LINE_SPACING * METRES_PER_POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE) + sketch
 
 
 def wrap_text(words: str, width: float, size: float = BODY_SIZE) -> list[str]:
@@ -547,25 +553,28 @@ def wrap_text(words: str, width: float, size: float = BODY_SIZE) -> list[str]:
 
 def _draw_header(pen: Pen, guide: Guide, top: float, right: float) -> None:
     title_size = 20.0  # Points.
-    pen.text(0.0, top - title_size * POINT, guide.title, title_size, font=BOLD_FONT)
+    pen.text(0.0, top - title_size * METRES_PER_POINT, guide.title, title_size, font=BOLD_FONT)
     size = BODY_SIZE * min(1.0, right / max(text_width(guide.subtitle, BODY_SIZE), 1e-9))
     pen.text(0.0, top - 13e-3, guide.subtitle, max(size, 10.0))
-    pen.line((0.0, top - 15e-3), (right, top - 15e-3), width=0.2e-3, color=FAINT)
+    pen.line((0.0, top - 15e-3), (right, top - 15e-3), width=0.2e-3, color=FAINT_LINE_RGB)
 
 
 def _draw_step(pen: Pen, place: StepPlace) -> None:
-    y = place.top - HEADING_SIZE * POINT
+    y = place.top - HEADING_SIZE * METRES_PER_POINT
     heading = f"{place.number}  {place.step.heading}"
-    pen.text(place.left, y, heading, HEADING_SIZE, font=BOLD_FONT, color=INK)
-    y -= 2.0 * LINE_SPACING * POINT
+    pen.text(place.left, y, heading, HEADING_SIZE, font=BOLD_FONT, color=TEXT_RGB)
+    y -= 2.0 * LINE_SPACING * METRES_PER_POINT
     if place.step.draw:
         y -= place.step.height + 1e-3
         pen.canvas.saveState()
-        pen.canvas.translate((place.left + (place.width - SKETCH_SIZE[0]) / 2) / POINT, y / POINT)
+        pen.canvas.translate(
+            (place.left + (place.width - SKETCH_SIZE[0]) / 2) / METRES_PER_POINT,
+            y / METRES_PER_POINT,
+        )
         place.step.draw(pen)
         pen.canvas.restoreState()
         y -= 1e-3
     for paragraph in place.step.words:
         for line in wrap_text(paragraph, place.width):
-            y -= LINE_SPACING * BODY_SIZE * POINT
-            pen.text(place.left, y + 0.25 * BODY_SIZE * POINT, line, BODY_SIZE)
+            y -= LINE_SPACING * BODY_SIZE * METRES_PER_POINT
+            pen.text(place.left, y + 0.25 * BODY_SIZE * METRES_PER_POINT, line, BODY_SIZE)

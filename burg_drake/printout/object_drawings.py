@@ -21,7 +21,7 @@ MAX_LUMA = 0.94
 MAX_TINT_HEIGHT = 0.10
 """Metres above which tints no longer change."""
 
-HUES = (
+TINT_COLORS = (
     (0.14, 0.49, 0.70),
     (0.50, 0.25, 0.00),
     (0.35, 0.70, 0.00),
@@ -32,7 +32,7 @@ HUES = (
     (0.32, 0.85, 0.00),
 )
 """Hues of free objects, which differ by 11 in CIELAB, also with colour blindness."""
-FIXED_HUE = (0.35, 0.35, 0.35)
+FIXED_TINT_COLOR = (0.35, 0.35, 0.35)
 """Hue of fixed objects."""
 
 
@@ -309,7 +309,11 @@ def projected_layers(scene: Scene, grid: SheetGrid) -> dict[str, SheetLayer]:
 def instance_hue(scene: Scene, name: str) -> Rgb:
     """Hue of an instance; all fixed ones share one."""
     free = list(scene.instances)
-    return HUES[free.index(name) % len(HUES)] if name in scene.instances else FIXED_HUE
+    return (
+        TINT_COLORS[free.index(name) % len(TINT_COLORS)]
+        if name in scene.instances
+        else FIXED_TINT_COLOR
+    )
 
 
 def mask_outlines(

@@ -11,7 +11,7 @@ import numpy as np
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, suggest_names
 from burg_drake.scene import MarkerLayout
 
-PAPERS = {
+PAPER_SIZES = {
     "A4": (0.210, 0.297),
     "A3": (0.297, 0.420),
     "A2": (0.420, 0.594),
@@ -66,7 +66,7 @@ def paper_size(name: str) -> tuple[str, float, float]:
     """Looks a paper up.
 
     Args:
-        name: of `PAPERS` in any case, or `WxH` in millimetres, such as `700x500`.
+        name: of `PAPER_SIZES` in any case, or `WxH` in millimetres, such as `700x500`.
 
     Returns:
         Its name as it is written, short and long side [m].
@@ -76,14 +76,14 @@ def paper_size(name: str) -> tuple[str, float, float]:
         InvalidInputError: it is too small or too large.
     """
     max_length = 5.08  # Metres; PDF pages have at most 14400 points (ISO 32000-1, annex C).
-    known = {key.lower(): key for key in PAPERS}
+    known = {key.lower(): key for key in PAPER_SIZES}
     if name.lower() in known:
         key = known[name.lower()]
-        return key, *PAPERS[key]
+        return key, *PAPER_SIZES[key]
     own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", name.lower())
     if not own:
         raise UnknownNameError(
-            f"page {name!r} does not exist; {suggest_names(name, PAPERS)}; or give WxH in mm,"
+            f"page {name!r} does not exist; {suggest_names(name, PAPER_SIZES)}; or give WxH in mm,"
             " such as 700x500"
         )
     short, long = sorted(float(text) * 1e-3 for text in own.groups())
@@ -113,7 +113,12 @@ def page_orientations(
     label, short, long = paper_size(name)
     sx, sy = (0.1 / m for m in measured)
     pages = [
-        Paper(label if label in PAPERS else f"{1e3 * w:g} x {1e3 * h:g} mm", w / sx, h / sy, margin)
+        Paper(
+            label if label in PAPER_SIZES else f"{1e3 * w:g} x {1e3 * h:g} mm",
+            w / sx,
+            h / sy,
+            margin,
+        )
         for w, h in ((short, long), (long, short))
     ]
     white = 2 * margin - 0.01  # the least sizes are those with margins of 5 mm
@@ -239,7 +244,7 @@ def tile_board(
 def _page_advice(
     size: tuple[float, float], layout: MarkerLayout, needed: tuple[Array, Array], margin: float
 ) -> str:
-    for name in PAPERS:
+    for name in PAPER_SIZES:
         if any(_tile_on_paper(size, layout, needed, p) for p in page_orientations(name, margin)):
             return f"{name} would be large enough"
     return "give larger paper as WxH in mm, or smaller markers"

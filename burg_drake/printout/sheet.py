@@ -24,14 +24,14 @@ from burg_drake.printout.object_drawings import (
 from burg_drake.printout.page_tiling import BLEED, Tile, Tiling
 from burg_drake.scene import MarkerLayout
 
-POINT = 0.0254 / 72
+METRES_PER_POINT = 0.0254 / 72
 """Metres per point, the unit of PDF."""
-BLACK: Rgb = (0.0, 0.0, 0.0)
-INK: Rgb = (0.16, 0.18, 0.22)
+BLACK_RGB: Rgb = (0.0, 0.0, 0.0)
+TEXT_RGB: Rgb = (0.16, 0.18, 0.22)
 """Colour of text and rulers."""
-FAINT: Rgb = (0.52, 0.55, 0.60)
+FAINT_LINE_RGB: Rgb = (0.52, 0.55, 0.60)
 """Colour of inconspicuous lines."""
-WHITE: Rgb = (1.0, 1.0, 1.0)
+WHITE_RGB: Rgb = (1.0, 1.0, 1.0)
 REGULAR_FONT, BOLD_FONT = "Helvetica", "Helvetica-Bold"
 
 
@@ -42,7 +42,7 @@ def to_printable(text: str) -> str:
 
 def text_width(text: str, size: float, font: str = REGULAR_FONT) -> float:
     """Length of a line of text [m]; `size` in points."""
-    return float(stringWidth(to_printable(text), font, size) * POINT)
+    return float(stringWidth(to_printable(text), font, size) * METRES_PER_POINT)
 
 
 class Pen:
@@ -55,7 +55,7 @@ class Pen:
         self,
         *points: tuple[float, float],
         width: float = 0.15e-3,
-        color: Rgb = INK,
+        color: Rgb = TEXT_RGB,
         dash: float = 0.0,
     ) -> None:
         """Draws a line through points."""
@@ -91,7 +91,9 @@ class Pen:
     def circle(self, x: float, y: float, radius: float, color: Rgb, width: float) -> None:
         """Draws a circle."""
         self._stroke(width, color)
-        self.canvas.circle(x / POINT, y / POINT, radius / POINT, stroke=1, fill=0)
+        self.canvas.circle(
+            x / METRES_PER_POINT, y / METRES_PER_POINT, radius / METRES_PER_POINT, stroke=1, fill=0
+        )
 
     def text(
         self,
@@ -101,7 +103,7 @@ class Pen:
         size: float,
         *,
         font: str = REGULAR_FONT,
-        color: Rgb = INK,
+        color: Rgb = TEXT_RGB,
         align: float = 0.0,
         turned: bool = False,
     ) -> None:
@@ -118,7 +120,7 @@ class Pen:
         """
         canvas = self.canvas
         canvas.saveState()
-        canvas.translate(x / POINT, y / POINT)
+        canvas.translate(x / METRES_PER_POINT, y / METRES_PER_POINT)
         if turned:
             canvas.rotate(90)
         canvas.setFillColorRGB(*color)
@@ -129,14 +131,14 @@ class Pen:
 
     def _stroke(self, width: float, color: Rgb, dash: float = 0.0) -> None:
         self.canvas.setStrokeColorRGB(*color)
-        self.canvas.setLineWidth(width / POINT)
+        self.canvas.setLineWidth(width / METRES_PER_POINT)
         self.canvas.setLineJoin(1)
-        self.canvas.setDash([dash / POINT, dash / POINT] if dash else [])
+        self.canvas.setDash([dash / METRES_PER_POINT, dash / METRES_PER_POINT] if dash else [])
 
     def _path(self, polygons: Iterable[Array], *, closed: bool = True) -> Any:
         path = self.canvas.beginPath()
         for polygon in polygons:
-            points = (np.asarray(polygon, dtype=float) / POINT).tolist()
+            points = (np.asarray(polygon, dtype=float) / METRES_PER_POINT).tolist()
             path.moveTo(*points[0])
             for point in points[1:]:
                 path.lineTo(*point)
@@ -170,7 +172,7 @@ def draw_arrow(
 
 
 EDGE_LABEL_SIZE = 6.5  # Points.
-EDGE_LABEL_HEIGHT = 0.72 * EDGE_LABEL_SIZE * POINT
+EDGE_LABEL_HEIGHT = 0.72 * EDGE_LABEL_SIZE * METRES_PER_POINT
 """Metres, of a capital letter."""
 EDGE_LABEL_OFFSET = 1.0e-3
 """Metres between the label and the edge."""
@@ -189,7 +191,7 @@ def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
     label = "edge of the board"  # Text along the edge.
     # Metres needed outside the edge; otherwise the label is inside.
     label_room = EDGE_LABEL_OFFSET + EDGE_LABEL_HEIGHT + 1.0e-3
-    pen.outline([rectangle((0.0, 0.0), size)], 0.2e-3, FAINT)
+    pen.outline([rectangle((0.0, 0.0), size)], 0.2e-3, FAINT_LINE_RGB)
     for axis in (0, 1):  # that runs across the edge
         along = 1 - axis
         start = max(tile.lower[along], 0.0) + ORIGIN_CORNER_SIZE + 4e-3
@@ -231,7 +233,7 @@ def draw_origin(pen: Pen, tile: Tile, clear: float) -> bool:
         across = np.eye(2)[1 - axis]
         tip, neck = axis_length * along, (axis_length - 2.5e-3) * along
         pen.line((0.0, 0.0), (float(neck[0]), float(neck[1])), width=0.4e-3)
-        pen.area([np.array([tip, neck + 0.9e-3 * across, neck - 0.9e-3 * across])], INK)
+        pen.area([np.array([tip, neck + 0.9e-3 * across, neck - 0.9e-3 * across])], TEXT_RGB)
     pen.text(axis_length + 0.8e-3, 0.6e-3, "x", 8)
     pen.text(0.8e-3, axis_length + 0.6e-3, "y", 8)
     pen.text(1.5e-3, 1.7e-3, "origin", EDGE_LABEL_SIZE)
@@ -445,7 +447,10 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     names: list[ObjectName] = []
     homeless: list[str] = []
     for words, color, beside in wanted:
-        extent = text_width(words, NAME_SIZE, BOLD_FONT) + 2 * NAME_CLEARANCE, NAME_SIZE * POINT
+        extent = (
+            text_width(words, NAME_SIZE, BOLD_FONT) + 2 * NAME_CLEARANCE,
+            NAME_SIZE * METRES_PER_POINT,
+        )
         corner = space.place(extent, beside)
         if corner is None:
             homeless.append(repr(words))
@@ -504,10 +509,10 @@ def draw_sheet(pen: Pen, sheet: Sheet) -> None:
     _draw_markers(pen, sheet.layout)
     _draw_outlines(pen, sheet)
     for x, y in sheet.marks.tolist():
-        pen.circle(x, y, ALIGNMENT_MARK_RADIUS, FAINT, 0.12e-3)
+        pen.circle(x, y, ALIGNMENT_MARK_RADIUS, FAINT_LINE_RGB, 0.12e-3)
         reach = 1.6 * ALIGNMENT_MARK_RADIUS
-        pen.line((x - reach, y), (x + reach, y), width=0.12e-3, color=FAINT)
-        pen.line((x, y - reach), (x, y + reach), width=0.12e-3, color=FAINT)
+        pen.line((x - reach, y), (x + reach, y), width=0.12e-3, color=FAINT_LINE_RGB)
+        pen.line((x, y - reach), (x, y + reach), width=0.12e-3, color=FAINT_LINE_RGB)
     for name in sheet.names:
         pen.text(*name.position, name.words, NAME_SIZE, font=BOLD_FONT, color=name.color)
 
@@ -523,7 +528,7 @@ def _draw_tints(pen: Pen, drawing: ObjectDrawing) -> None:
         pen.canvas.saveState()
         pen.clip(drawing.outline)
         for x in np.arange(lower[0] - high, upper[0], hatch_spacing).tolist():
-            pen.line((x, lower[1]), (x + high, upper[1]), width=0.6e-3, color=WHITE)
+            pen.line((x, lower[1]), (x + high, upper[1]), width=0.6e-3, color=WHITE_RGB)
         pen.canvas.restoreState()
 
 
@@ -542,9 +547,9 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
         outer = rectangle(lower - 0.9 * frame, upper + 0.9 * frame)
         meeting = rectangle(lower - gap / 2, upper + gap / 2)
         for start, end in zip(outer.tolist(), meeting.tolist(), strict=True):
-            pen.line(start, end, width=seam_width, color=WHITE)
-    pen.area(frames, WHITE)
-    pen.area(_black_cell_outlines(layout), BLACK, holes=False)
+            pen.line(start, end, width=seam_width, color=WHITE_RGB)
+    pen.area(frames, WHITE_RGB)
+    pen.area(_black_cell_outlines(layout), BLACK_RGB, holes=False)
 
 
 def _draw_outlines(pen: Pen, sheet: Sheet) -> None:

@@ -15,7 +15,7 @@ from .polygons import (
     simplify_polygon as simplify_polygon,
 )
 from .scene_document import (
-    LAYOUTS as LAYOUTS,
+    LAYOUT_NAMES as LAYOUT_NAMES,
     MARKER_EDGE_MARGIN as MARKER_EDGE_MARGIN,
     Board as Board,
     Instance as Instance,

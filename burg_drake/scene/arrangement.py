@@ -31,7 +31,13 @@ from burg_drake.scene.occupancy import (
 )
 from burg_drake.scene.packing import pack_objects, packing_density
 from burg_drake.scene.polygons import exit_distance
-from burg_drake.scene.scene_document import DEFAULT_TRIES, LAYOUTS, Board, LayoutName, PoseChoice
+from burg_drake.scene.scene_document import (
+    DEFAULT_TRIES,
+    LAYOUT_NAMES,
+    Board,
+    LayoutName,
+    PoseChoice,
+)
 
 
 def place_beside(
@@ -264,9 +270,9 @@ def arrange(
         InvalidInputError: an object cannot be placed, as it has no mass, for example; or there is
             no such layout.
     """
-    if layout not in LAYOUTS:
+    if layout not in LAYOUT_NAMES:
         raise InvalidInputError(
-            f"layout {layout!r} does not exist; {suggest_names(layout, LAYOUTS)}"
+            f"layout {layout!r} does not exist; {suggest_names(layout, LAYOUT_NAMES)}"
         )
     occupied = OccupiedBoard(board, obstacles)
     for one in wanted:

@@ -203,7 +203,7 @@ LayoutName = Literal["random", "wide", "close", "touching", "packed", "heap"]
 """`random`: anywhere on the board; `wide`: with room for an open hand's fingers in between; `close`
 and `touching`: beside one another, a few millimetres apart or in contact; `packed`: as dense as it
 gets; `heap`: in any orientation above a spot, to be dropped."""
-LAYOUTS: tuple[LayoutName, ...] = get_args(LayoutName)  # Names of the layouts.
+LAYOUT_NAMES: tuple[LayoutName, ...] = get_args(LayoutName)  # Names of the layouts.
 
 PoseChoice = Literal["probability", "uniform", "as_scanned"]
 """Which of its stable poses an object gets: by their probabilities, each as often,

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from burg_drake.scene import Board
 
 CUSTOM_SIZE = "own size"  # Choice for a size that no paper has.
-LANDSCAPE = "across"  # Choice for a board whose long side lies along x.
-PORTRAIT = "upright"  # Choice for a board whose long side lies along y.
+LANDSCAPE_CHOICE = "across"  # Choice for a board whose long side lies along x.
+PORTRAIT_CHOICE = "upright"  # Choice for a board whose long side lies along y.
 
 
 class BoardPanel:
@@ -43,7 +43,7 @@ class BoardPanel:
                 gui.add_dropdown("Size", (*BOARD_SIZES, CUSTOM_SIZE)), self._choose
             )
             self._orientation = actions.on_choice(
-                gui.add_dropdown("Lies", (LANDSCAPE, PORTRAIT)), self._turn
+                gui.add_dropdown("Lies", (LANDSCAPE_CHOICE, PORTRAIT_CHOICE)), self._turn
             )
             self._extents = actions.typed_field(
                 gui.add_vector2(
@@ -58,7 +58,7 @@ class BoardPanel:
         name = board_size_name(size)
         self._own = self._own or name is None
         self._size.value = CUSTOM_SIZE if self._own or name is None else name
-        self._orientation.value = PORTRAIT if size[1] > size[0] else LANDSCAPE
+        self._orientation.value = PORTRAIT_CHOICE if size[1] > size[0] else LANDSCAPE_CHOICE
         self._orientation.visible = not self._own
         self._extents.handle.visible = self._own
         self._extents.show(tuple(round(1e3 * side, 3) for side in size))
@@ -73,7 +73,7 @@ class BoardPanel:
 
     def _turn(self, orientation: str) -> None:
         short, long = sorted(self._actions.session.view.document.board.size)
-        self._set((short, long) if orientation == PORTRAIT else (long, short))
+        self._set((short, long) if orientation == PORTRAIT_CHOICE else (long, short))
 
     def _resize(self, extents_mm: tuple[float, float]) -> None:
         width, depth = (round(1e-3 * side, 6) for side in extents_mm)
@@ -289,7 +289,7 @@ class BackdropPanel(SidePanel):
         self._text.content = join_html(paragraph(secondary_text(line)))
 
 
-COLORINGS: dict[str, Coloring] = {
+COLORING_CHOICES: dict[str, Coloring] = {
     "as they look": "objects",
     "by status": "status",
     "random": "random",
@@ -319,7 +319,7 @@ class DisplayPanel(SidePanel):
         self._on_change = on_change
         down, front = viser.Icon.ARROW_BAR_DOWN, viser.Icon.PERSPECTIVE
         with gui.add_folder("Display"):
-            self._colors: Any = gui.add_dropdown("Objects", tuple(COLORINGS))
+            self._colors: Any = gui.add_dropdown("Objects", tuple(COLORING_CHOICES))
             self._markers = gui.add_checkbox("Markers", True)
             for field in (self._colors, self._markers):
                 actions.on_choice(field, lambda value: on_change())
@@ -341,7 +341,7 @@ class DisplayPanel(SidePanel):
     @property
     def coloring(self) -> Coloring:
         """Which colours objects have."""
-        return COLORINGS.get(self._colors.value, "objects")
+        return COLORING_CHOICES.get(self._colors.value, "objects")
 
     @property
     def markers(self) -> bool:
@@ -350,7 +350,7 @@ class DisplayPanel(SidePanel):
 
     def next_colors(self) -> None:
         """Goes on to the next colours."""
-        names = tuple(COLORINGS)
+        names = tuple(COLORING_CHOICES)
         self._colors.value = names[(names.index(self._colors.value) + 1) % len(names)]
         self._on_change()
 

@@ -15,7 +15,7 @@ from burg_drake.compose import (
     SessionView,
 )
 from burg_drake.objects import ObjectLibrary
-from burg_drake.scene import LAYOUTS
+from burg_drake.scene import LAYOUT_NAMES
 from burg_drake.ui.background_pictures import ObjectPictures
 from burg_drake.ui.buttons import (
     SidePanel,
@@ -129,7 +129,7 @@ class FillPanel(SidePanel):
                 step=1,
                 hint="0: those that are on the board",
             )
-            self._layout = gui.add_dropdown("Layout", LAYOUTS)
+            self._layout = gui.add_dropdown("Layout", LAYOUT_NAMES)
             self._seed: Any = gui.add_number(
                 "Seed", 1, min=0, max=MAX_SEED, step=1, hint="Of the next configuration"
             )

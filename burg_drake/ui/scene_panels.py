@@ -11,7 +11,7 @@ from typing import Any
 import viser
 
 from burg_drake.compose import FileChanged, SessionView, UnsavedChanges
-from burg_drake.printout import PAPERS, PrintSettings
+from burg_drake.printout import PAPER_SIZES, PrintSettings
 from burg_drake.ui.buttons import SidePanel, ask_for_confirmation
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_html import (
@@ -132,7 +132,7 @@ class FilePanel(SidePanel):
                 hint="Take the objects of this scene, and new ones, from this library",
             )
         with gui.add_folder("Print"):
-            self._page = gui.add_dropdown("Page size", tuple(PAPERS), initial_value="A4")
+            self._page = gui.add_dropdown("Page size", tuple(PAPER_SIZES), initial_value="A4")
             self._page_button(
                 "Save printout", self.print_out, icon=icon.PRINTER, hint="Download it as PDF"
             )

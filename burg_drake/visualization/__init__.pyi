@@ -5,7 +5,7 @@ from .colors import (
     OUTCOME_GROUPS as OUTCOME_GROUPS,
     UNJUDGED_GROUP as UNJUDGED_GROUP,
     UNKNOWN_COLOR as UNKNOWN_COLOR,
-    VIRIDIS as VIRIDIS,
+    VIRIDIS_COLORS as VIRIDIS_COLORS,
     ColorScale as ColorScale,
     color_scale as color_scale,
     contrast_ratio as contrast_ratio,
@@ -104,7 +104,7 @@ from .meshcat_page import (
 )
 from .object_drawing import (
     PIXELS_PER_UNIT as PIXELS_PER_UNIT,
-    TONES as TONES,
+    TONE_COUNT as TONE_COUNT,
     FlatView as FlatView,
     SolidMesh as SolidMesh,
     best_yaw as best_yaw,

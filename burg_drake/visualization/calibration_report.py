@@ -22,22 +22,22 @@ FIGURE_WIDTH = 460.0
 """Width of a drawing of the image, in CSS pixels."""
 
 
-INK = "#1f2630"
+TEXT_HEX = "#1f2630"
 """Colour of text and points."""
-ACCENT = "#b3261e"
+ACCENT_HEX = "#b3261e"
 """Colour of residuals, uncertainty and advice."""
-SHADE = "#2f6db5"
+BAR_HEX = "#2f6db5"
 """Colour of bars, coverage and distortion."""
 CALIBRATION_STYLE = f"""
-body {{ font: 15px/1.5 system-ui, sans-serif; color: {INK}; max-width: 62rem; margin: 2rem auto;
-  padding: 0 1rem; }}
+body {{ font: 15px/1.5 system-ui, sans-serif; color: {TEXT_HEX}; max-width: 62rem;
+  margin: 2rem auto; padding: 0 1rem; }}
 h1 {{ font-size: 1.4rem; }} h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; }}
 table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
 td, th {{ padding: .15rem .9rem .15rem 0; text-align: right; border-bottom: 1px solid #e4e7ec; }}
 td:first-child, th:first-child {{ text-align: left; }}
 figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }}
 figcaption {{ font-size: .85rem; max-width: {FIGURE_WIDTH:.0f}px; }}
-.advice {{ color: {ACCENT}; }}
+.advice {{ color: {ACCENT_HEX}; }}
 svg {{ max-width: 100%; height: auto; }}
 @media (max-width: 30rem) {{ td, th {{ padding-right: .5rem; font-size: .85rem; }}
   td > svg {{ display: none; }} }}
@@ -99,7 +99,7 @@ def _view_table(calibration: Calibration) -> Html:
     rows: list[Sequence[Child]] = []
     for used in calibration.views:
         length = f"{120.0 * used.rms / largest:.1f}"
-        bar = element("rect", x=0, y=4, width=length, height=9, fill=SHADE)
+        bar = element("rect", x=0, y=4, width=length, height=9, fill=BAR_HEX)
         rows.append(
             (
                 used.view.name,
@@ -151,7 +151,7 @@ def _draw_arrows(calibration: Calibration, start: Array, vectors: Array, color: 
     dot: dict[str, str | float] = {"stroke_width": 2 * width, "stroke_linecap": "round"}
     return [
         element("path", d=path, stroke=color, stroke_width=width, fill="none"),
-        element("path", d=dots, stroke=INK, **dot, fill="none"),
+        element("path", d=dots, stroke=TEXT_HEX, **dot, fill="none"),
     ]
 
 
@@ -159,7 +159,7 @@ def _residual_figure(calibration: Calibration) -> Html:
     corners = np.concatenate([used.view.corners for used in calibration.views])
     residuals = np.concatenate([used.residuals for used in calibration.views])
     scale = _floor_to_one_digit(0.03 * calibration.intrinsics.width / max(calibration.rms, 1e-6))
-    arrows = _draw_arrows(calibration, corners, scale * residuals, ACCENT)
+    arrows = _draw_arrows(calibration, corners, scale * residuals, ACCENT_HEX)
     return _figure(
         _image_svg(calibration, *arrows),
         f"Residuals of all corners, {scale:g} times as long. Where neighbours agree, the lens model"
@@ -181,7 +181,7 @@ def _draw_cells(calibration: Calibration, shades: Array, words: list[str], color
             element("rect", x=x, y=y, width=width, height=height, fill=color, fill_opacity=opacity)
         )
         place = {"x": x + width / 2, "y": y + 0.6 * height, "text_anchor": "middle"}
-        ink = "#ffffff" if opacity > 0.5 else INK
+        ink = "#ffffff" if opacity > 0.5 else TEXT_HEX
         shapes.append(element("text", word, **place, font_size=0.026 * k.width, fill=ink))
     return _image_svg(calibration, *shapes)
 
@@ -192,7 +192,7 @@ def _coverage_figure(calibration: Calibration) -> Html:
     shades = np.sqrt(counts / max(1, counts.max()))
     words = [str(n) for n in counts.ravel().tolist()]
     return _figure(
-        _draw_cells(calibration, shades, words, SHADE),
+        _draw_cells(calibration, shades, words, BAR_HEX),
         "Corners seen in each part of the image. Where there are none, the lens is a guess.",
     )
 
@@ -211,7 +211,7 @@ def _uncertainty_figure(calibration: Calibration) -> Html:
     shades = np.clip(bounds / max(1.0, min(bounds.max(), max_error)), 0.0, 1.0)
     words = [f"{b:.2f}" if b < max_error else f">{max_error:g}" for b in bounds.tolist()]
     return _figure(
-        _draw_cells(calibration, shades.reshape(COVERAGE_GRID), words, ACCENT),
+        _draw_cells(calibration, shades.reshape(COVERAGE_GRID), words, ACCENT_HEX),
         "How far the camera model may be off in the middle of each part, in 19 of 20 cases"
         " [pixels]; towards the corners of the image it is more. It counts the scatter of the"
         " residuals, how far the views disagree, and how far lens models differ that fit as well."
@@ -230,7 +230,7 @@ def _distortion_figure(calibration: Calibration) -> Html:
         moved, straight = seen - (even * k.focal + k.center), "an image of even angles"
     longest = float(np.linalg.norm(moved, axis=1).max())
     scale = _floor_to_one_digit(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
-    arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, SHADE)
+    arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, BAR_HEX)
     return _figure(
         _image_svg(calibration, *arrows),
         f"Where the lens moves points of {straight} to (dots: from), {scale:g} times as long;"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core import Array, InvalidInputError, Outcome, Rgba as Rgba
 
-VIRIDIS = (
+VIRIDIS_COLORS = (
     *("#440154", "#481a6c", "#472f7d", "#414487", "#39568c", "#31688e", "#2a788e", "#23888e"),
     *("#1f988b", "#22a884", "#35b779", "#54c568", "#7ad151", "#a5db36", "#d2e21b", "#fde725"),
 )
@@ -25,7 +25,7 @@ def map_colors(share: ArrayLike) -> Array:
     Returns:
         (..., 3) red, green, blue in [0, 1] (sRGB).
     """
-    points = np.array([rgb_from_hex(color) for color in VIRIDIS])
+    points = np.array([rgb_from_hex(color) for color in VIRIDIS_COLORS])
     place = np.clip(np.asarray(share, dtype=float), 0.0, 1.0) * (len(points) - 1)
     return np.stack(
         [np.interp(place, np.arange(len(points)), points[:, k]) for k in range(3)], axis=-1

@@ -135,7 +135,7 @@ def _decimal_text(value: float, decimals: int) -> str:
     return "0" if text == "-0" else text
 
 
-TONES = 6
+TONE_COUNT = 6
 """Number of even tones in a shaded drawing."""
 PIXELS_PER_UNIT = 3
 """Pixels per SVG unit of the raster in which contours are traced."""
@@ -162,7 +162,7 @@ def shaded_outline(solids: Sequence[SolidMesh], view: FlatView) -> list[str]:
         rule `evenodd`; the first is the outline of everything. Empty where there is no such tone.
     """
     levels = _tone_raster(solids, view)
-    return [_trace_contours(_smooth_mask(levels > tone)) for tone in range(TONES)]
+    return [_trace_contours(_smooth_mask(levels > tone)) for tone in range(TONE_COUNT)]
 
 
 def object_surface(library: ObjectLibrary, name: str) -> SolidMesh:
@@ -236,7 +236,7 @@ def _triangle_tones(triangles: Array, view: FlatView) -> NDArray[np.int64]:
     normals *= -np.sign(normals[:, 2:] + 1e-12)
     light = normals @ (light_direction / np.linalg.norm(light_direction))
     share = np.clip(0.5 + 0.5 * light, 0.0, 1.0)
-    return np.minimum((share * TONES).astype(np.int64), TONES - 1)
+    return np.minimum((share * TONE_COUNT).astype(np.int64), TONE_COUNT - 1)
 
 
 def _trace_contours(mask: NDArray[np.bool_]) -> str:

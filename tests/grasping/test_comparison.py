@@ -11,7 +11,7 @@ from grasp_samples import about, crowded_grasps
 from burg_drake.core import GraspSet, make_pose, swap_fingers
 from burg_drake.grasping import (
     DISTANCE_VERSION,
-    QUANTILES,
+    DISTRIBUTION_QUANTILES,
     Share,
     Tolerance,
     compare_grasps,
@@ -35,7 +35,7 @@ def test_distribution_by_hand() -> None:
     d = distribution([3.0, NAN, 1.0, math.inf, 2.0])
     assert (d.count, d.missing, d.mean, d.median) == (3, 2, 2.0, 2.0)
     assert d.quantiles == (1.0, 1.1, 1.5, 2.0, 2.5, 2.9, 3.0)
-    assert len(d.quantiles) == len(QUANTILES)
+    assert len(d.quantiles) == len(DISTRIBUTION_QUANTILES)
 
 
 def test_distribution_of_nothing() -> None:
@@ -95,10 +95,12 @@ def test_comparison_by_hand() -> None:
     assert mug.coverage == Share(2, 3)
     assert mug.precision == Share(2, 4)
     np.testing.assert_allclose(
-        mug.to_grasps.quantiles, np.quantile([0.0, 0.01, 0.005], QUANTILES), atol=1e-15
+        mug.to_grasps.quantiles, np.quantile([0.0, 0.01, 0.005], DISTRIBUTION_QUANTILES), atol=1e-15
     )
     np.testing.assert_allclose(
-        mug.to_reference.quantiles, np.quantile([0.0, 0.01, 0.3, 0.005], QUANTILES), atol=1e-15
+        mug.to_reference.quantiles,
+        np.quantile([0.0, 0.01, 0.3, 0.005], DISTRIBUTION_QUANTILES),
+        atol=1e-15,
     )
     np.testing.assert_allclose(mug.translation.quantiles[-1], 0.01, atol=1e-15)
     np.testing.assert_allclose(mug.angle.quantiles[-1], math.radians(5.0), atol=1e-15)

@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 from burg_drake.core import InvalidInputError
-from burg_drake.motion import PHASES, ArmLimits, DoubleS, Plan, PlanOrigin, Trajectory, load_plan
+from burg_drake.motion import (
+    MOTION_PHASES,
+    ArmLimits,
+    DoubleS,
+    Plan,
+    PlanOrigin,
+    Trajectory,
+    load_plan,
+)
 from burg_drake.scene import load_scene
 from burg_drake.station import load_station
 
@@ -79,7 +87,7 @@ def test_between_the_samples_there_are_cubic_polynomials() -> None:
 
 def test_the_phases_follow_one_another(plan: Plan) -> None:
     whole = plan.whole
-    assert tuple(plan.phases) == tuple(name for name in PHASES if name != "retreat")
+    assert tuple(plan.phases) == tuple(name for name in MOTION_PHASES if name != "retreat")
     assert whole.duration == pytest.approx(plan.duration, abs=1e-9)
     parts = (plan.transfer, plan.approach, plan.lift)
     assert plan.duration == pytest.approx(0.5 + sum(part.duration for part in parts), abs=1e-9)
@@ -122,7 +130,7 @@ RETREAT = {
 def test_files_bring_a_retreat_back(plan: Plan, tmp_path: Path, suffix: str) -> None:
     plan = replace(plan, **RETREAT)
     back = load_plan(written(plan, tmp_path, suffix))
-    assert tuple(back.phases) == PHASES
+    assert tuple(back.phases) == MOTION_PHASES
     for name, phase in plan.phases.items():
         assert_same(back.phases[name], phase)
 

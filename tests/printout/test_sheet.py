@@ -9,7 +9,7 @@ import pytest
 from reportlab.pdfgen.canvas import Canvas
 
 from burg_drake.printout import (
-    POINT,
+    METRES_PER_POINT,
     ObjectDrawing,
     Pen,
     Sheet,
@@ -49,7 +49,7 @@ def test_lines_keep_clear_of_the_edges_of_markers(
     """They run in the middle of gaps and of cells; beside all edges there is none."""
     layout = marker_layout(SIZE, Markers(side=side, spacing=spacing, count=(2, 2)))
     stream = io.BytesIO()
-    canvas = Canvas(stream, pagesize=(SIZE[0] / POINT, SIZE[1] / POINT))
+    canvas = Canvas(stream, pagesize=(SIZE[0] / METRES_PER_POINT, SIZE[1] / METRES_PER_POINT))
     draw_sheet(Pen(canvas), Sheet(SIZE, layout, [lines_everywhere()], [], np.zeros((0, 2))))
     canvas.save()
     (image,) = rasterised(stream.getvalue(), DPI, grey=False)

@@ -11,7 +11,7 @@ from burg_drake.core import InvalidInputError, UnknownNameError
 from burg_drake.printout import (
     BLEED,
     MAX_FLAP_WIDTH,
-    PAPERS,
+    PAPER_SIZES,
     cut_axis,
     page_orientations,
     paper_size,
@@ -116,7 +116,7 @@ def test_mistakes() -> None:
 
 def test_papers() -> None:
     """ISO 216: each half of the one before, sides as 1 to the root of 2, to the millimetre."""
-    series = [PAPERS[f"A{k}"] for k in range(5)]
+    series = [PAPER_SIZES[f"A{k}"] for k in range(5)]
     for (short, long), (half, side) in itertools.pairwise(series):
         assert side == short and abs(half - long / 2) < 1e-3
         assert abs(long / short - 2**0.5) < 3e-3

@@ -7,12 +7,19 @@ import itertools
 import cv2
 import numpy as np
 
-from burg_drake.printout import FIXED_HUE, HUES, MIN_LUMA, height_at, luma_at, tint_colors
+from burg_drake.printout import (
+    FIXED_TINT_COLOR,
+    MIN_LUMA,
+    TINT_COLORS,
+    height_at,
+    luma_at,
+    tint_colors,
+)
 
 
 def test_grey_is_the_luma_for_every_hue() -> None:
     luma = np.linspace(MIN_LUMA, 1.0, 50)
-    for hue in (*HUES, FIXED_HUE):
+    for hue in (*TINT_COLORS, FIXED_TINT_COLOR):
         colors = tint_colors(hue, luma)
         assert colors.min() >= 0.0 and colors.max() <= 1.0
         grey = cv2.cvtColor(colors[None].astype(np.float32), cv2.COLOR_RGB2GRAY)[0]
@@ -60,11 +67,11 @@ Simulation of Color Vision Deficiency" (2009), at severity 1."""
 def test_hues_differ_for_every_kind_of_color_vision() -> None:
     """By 5 in CIELAB where tints are light, and 10 where they are dark; 2.3 can be noticed."""
     for luma, least in ((0.72, 10.0), (0.85, 5.0)):
-        colors = np.array([tint_colors(hue, luma) for hue in HUES])
+        colors = np.array([tint_colors(hue, luma) for hue in TINT_COLORS])
         linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
         for vision, seen in COLOR_VISION.items():
             rgb = np.clip(linear @ seen.T, 0.0, 1.0)
             encoded = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * rgb ** (1 / 2.4) - 0.055)
             lab = cv2.cvtColor(encoded[None].astype(np.float32), cv2.COLOR_RGB2LAB)[0]
-            for a, b in itertools.combinations(range(len(HUES)), 2):
+            for a, b in itertools.combinations(range(len(TINT_COLORS)), 2):
                 assert np.linalg.norm(lab[a] - lab[b]) > least, (vision, luma, a, b)

@@ -13,7 +13,7 @@ from scipy.stats import chisquare, kstest
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, transform_points
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.scene import (
-    LAYOUTS,
+    LAYOUT_NAMES,
     Arrangement,
     Board,
     LayoutName,
@@ -82,7 +82,7 @@ def overlap(one: Array, other: Array) -> bool:
     return bool(linprog(np.zeros(sums.shape[1]), A_eq=sums, b_eq=right).status == 0)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", LAYOUT_NAMES)
 def test_nothing_overlaps_or_is_beyond_the_edge(shapes: ObjectShapes, layout: LayoutName) -> None:
     arrangement = laid_out(shapes, layout, seed=1)
     assert len(arrangement.instances) + len(arrangement.missing) == 6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.visualization import VIRIDIS, hex_color, linear_light, map_colors
+from burg_drake.visualization import VIRIDIS_COLORS, hex_color, linear_light, map_colors
 
 # Linear RGB to what dichromats see: Machado, Oliveira, Fernandes, "A Physiologically-based Model
 # for Simulation of Color Vision Deficiency" (2009), severity 1.0.
@@ -78,8 +78,8 @@ def test_ends_are_those_of_viridis() -> None:
 
 
 def test_control_points_are_met_and_what_is_beyond_is_cut() -> None:
-    n = len(VIRIDIS)
-    assert [hex_color(c) for c in map_colors(np.arange(n) / (n - 1))] == list(VIRIDIS)
+    n = len(VIRIDIS_COLORS)
+    assert [hex_color(c) for c in map_colors(np.arange(n) / (n - 1))] == list(VIRIDIS_COLORS)
     assert map_colors([-5.0, np.inf]) == pytest.approx(map_colors([0.0, 1.0]))
     assert map_colors(np.zeros((2, 5))).shape == (2, 5, 3)
 

@@ -14,7 +14,7 @@ from burg_drake.visualization import (
     FINGER_LENGTH,
     PIXELS_PER_UNIT,
     STEM_LENGTH,
-    TONES,
+    TONE_COUNT,
     FlatView,
     SolidMesh,
     camera_rotation,
@@ -58,7 +58,7 @@ def test_an_outline_covers_what_the_solid_covers(mesh: trimesh.Trimesh, area: fl
     shown = solid(mesh)
     view = fit_view(shown.vertices, DOWN, 300.0)
     outline, *_ = paths = shaded_outline([shown], view)
-    assert len(paths) == TONES
+    assert len(paths) == TONE_COUNT
     # contours run through the middles of the pixels at the border, half a pixel inside
     length = sum(cv2.arcLength(p.astype(np.float32), True) for p in polygons(outline))
     found = even_odd_area(outline) + length * 0.5 / PIXELS_PER_UNIT

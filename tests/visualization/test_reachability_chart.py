@@ -12,7 +12,7 @@ from burg_drake.scene import load_scene
 from burg_drake.visualization import (
     CHART_TITLE_HEIGHT,
     CHART_WIDTH,
-    VIRIDIS,
+    VIRIDIS_COLORS,
     object_outlines,
     reachability_chart,
     reachability_key,
@@ -39,11 +39,11 @@ def test_cells_lie_as_the_sheet_is_read() -> None:
     svg = ElementTree.fromstring(reachability_chart(one_corner(), 0, {"a<b": triangle}))
     cells = [rect.attrib for rect in svg.iter("rect")]
     assert len(cells) == 8
-    (bright,) = (c for c in cells if c["fill"] == VIRIDIS[-1])
+    (bright,) = (c for c in cells if c["fill"] == VIRIDIS_COLORS[-1])
     assert (float(bright["x"]), float(bright["y"])) == pytest.approx(
         (0.75 * CHART_WIDTH, CHART_TITLE_HEIGHT)
     )
-    assert {c["fill"] for c in cells} == {VIRIDIS[0], VIRIDIS[-1]}
+    assert {c["fill"] for c in cells} == {VIRIDIS_COLORS[0], VIRIDIS_COLORS[-1]}
     (path,) = svg.iter("path")
     foot = CHART_TITLE_HEIGHT + CHART_WIDTH / 2
     assert (

@@ -193,7 +193,7 @@ class OptionalFeature:
     modules: str
 
 
-EXTRAS = (
+OPTIONAL_FEATURES = (
     OptionalFeature("mujoco", "second opinion by MuJoCo", "mujoco", "mujoco"),
     OptionalFeature("ui", "scene editor (burg-drake setup)", "viser", "msgspec"),
     OptionalFeature("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
@@ -209,7 +209,7 @@ BLENDER_EXTRA = OptionalFeature("blender", "photorealistic images (Blender)", "b
 
 def all_checks() -> list[FeatureCheck]:
     """Everything, in the order in which it is shown."""
-    installed = [extra for extra in EXTRAS if installed_version(extra.package)]
+    installed = [extra for extra in OPTIONAL_FEATURES if installed_version(extra.package)]
     tried = ["pydrake.common", COMPILED_MODULES, *(extra.modules for extra in installed)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
         list(pool.map(import_error, tried))
@@ -218,7 +218,7 @@ def all_checks() -> list[FeatureCheck]:
     return [
         *(_check_python(), _check_drake(), _check_packages(), _check_cores_and_memory()),
         *(_check_disk(), _check_cache(), _check_renderer(), _check_allocator()),
-        *(_check_extra(extra, names) for extra in EXTRAS),
+        *(_check_extra(extra, names) for extra in OPTIONAL_FEATURES),
         *(_check_blender(names), _check_ros(), _check_cameras(), _check_browser()),
         FeatureCheck("GPU", "ok", f"{gpu}; none is needed, physics runs on the processor"),
     ]

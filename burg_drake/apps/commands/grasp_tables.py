@@ -17,8 +17,8 @@ from burg_drake.core import (
     format_percent,
 )
 from burg_drake.grasping import (
+    DISTRIBUTION_QUANTILES,
     FRICTION_NEEDED,
-    QUANTILES,
     Distribution,
     Ranking,
     SetComparison,
@@ -138,7 +138,7 @@ def comparison_table(comparison: SetComparison) -> TextTable:
             format_percent(one.coverage.value),
             format_percent(one.precision.value),
             format_number(1e3 * one.to_grasps.median, 1),
-            format_number(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)], 1),
+            format_number(1e3 * one.to_grasps.quantiles[DISTRIBUTION_QUANTILES.index(0.95)], 1),
             format_number(1e3 * one.translation.median, 1),
             format_number(math.degrees(one.angle.median), 1),
             format_number(1e3 * one.to_reference.median, 1),
@@ -193,7 +193,7 @@ def _rows_with_total(objects: dict[str, Row], overall: Row) -> list[tuple[str, R
 
 def _mean_and_quantiles(values: Distribution) -> dict[str, float]:
     """Mean and quantiles by name."""
-    shown = {f"{q:.0%}": values.quantiles[QUANTILES.index(q)] for q in TABLE_QUANTILES}
+    shown = {f"{q:.0%}": values.quantiles[DISTRIBUTION_QUANTILES.index(q)] for q in TABLE_QUANTILES}
     return {"mean": values.mean, **shown}
 
 

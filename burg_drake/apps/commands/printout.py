@@ -55,7 +55,7 @@ def require_pdf(path: str) -> None:
 def run_printout(arguments: argparse.Namespace) -> int:
     """Writes the PDF; what is not on it as in the scene goes to stderr."""
     from burg_drake.core import require_writable
-    from burg_drake.printout import PAPERS, PrintSettings, print_board
+    from burg_drake.printout import PAPER_SIZES, PrintSettings, print_board
     from burg_drake.scene import load_scene
 
     require_pdf(arguments.output)
@@ -75,7 +75,7 @@ def run_printout(arguments: argparse.Namespace) -> int:
     tiling = printout.tiling
     columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
     across = " landscape" if tiling.paper.width > tiling.paper.height else " portrait"
-    if tiling.paper.name not in PAPERS:
+    if tiling.paper.name not in PAPER_SIZES:
         across = ""
     pages = f"{columns} x {rows} pages" if columns * rows > 1 else "1 page"
     told = "instructions and " if printout.first else ""

@@ -85,7 +85,7 @@ def _add_object_options(parser: Any) -> None:
 
 def _add_layout_options(parser: Any) -> None:
     other_layouts = ("random", "packed", "heap")  # Layouts with an option of their own.
-    from burg_drake.scene import LAYOUTS, SceneRecipe
+    from burg_drake.scene import LAYOUT_NAMES, SceneRecipe
 
     group = parser.add_argument_group("layout")
     group.add_argument(
@@ -98,7 +98,7 @@ def _add_layout_options(parser: Any) -> None:
     how = group.add_mutually_exclusive_group()
     how.add_argument(
         "--spacing",
-        choices=[name for name in LAYOUTS if name not in other_layouts],
+        choices=[name for name in LAYOUT_NAMES if name not in other_layouts],
         help="space between objects: 40 mm, 2 to 10 mm, or contact (default: random)",
     )
     how.add_argument("--packed", action="store_true", help="pack objects side by side")

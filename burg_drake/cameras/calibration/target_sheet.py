@@ -11,10 +11,10 @@ from reportlab.pdfgen.canvas import Canvas
 from burg_drake.cameras.calibration.charuco_target import CharucoTarget
 from burg_drake.core import Array, InvalidInputError, atomic_write, option_name
 from burg_drake.printout import (
-    BLACK,
+    BLACK_RGB,
     BOLD_FONT,
-    INK,
-    POINT,
+    METRES_PER_POINT,
+    TEXT_RGB,
     Paper,
     Pen,
     PrintSettings,
@@ -61,7 +61,7 @@ def write_target(
         )
     stream = io.BytesIO()
     print_scale = 0.1 / np.array(settings.measured)
-    page_size = tuple((print_scale * [paper.width, paper.height] / POINT).tolist())
+    page_size = tuple((print_scale * [paper.width, paper.height] / METRES_PER_POINT).tolist())
     canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)
     canvas.setTitle("Calibration target")
     canvas.setCreator("burg-drake")
@@ -96,13 +96,13 @@ def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
         squares.append(
             origin + flip * rectangle(corner.tolist(), (corner + target.square).tolist())
         )
-    pen.area(squares, BLACK, holes=False)
+    pen.area(squares, BLACK_RGB, holes=False)
     dictionary = marker_dictionary(target.dictionary)
     bits = int(dictionary.markerSize) + 2
     for number, corner in zip(target.board.getIds().ravel(), markers, strict=True):
         image = dictionary.generateImageMarker(int(number), bits)
         loops = [loop * (target.marker / bits) for loop in cell_outlines(image < 128)]
-        pen.area([origin + flip * (corner + loop) for loop in loops], BLACK)
+        pen.area([origin + flip * (corner + loop) for loop in loops], BLACK_RGB)
 
 
 def _draw_caption(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
@@ -116,7 +116,7 @@ def _draw_caption(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
     }
     words = [f"{option_name(CharucoTarget, name)} {value}" for name, value in values.items()]
     words += [option_name(CharucoTarget, "legacy")] if target.legacy else []
-    pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD_FONT, color=INK)
+    pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD_FONT, color=TEXT_RGB)
     for k, line in enumerate(
         (
             "Print at 100 %, glue onto something flat and stiff, then",

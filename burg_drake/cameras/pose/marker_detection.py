@@ -112,7 +112,7 @@ def _otsu_split(means: Array, shape: tuple[int, ...]) -> tuple[Booleans, Array]:
 
 FIRST_SEARCH = ((13,), 15.0)
 """Threshold windows in pixels, and contrast in 8-bit levels, for fair light."""
-SEARCHES = (True, FIRST_SEARCH), (False, FIRST_SEARCH), (True, ((5, 21, 37), 5.0))
+MARKER_SEARCHES = (True, FIRST_SEARCH), (False, FIRST_SEARCH), (True, ((5, 21, 37), 5.0))
 """Use of the encoded image (or its linear light), windows and contrast of each search."""
 MIN_PERIMETER = 0.06
 """Perimeter of a marker, at least, as a fraction of the image's longer side."""
@@ -162,7 +162,7 @@ class MarkerDetector:
     def detect(self, grey: Bytes) -> Detection:
         """Finds markers in an image (H, W). One that is seen twice counts as not seen."""
         found = Detection()
-        for encoded, (windows, constant) in SEARCHES:
+        for encoded, (windows, constant) in MARKER_SEARCHES:
             image = grey if encoded else linear_levels(srgb_to_linear(grey))
             again = self._search(image, windows, constant)
             if again.count >= found.count:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import time
 import uuid
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -91,7 +92,7 @@ WORKER_POLL_INTERVAL = 1.0
 SentT = TypeVar("SentT", bound=SentTask)
 
 
-class ClusterRun(Generic[SentT]):
+class ClusterRun(ABC, Generic[SentT]):
     """Tasks of one run under way on a cluster.
 
     Attributes:
@@ -111,9 +112,9 @@ class ClusterRun(Generic[SentT]):
         self._last_poll = -WORKER_POLL_INTERVAL
         self._waiting = WorkerWait(client)
 
+    @abstractmethod
     def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Any]:
         """Takes back the tasks of a lost worker, and yields the results of those given up."""
-        raise NotImplementedError
 
     def begin(self, plugin: Any) -> None:
         """Registers the plugin of the run on all workers and on those that join later. A worker

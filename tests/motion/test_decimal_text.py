@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core import format_rows, round_to_grid
+from burg_drake.motion import format_rows, round_to_grid
 
 
 def values() -> np.ndarray:
