@@ -115,11 +115,11 @@ def plans(scene: Scene, station: Station, count: int) -> Iterator[Planned]:
         clear = clear[: ASKED * count]
         width = sampled.width[clear]
         found = planner.reach.check_all([name] * len(clear), X_WG[clear], width)
-        feasible = [k for k, reach in enumerate(found) if reach.witness is not None][:count]
+        feasible = [k for k, reach in enumerate(found) if reach.path is not None][:count]
         for k in feasible:
-            witness = found[k].witness
-            assert witness is not None
-            plan = planner.time(name, witness, float(width[k]))
+            arm_path = found[k].path
+            assert arm_path is not None
+            plan = planner.time(name, arm_path, float(width[k]))
             yield Planned(name, k, sampled.X_OG[clear[k]], plan)
 
 

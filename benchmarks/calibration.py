@@ -171,18 +171,18 @@ def judged(camera: Camera, views: list[burg.cameras.CharucoView]) -> Judgement:
     seconds = time.process_time() - start
     pixels, off = errors(camera, found.intrinsics)
     part = np.array(IMAGE_PARTS)[image_part_indices(pixels, camera.size)]
-    promise = found.promise
-    of_parts = {name: off[part == name].max() for name in promise.parts if (part == name).any()}
-    held = [of_parts[name] for name in of_parts if name not in promise.except_at]
+    accuracy = found.accuracy
+    of_parts = {name: off[part == name].max() for name in accuracy.parts if (part == name).any()}
+    held = [of_parts[name] for name in of_parts if name not in accuracy.excepted_parts]
     return Judgement(
         found.model,
         found.rms,
         max(held),
-        promise.known_to,
-        len(promise.except_at),
+        accuracy.error_bound,
+        len(accuracy.excepted_parts),
         max(of_parts.values()),
-        max(promise.parts.values()),
-        max(error / promise.parts[name] for name, error in of_parts.items()),
+        max(accuracy.parts.values()),
+        max(error / accuracy.parts[name] for name, error in of_parts.items()),
         seconds,
     )
 

@@ -143,12 +143,12 @@ def sizes() -> None:
         for k in range(ChunkSettings.max_grasps)
     )
     recipe = JudgeRecipe(pickle.dumps(Make(KnownJudge())))
-    empty = len(
-        pickle.dumps(worker_tasks.Chunk("burg-drake-" + "0" * 32, recipe, (), WorkerLimits()))
-    )
-    there = len(
-        pickle.dumps(worker_tasks.Chunk("burg-drake-" + "0" * 32, recipe, grasps, WorkerLimits()))
-    )
+
+    def size_with(grasps: tuple[Candidate, ...]) -> int:
+        run, limits = "burg-drake-" + "0" * 32, WorkerLimits()
+        return len(pickle.dumps(worker_tasks.GraspChunk(run, "", recipe, grasps, limits)))
+
+    empty, there = size_with(()), size_with(grasps)
     back = len(pickle.dumps(worker_tasks.ChunkAnswers(answers(grasps))))
     print(
         f"a chunk of {ChunkSettings.max_grasps} grasps: {there} bytes there"
@@ -188,7 +188,7 @@ def main_of_sleepers(handle: int) -> None:
         _judged += 1
         seconds: float = pickle.loads(job.make_judge.make_judge).judge.pause  # type: ignore[attr-defined]
         time.sleep(seconds * len(job.candidates))
-        return worker_tasks.ChunkAnswers(answers(tuple(job.candidates)), seconds=seconds)
+        return worker_tasks.ChunkAnswers(answers(tuple(job.candidates)))
 
     worker_tasks.Supervisor.judge = judge  # type: ignore[method-assign]
 

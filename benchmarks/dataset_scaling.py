@@ -27,7 +27,6 @@ from pathlib import Path
 from burg_drake.core import Task, WorkerPool
 from burg_drake.dataset import (
     AppearanceSettings,
-    DatasetInputs,
     DatasetRecipe,
     SceneWork,
     make_scene,
@@ -103,9 +102,10 @@ def warm(workers: int, asked: argparse.Namespace) -> float:
     recipe = DatasetRecipe(views=asked.views, looks=looks)
     recipe = replace(recipe, given=tuple(scene.content for scene in scenes))
     with tempfile.TemporaryDirectory() as folder, WorkerPool(workers, own_group=True) as pool:
-        inputs = DatasetInputs(recipe, Path(folder), load_station(STATION).path, None)
+        station = load_station(STATION).path
         tasks = [
-            Task(make_scene, (SceneWork(inputs, k, scene.path),)) for k, scene in enumerate(scenes)
+            Task(make_scene, (SceneWork(k, scene.path, recipe, Path(folder), station, None),))
+            for k, scene in enumerate(scenes)
         ]
         before, timed = tasks[asked.scenes :], tasks[: asked.scenes]
         for k, task in enumerate(before):

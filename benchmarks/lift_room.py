@@ -65,10 +65,10 @@ def judge(
     print("    " + "; ".join(f"{count} x {cause}" for cause, count in causes.most_common(4)))
     audit, faults = Audit(scene, station), 0
     for k in reached[:most]:
-        witness = found[k].witness
-        assert witness is not None
+        arm_path = found[k].path
+        assert arm_path is not None
         width = float(grasps.width[k])
-        faults += bool(audit.faults(grasps.instance[k], witness, width, step=STEP))
+        faults += bool(audit.faults(grasps.instance[k], arm_path, width, step=STEP))
     print(f"    audit: {faults} of {len(reached[:most])} motions collide", flush=True)
 
 

@@ -94,7 +94,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
     campaign = save_campaign(Campaign(folder, campaign_document(found, request)))
     by_name = dict(zip((entry.name for entry in found.entries), loaded, strict=True))
     ledger = SceneStates(folder)
-    writer = PartWriter(folder, campaign.places, campaign.document.instances)
+    writer = PartWriter(campaign)
     for name in campaign.names:
         rng = np.random.default_rng(int(name[-5:]))
         scene = by_name[name]

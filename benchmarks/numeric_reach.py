@@ -96,14 +96,14 @@ def against_drake(
     """Audits motions, and asks the judge by SNOPT and RRT about as many yes as no."""
     motion = GraspMotion()
     world = World(scene, station, motion.standoff, motion.lift_height)
-    reached = [k for k, reach in enumerate(found) if reach.witness is not None]
+    reached = [k for k, reach in enumerate(found) if reach.path is not None]
     audited = reached[: arguments.audit]
     audit, faults = Audit(scene, station), 0
     for k in audited:
-        witness = found[k].witness
-        assert witness is not None
+        arm_path = found[k].path
+        assert arm_path is not None
         width = float(grasps.width[k])
-        faults += bool(audit.faults(grasps.instance[k], witness, width, step=STEP))
+        faults += bool(audit.faults(grasps.instance[k], arm_path, width, step=STEP))
     print(f"  audit: {faults} of {len(audited)} motions collide")
     refused = [
         k

@@ -121,10 +121,10 @@ def audit_motions(
 ) -> None:
     """Audits the first motions, and prints what collides."""
     audit = Audit(scene, station)
-    motions = [(k, reach.witness) for k, reach in enumerate(found) if reach.witness][:most]
+    motions = [(k, reach.path) for k, reach in enumerate(found) if reach.path][:most]
     faulty = 0
-    for k, witness in motions:
-        faults = audit.faults(grasps.instance[k], witness, float(grasps.width[k]), step=STEP)
+    for k, arm_path in motions:
+        faults = audit.faults(grasps.instance[k], arm_path, float(grasps.width[k]), step=STEP)
         if faults:
             faulty += 1
             print(

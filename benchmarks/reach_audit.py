@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array
-from burg_drake.motion import Witness
+from burg_drake.motion import ArmPath
 from burg_drake.scene import Scene
 from burg_drake.station import Station, build_station_diagram, replace_meshes_by_pieces
 
@@ -67,7 +67,7 @@ class Audit:
         self._at_rest = self._overlaps()
 
     def faults(
-        self, instance: str, witness: Witness, width: float = np.nan, *, step: float = 0.005
+        self, instance: str, arm_path: ArmPath, width: float = np.nan, *, step: float = 0.005
     ) -> list[Fault]:
         """What overlaps, for each configuration that is looked at.
 
@@ -75,15 +75,19 @@ class Audit:
 
         Args:
             instance: the target; "" if there is none.
-            witness: the motion.
+            arm_path: the motion.
             width: distance between the pads on retreat and lift [m]; NaN for the open hand.
             step: between two configurations; a radian of each joint counts as one metre, which is
                 longer than the arm [m].
         """
-        parts = {"transfer": witness.transfer, "approach": witness.approach, "lift": witness.lift}
-        held_at = witness.lift[0]
-        if witness.retreat is not None:
-            parts["retreat"], held_at = witness.retreat, witness.retreat[0]
+        parts = {
+            "transfer": arm_path.transfer,
+            "approach": arm_path.approach,
+            "lift": arm_path.lift,
+        }
+        held_at = arm_path.lift[0]
+        if arm_path.retreat is not None:
+            parts["retreat"], held_at = arm_path.retreat, arm_path.retreat[0]
         target = self._built.free.get(instance)
         X_WO = RigidTransform(self._built.X_WO(instance)) if instance else RigidTransform()
         X_HO = self._X_WH(held_at).inverse() @ X_WO

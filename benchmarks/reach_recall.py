@@ -17,7 +17,7 @@ from reach_audit import Audit
 from reach_prover import Prover
 
 from burg_drake.core import Array, wilson_interval
-from burg_drake.motion import ArmReach, Reach, ReachSettings, Witness
+from burg_drake.motion import ArmPath, ArmReach, Reach, ReachSettings
 from burg_drake.scene import Scene
 from burg_drake.station import GraspMotion, Station
 
@@ -75,8 +75,8 @@ def recall(
         numeric = ArmReach(scene, station, settings=replace(settings, closed_form=False))
         again = numeric.check_all([instance[k] for k in refused], X_WG[refused], width[refused])
         for k, reach in zip(refused, again, strict=True):
-            if reach.witness is not None:
-                motions.setdefault(k, reach.witness)
+            if reach.path is not None:
+                motions.setdefault(k, reach.path)
     audit = Audit(scene, station)
     missed = [
         f"{instance[k]} {k}: {ours[k].outcome} {ours[k].blocker}".rstrip()
@@ -98,7 +98,7 @@ def _proven(
     grasps: tuple[list[str], Array, Array],
     refused: list[int],
     motion: GraspMotion,
-) -> dict[int, Witness]:
+) -> dict[int, ArmPath]:
     """Motions of the independent judge, by the number of the grasp."""
     assert motion.retreat == 0.0 and np.array_equal(motion.direction_W, (0.0, 0.0, 1.0))
     prover = Prover(scene, station, motion.standoff, motion.lift_height)
@@ -106,7 +106,7 @@ def _proven(
     for k in refused:
         proof = prover.prove(grasps[0][k], grasps[1][k], float(grasps[2][k]))
         if proof is not None:
-            motions[k] = Witness(
+            motions[k] = ArmPath(
                 X_WG=proof.X_WG,
                 transfer=proof.transfer,
                 approach=proof.approach,

@@ -114,9 +114,9 @@ def ask(scene_name: str, station_name: str, grasps: str) -> dict[str, float]:
     judged = time.process_time()
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     planner = Planner(reach)
-    planned = [k for k, verdict in enumerate(verdicts) if verdict.witness is not None]
+    planned = [k for k, verdict in enumerate(verdicts) if verdict.path is not None]
     began = time.process_time()
-    plans = [planner.time(names[k], verdicts[k].witness, width[k]) for k in planned]
+    plans = [planner.time(names[k], verdicts[k].path, width[k]) for k in planned]
     ended = time.process_time()
     figures = {
         "import": imported,

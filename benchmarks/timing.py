@@ -64,13 +64,13 @@ def measure(planner: Planner, grasps: Grasps, title: str) -> None:
     plans: list[tuple[str, Plan]] = []
     cost, alone, stops = [], [], 0.0
     for instance, reach, width in zip(grasps.instance, reaches, grasps.width, strict=True):
-        if reach.witness is None:
+        if reach.path is None:
             continue
         start = time.process_time()
-        plan = planner.time(instance, reach.witness, float(width))
+        plan = planner.time(instance, reach.path, float(width))
         cost.append(1e3 * (time.process_time() - start))
         start = time.process_time()
-        unchecked = time_motion(reach.witness, planner.limits, planner.reach.kinematics)
+        unchecked = time_motion(reach.path, planner.limits, planner.reach.kinematics)
         alone.append(1e3 * (time.process_time() - start))
         stops += float(unchecked.transfer.duration)
         plans.append((instance, plan))

@@ -102,12 +102,14 @@ class Package:
 
     @cached_property
     def imports(self) -> list[Import]:
-        """All imports of the package's own names, those within functions, too."""
-        return [
+        """All imports of the package's own names, those within functions, too; and the names that
+        are used of a package with a face that is imported as a whole."""
+        named = [
             found
             for module in self.files
             for found in self._imports(module, self.statements[module])
         ]
+        return [*named, *(used for found in named for used in self._attributes(found))]
 
     @cached_property
     def graph(self) -> dict[str, dict[str, Import]]:
@@ -164,6 +166,14 @@ class Package:
                 if node.level == 0 and f"{node.module}.".startswith(inside):
                     for alias in node.names:
                         yield Import(module, str(node.module), alias.name, node.lineno)
+
+    def _attributes(self, found: Import) -> Iterator[Import]:
+        """Names that a module uses of what it imports, if that is a package with a face."""
+        package = f"{found.source}.{found.name}"
+        if self.faces.get(package):
+            for node in ast.walk(self.trees[found.module]):
+                if isinstance(node, ast.Attribute) and ast.unparse(node.value) == found.name:
+                    yield Import(found.module, package, node.attr, node.lineno)
 
 
 def all_statements(node: ast.AST) -> Iterator[ast.AST]:

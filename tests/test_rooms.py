@@ -231,6 +231,17 @@ def test_a_name_that_nobody_imports_is_found(tmp_path: Path) -> None:
     ]
 
 
+def test_names_of_a_room_that_is_imported_as_a_whole_count(tmp_path: Path) -> None:
+    house = built(
+        tmp_path, a_in_low="f = g = 1", b_in_low="from house import high\nhigh.h",
+        c_in_high="from house import low\nlow.f", d_in_high="h = 1",
+    )  # fmt: skip
+    house = face(house, "low", "from .a import f as f, g as g")
+    house = face(house, "high", "from .d import h as h")
+    assert unasked(house) == ["house.low shows g, which nobody imports"]
+    assert "house.low.b:2 imports h from house.high" in upward(house, ORDER)
+
+
 def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:
     house = built(tmp_path, a_in_low="class Ball: ...", b_in_high="class Ball: ...")
     assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]

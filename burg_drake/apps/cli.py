@@ -12,6 +12,7 @@ import importlib
 import io
 import os
 import select
+import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -224,7 +225,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.reconfigure(errors="backslashreplace")
     # pyarrow's own allocator gives memory back again and again, which costs more than the reading
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
-    arguments = build_parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = build_parser().parse_args(words)
+    arguments.command_line = shlex.join(["burg-drake", *words])
     try:
         return _run_command(arguments)
     except KeyboardInterrupt:

@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import ipaddress
-import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime
-from functools import partial
 from http import HTTPStatus
 from typing import Any
 
+from starlette.requests import Request
+from starlette.responses import Response
+
+from burg_drake import core
 from burg_drake.apps.page_server import (
-    Handler,
-    PageHandler,
     PageServer,
-    parse_address,
+    file_routes,
+    get_route,
+    json_response,
     parse_picture_number,
-)
-from burg_drake.core import (
-    BrowserToken,
-    BurgError,
-    RealOutcome,
-    RequestError,
-    quote_value,
-    require_local_host,
+    post_route,
+    request_header,
 )
 from burg_drake.experiment import (
-    EntryConflict,
     LabBook,
     LabCamera,
     LabEntry,
     PictureCache,
+    TrialChanged,
     entry_data,
     entry_states,
     parse_real_outcome,
@@ -64,11 +60,11 @@ def parse_lab_entry(body: dict[str, Any], plan: str) -> LabEntry:
     for name, value in body.items():
         if name not in ENTRY_FIELDS:
             raise _bad_request(
-                f"an entry has no {quote_value(name)}; it has {', '.join(ENTRY_FIELDS)}"
+                f"an entry has no {core.quote_value(name)}; it has {', '.join(ENTRY_FIELDS)}"
             )
         if value is not None and not _has_type(ENTRY_FIELDS[name], value):
             raise _bad_request(
-                f"{name} must be a {ENTRY_FIELDS[name].__name__}, not {quote_value(value)}"
+                f"{name} must be a {ENTRY_FIELDS[name].__name__}, not {core.quote_value(value)}"
             )
         if isinstance(value, str):
             _require_line(name, value)
@@ -76,7 +72,7 @@ def parse_lab_entry(body: dict[str, Any], plan: str) -> LabEntry:
         if body.get(name) is None:
             raise _bad_request(f"an entry needs {name}")
     if body["plan"] != plan:
-        raise RequestError(HTTPStatus.CONFLICT, "this entry is of another trials file")
+        raise core.RequestError(HTTPStatus.CONFLICT, "this entry is of another trials file")
     return LabEntry(
         number=body["number"],
         replaces=body["replaces"],
@@ -96,7 +92,7 @@ def parse_trial_number(body: dict[str, Any]) -> int:
     """
     number = body.get("number")
     if not _has_type(int, number):
-        raise _bad_request(f"number must be that of a trial, not {quote_value(number)}")
+        raise _bad_request(f"number must be that of a trial, not {core.quote_value(number)}")
     return int(body["number"])
 
 
@@ -116,12 +112,12 @@ def _require_line(name: str, value: str) -> None:
         raise _bad_request(f"{name} has characters that are no text")
 
 
-def _parse_outcome(value: str | None) -> RealOutcome | None:
+def _parse_outcome(value: str | None) -> core.RealOutcome | None:
     if value is None:
         return None
     try:
         return parse_real_outcome(value)
-    except BurgError as error:
+    except core.BurgError as error:
         raise _bad_request(str(error)) from error
 
 
@@ -131,7 +127,7 @@ def _parse_time(value: str) -> str:
     except ValueError:
         moment = None
     if moment is None or moment.tzinfo is None:
-        raise _bad_request(f"time {quote_value(value)} is not a date and time with its zone")
+        raise _bad_request(f"time {core.quote_value(value)} is not a date and time with its zone")
     return moment.isoformat(timespec="seconds")
 
 
@@ -140,12 +136,14 @@ def _parse_width(value: float | None) -> float | None:
     if value is None:
         return None
     if not math.isfinite(value) or not 0.0 <= value <= max_width_mm:
-        raise _bad_request(f"width_mm must be from 0 to {max_width_mm:g}, not {quote_value(value)}")
+        raise _bad_request(
+            f"width_mm must be from 0 to {max_width_mm:g}, not {core.quote_value(value)}"
+        )
     return float(value)
 
 
-def _bad_request(message: str) -> RequestError:
-    return RequestError(HTTPStatus.BAD_REQUEST, message)
+def _bad_request(message: str) -> core.RequestError:
+    return core.RequestError(HTTPStatus.BAD_REQUEST, message)
 
 
 LAB_PAGE_FILES = {
@@ -176,7 +174,11 @@ class LabServer(PageServer):
     """
 
     first_port = 7300
-    poll = 0.05
+    policy = (
+        "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
+        " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    refused_code = HTTPStatus.UNPROCESSABLE_ENTITY
 
     def __init__(
         self,
@@ -189,11 +191,22 @@ class LabServer(PageServer):
         secret: str | None = None,
     ) -> None:
         self.lab, self.pictures, self.camera = lab, pictures, camera
-        self.plan = json.dumps(plan_data(lab) | {"camera": camera is not None}).encode()
-        super().__init__(LabHandler, host=host, port=port)
+        plan = plan_data(lab) | {"camera": camera is not None}
+        routes = [
+            *file_routes("lab_page", LAB_PAGE_FILES),
+            get_route("/plan", lambda request: json_response(plan)),
+            get_route("/states", self._states),
+            get_route("/picture/{name:path}", self._picture),
+            get_route("/frame.jpg", self._frame),
+            get_route("/camera", lambda request: json_response(self._camera().status())),
+            post_route("/entry", self._enter),
+            post_route("/watch", self._watch),
+            post_route("/check", self._check),
+        ]
+        super().__init__(routes, host=host, port=port)
         bound, number = self.server_address[:2]
         local = ipaddress.ip_address(str(bound)).is_loopback
-        self.token = None if local else BrowserToken(f"burg_drake_{number}", secret)
+        self.token = None if local else core.BrowserToken(f"burg_drake_{number}", secret)
         self.on_admitted: Callable[[str], None] = lambda peer: None
 
     @property
@@ -202,122 +215,68 @@ class LabServer(PageServer):
         machines can reach it."""
         return super().url if self.token is None else f"{super().url}?token={self.token.token}"
 
-
-class LabHandler(PageHandler):
-    """Answers one connection's requests."""
-
-    server: LabServer
-    folder = "lab_page"
-    pages = LAB_PAGE_FILES
-    policy = "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
-    " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    refused_code = HTTPStatus.UNPROCESSABLE_ENTITY
-
-    def do_GET(self) -> None:
-        """Pages, pictures, what was entered."""
-        self.answer(
-            {
-                "/plan": self._send_plan,
-                "/states": self._send_states,
-                "/frame.jpg": self._send_frame,
-                "/camera": self._send_camera,
-            }
-        )
-
-    def do_POST(self) -> None:
-        """Entries and actions."""
-        self.answer({"/entry": self._enter, "/watch": self._watch, "/check": self._check})
-
-    def admitted(self) -> tuple[str, dict[str, str]]:
+    def admit(self, request: Request) -> str:
         """This machine is meant, and the browser was admitted or brings the token."""
-        path, query = parse_address(self.path)
-        require_local_host(self._header, served=self.server.host, is_page=path == "/")
-        self._require_browser(path, query)
-        return path, query
+        super().admit(request)
+        if self.token is None or self.token.admits(request_header(request, "Cookie") or ""):
+            return ""
+        given = request.query_params.get("token", "")
+        if request.scope["path"] != "/" or not self.token.use(given):
+            raise core.RequestError(
+                HTTPStatus.FORBIDDEN,
+                "open this page by the address with a token that burg-drake printed last; each"
+                " address works in one browser",
+            )
+        self.on_admitted(request.scope["client"][0])
+        return self.token.set_cookie
 
-    def find(self, routes: Mapping[str, Handler], path: str) -> Handler:
-        """Pictures have addresses of their own."""
-        if self.command == "GET" and path.startswith("/picture/"):
-            name = path.removeprefix("/picture/").removesuffix(".jpg")
-            return partial(self._send_picture, name)
-        return super().find(routes, path)
-
-    def refusal(self, error: BurgError) -> tuple[Any, HTTPStatus]:
+    def _answer_refusal(self, request: Request, error: Exception) -> Response:
         """An entry that another one came before is answered with that one."""
-        if isinstance(error, EntryConflict):
+        if isinstance(error, TrialChanged):
             answer = {"error": str(error), "entry": entry_data(error.trial)}
-            return answer, HTTPStatus.CONFLICT
-        return super().refusal(error)
+            return json_response(answer, HTTPStatus.CONFLICT)
+        return super()._answer_refusal(request, error)
 
-    def _header(self, name: str) -> str | None:
-        """A header; given twice it would mean one thing here and another thing there."""
-        values = self.headers.get_all(name, [])
-        if len(values) > 1:
-            raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
-        return values[0] if values else None
+    def _states(self, request: Request) -> Response:
+        found = entry_states(self.lab)
+        if "version" in found and found["version"] == request.query_params.get("after"):
+            return Response(status_code=HTTPStatus.NO_CONTENT)
+        return json_response(found)
 
-    def _require_browser(self, path: str, query: dict[str, str]) -> None:
-        """Lets in who was admitted, or brings the token."""
-        message = (
-            "open this page by the address with a token that burg-drake printed last; each"
-            " address works in one browser"
-        )
-        token, self.new_cookie = self.server.token, ""
-        if token is None or token.admits(self._header("Cookie") or ""):
-            return
-        if path != "/" or not token.use(query.get("token", "")):
-            raise RequestError(HTTPStatus.FORBIDDEN, message)
-        self.new_cookie = token.set_cookie
-        self.server.on_admitted(str(self.client_address[0]))
-
-    def _send_plan(self, query: dict[str, str]) -> None:
-        self.send(HTTPStatus.OK, "application/json", self.server.plan)
-
-    def _send_states(self, query: dict[str, str]) -> None:
-        found = entry_states(self.server.lab)
-        if "version" in found and found["version"] == query.get("after"):
-            self.send(HTTPStatus.NO_CONTENT)
-        else:
-            self.send_json(found)
-
-    def _send_picture(self, name: str, query: dict[str, str]) -> None:
+    def _picture(self, request: Request) -> Response:
         rendering_timeout = 20.0  # Seconds that the request waits for a picture.
-        picture = self.server.pictures.get(name, rendering_timeout)
+        name = request.path_params["name"].removesuffix(".jpg")
+        picture = self.pictures.get(name, rendering_timeout)
         if picture is None:
-            fault = self.server.pictures.fault or f"there is no picture {name[:100]}"
-            raise RequestError(HTTPStatus.NOT_FOUND, fault)
-        self.send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": "private, max-age=86400"})
+            fault = self.pictures.fault or f"there is no picture {name[:100]}"
+            raise core.RequestError(HTTPStatus.NOT_FOUND, fault)
+        headers = {"Cache-Control": "private, max-age=86400"}
+        return Response(picture, headers=headers, media_type="image/jpeg")
 
-    def _send_frame(self, query: dict[str, str]) -> None:
+    def _frame(self, request: Request) -> Response:
         frame_timeout = 1.0  # Seconds that the request waits for a newer frame.
-        after = parse_picture_number(query)
-        epoch = parse_picture_number({"after": query.get("epoch", "0")})
+        after, epoch = (parse_picture_number(request, name) for name in ("after", "epoch"))
         found = self._camera().next_picture(epoch, after, frame_timeout)
         if found is None:
-            self.send(HTTPStatus.NO_CONTENT)
-            return
+            return Response(status_code=HTTPStatus.NO_CONTENT)
         epoch, picture = found
         headers = {"X-Picture": str(picture.number), "X-Epoch": str(epoch)}
-        self.send(HTTPStatus.OK, "image/jpeg", picture.jpeg, headers)
+        return Response(picture.jpeg, headers=headers, media_type="image/jpeg")
 
-    def _send_camera(self, query: dict[str, str]) -> None:
-        self.send_json(self._camera().status())
+    def _enter(self, body: dict[str, Any]) -> dict[str, Any]:
+        return {"entry": entry_data(self.lab.enter(parse_lab_entry(body, self.lab.plan)))}
 
-    def _enter(self, body: dict[str, Any]) -> None:
-        entry = parse_lab_entry(body, self.server.lab.plan)
-        self.send_json({"entry": entry_data(self.server.lab.enter(entry))})
-
-    def _watch(self, body: dict[str, Any]) -> None:
+    def _watch(self, body: dict[str, Any]) -> dict[str, Any]:
         self._camera().watch(parse_trial_number(body))
-        self.send_json({})
+        return {}
 
-    def _check(self, body: dict[str, Any]) -> None:
+    def _check(self, body: dict[str, Any]) -> dict[str, Any]:
         if not isinstance(body.get("keep"), bool):
-            raise RequestError(HTTPStatus.BAD_REQUEST, '"keep" must be true or false')
+            raise core.RequestError(HTTPStatus.BAD_REQUEST, '"keep" must be true or false')
         self._camera().check(parse_trial_number(body), keep=body["keep"])
-        self.send_json({})
+        return {}
 
     def _camera(self) -> LabCamera:
-        if self.server.camera is None:
-            raise RequestError(HTTPStatus.NOT_FOUND, "there is no camera; start with --camera")
-        return self.server.camera
+        if self.camera is None:
+            raise core.RequestError(HTTPStatus.NOT_FOUND, "there is no camera; start with --camera")
+        return self.camera

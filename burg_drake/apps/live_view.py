@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
 from dataclasses import asdict
 from http import HTTPStatus
 from typing import Any
 
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+
+from burg_drake.apps import options
 from burg_drake.apps.commands.camera_placement import extra_object_line
-from burg_drake.apps.options.arguments import MAX_PAGE_CONNECTIONS
-from burg_drake.apps.page_server import PageHandler, PageServer, parse_address, parse_picture_number
+from burg_drake.apps.page_server import (
+    PageServer,
+    file_routes,
+    get_route,
+    json_response,
+    parse_picture_number,
+    post_route,
+)
 from burg_drake.apps.terminal import print_remark
 from burg_drake.cameras import (
     LiveSession,
@@ -24,7 +35,7 @@ from burg_drake.cameras import (
     placement_summary,
     position_sd,
 )
-from burg_drake.core import RequestError, require_local_host
+from burg_drake.core import RequestError
 
 
 def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> dict[str, Any]:
@@ -127,6 +138,7 @@ def _finite_or_none(value: float) -> float | None:
 
 LIVE_PICTURE_TIMEOUT = 1.0
 """Seconds that a request for a picture waits for a newer one."""
+BOUNDARY = "picture"  # Between pictures of a stream.
 LIVE_VIEW_FILES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
@@ -151,6 +163,7 @@ class ViewServer(PageServer):
 
     first_port = 7100
     title = "view"
+    policy = "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'"
 
     def __init__(
         self,
@@ -159,99 +172,70 @@ class ViewServer(PageServer):
         *,
         host: str = "127.0.0.1",
         port: int | None = None,
-        connections: int = MAX_PAGE_CONNECTIONS,
+        connections: int = options.MAX_PAGE_CONNECTIONS,
     ) -> None:
         self.live, self.actions = live, actions
-        self.closing = threading.Event()
-        super().__init__(ViewHandler, host=host, port=port, connections=connections)
+        self._closing = threading.Event()
+        routes = [
+            *file_routes("live_page", LIVE_VIEW_FILES),
+            get_route("/frame.jpg", self._picture),
+            get_route("/stream.mjpg", self._stream),
+            get_route("/status", self._status),
+            post_route("/settings", self._change_settings),
+            post_route("/snapshot", lambda body: {"path": str(actions.snapshot())}),
+            post_route("/record", self._record),
+            post_route("/check", self._check),
+        ]
+        super().__init__(routes, host=host, port=port, connections=connections)
 
     def close(self) -> None:
         """Stops serving; requests that are being answered end soon."""
-        self.closing.set()
+        self._closing.set()
         super().close()
 
-
-class ViewHandler(PageHandler):
-    """Answers one connection's requests."""
-
-    server: ViewServer
-    folder = "live_page"
-    pages = LIVE_VIEW_FILES
-    policy = "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'"
-
-    def do_GET(self) -> None:
-        """Pages, pictures, status."""
-        self.answer(
-            {
-                "/frame.jpg": self._send_picture,
-                "/stream.mjpg": self._send_stream,
-                "/status": self._send_status,
-            }
-        )
-
-    def do_POST(self) -> None:
-        """Actions."""
-        self.answer(
-            {
-                "/settings": self._change_settings,
-                "/snapshot": self._take_snapshot,
-                "/record": self._record,
-                "/check": self._check,
-            }
-        )
-
-    def admitted(self) -> tuple[str, dict[str, str]]:
-        """Only this machine is meant, and only the page itself may be led to from elsewhere."""
-        require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
-        return parse_address(self.path)
-
-    def _send_picture(self, query: dict[str, str]) -> None:
-        picture = self.server.live.next_picture(parse_picture_number(query), LIVE_PICTURE_TIMEOUT)
+    def _picture(self, request: Request) -> Response:
+        picture = self.live.next_picture(parse_picture_number(request), LIVE_PICTURE_TIMEOUT)
         if picture is None:
-            self.send(HTTPStatus.NO_CONTENT)
-        else:
-            self.send(HTTPStatus.OK, "image/jpeg", picture.jpeg, {"X-Picture": str(picture.number)})
+            return Response(status_code=HTTPStatus.NO_CONTENT)
+        return Response(
+            picture.jpeg, headers={"X-Picture": str(picture.number)}, media_type="image/jpeg"
+        )
 
-    def _send_stream(self, query: dict[str, str]) -> None:
-        boundary = "picture"
-        self.close_connection = True
-        kind = f"multipart/x-mixed-replace; boundary={boundary}"
-        self.send_head(HTTPStatus.OK, {"Content-Type": kind})
-        self.end_headers()
+    def _stream(self, request: Request) -> Response:
+        kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+        return StreamingResponse(self._parts(), media_type=kind, headers={"Connection": "close"})
+
+    def _parts(self) -> Iterator[bytes]:
+        """Pictures until the server or the client ends."""
         number = 0
-        while not self.server.closing.is_set():
-            picture = self.server.live.next_picture(number, LIVE_PICTURE_TIMEOUT)
+        while not self._closing.is_set():
+            picture = self.live.next_picture(number, LIVE_PICTURE_TIMEOUT)
             if picture is None:
                 continue
             number = picture.number
             head = (
-                f"--{boundary}\r\nContent-Type: image/jpeg\r\n"
+                f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\n"
                 f"Content-Length: {len(picture.jpeg)}\r\nX-Picture: {number}\r\n\r\n"
             )
-            self.wfile.write(head.encode() + picture.jpeg + b"\r\n")
+            yield head.encode() + picture.jpeg + b"\r\n"
 
-    def _send_status(self, query: dict[str, str]) -> None:
-        self.send_json(
-            session_status(self.server.live, self.server.actions, parse_picture_number(query))
-        )
+    def _status(self, request: Request) -> Response:
+        return json_response(session_status(self.live, self.actions, parse_picture_number(request)))
 
-    def _change_settings(self, body: dict[str, Any]) -> None:
-        self.server.live.change(**body)
-        self.send_json({})
+    def _change_settings(self, body: dict[str, Any]) -> dict[str, Any]:
+        self.live.change(**body)
+        return {}
 
-    def _take_snapshot(self, body: dict[str, Any]) -> None:
-        self.send_json({"path": str(self.server.actions.snapshot())})
-
-    def _record(self, body: dict[str, Any]) -> None:
+    def _record(self, body: dict[str, Any]) -> dict[str, Any]:
         if not isinstance(body.get("on"), bool):
             raise RequestError(HTTPStatus.BAD_REQUEST, '"on" must be true or false')
-        actions = self.server.actions
+        actions = self.actions
         path = actions.start_recording() if body["on"] else actions.stop_recording()
-        self.send_json({"path": path and str(path)})
+        return {"path": path and str(path)}
 
-    def _check(self, body: dict[str, Any]) -> None:
-        self.server.actions.start_check()
-        self.send_json({})
+    def _check(self, body: dict[str, Any]) -> dict[str, Any]:
+        self.actions.start_check()
+        return {}
 
 
 def finish_script(

@@ -1,86 +1,114 @@
-"""The HTTP server of local pages: ports, one thread per connection, requests and answers.
+"""The HTTP server of local pages: connections, their deadlines and places, requests and answers.
 
 Requests are not trusted: what cannot be read is refused with a message.
 """
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import io
+import asyncio
 import ipaddress
 import json
-import socket
-import sys
 import threading
-import time
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from email.message import Message
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
-from io import BufferedIOBase
 from typing import Any, Literal
-from urllib.parse import parse_qs, urlsplit
 
-from burg_drake.apps.options.arguments import MAX_PAGE_CONNECTIONS
-from burg_drake.core import (
-    SECURITY_HEADERS as ACCESS_HEADERS,
-    BurgError,
-    InvalidInputError,
-    RequestError,
-    address_in_use_error,
-    page_url,
-    parse_json,
-)
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.middleware.base import BaseHTTPMiddleware
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from burg_drake import core
+from burg_drake.apps import options
+
+MAX_REFUSALS = 8
+"""Maximum number of surplus connections answered with status 503 at a time; further ones are closed
+without an answer."""
+
+IDLE_TIMEOUT = 30.0  # Seconds between requests, and for a client to receive an answer.
+REQUEST_TIMEOUT = 10.0  # Seconds for a request's head and body, and for the first request to begin.
+REFUSAL_TIMEOUT = 2.0  # Seconds for the request of a surplus connection.
 
 
-def parse_address(target: str) -> tuple[str, dict[str, str]]:
-    """Path and query of what is asked for; of a repeated field the last value.
+def json_response(
+    data: Any, code: int = HTTPStatus.OK, headers: Mapping[str, str] | None = None
+) -> Response:
+    """An answer with JSON; what no UTF-8 can tell, as names of files may hold, is escaped."""
+    return Response(json.dumps(data, allow_nan=False), code, headers, "application/json")
 
-    Raises:
-        RequestError: it is not an address.
+
+def get_route(path: str, answer: Callable[[Request], Response]) -> Route:
+    """A GET request that is answered in a thread of its own."""
+    return Route(path, answer, methods=["GET"])
+
+
+def post_route(path: str, act: Callable[[dict[str, Any]], dict[str, Any]]) -> Route:
+    """A POST request: what is done, in a thread of its own, with the JSON object that was sent, and
+    the JSON object of the answer."""
+
+    async def answer(request: Request) -> Response:
+        return json_response(await run_in_threadpool(act, await _read_json_body(request)))
+
+    return Route(path, answer, methods=["POST"])
+
+
+def file_routes(folder: str, pages: Mapping[str, tuple[str, str]]) -> list[Route]:
+    """The files of a page.
+
+    Args:
+        folder: of `burg_drake.apps`, in which they are.
+        pages: file name and content type by path.
     """
-    try:
-        url = urlsplit(target)
-        return url.path, {key: values[-1] for key, values in parse_qs(url.query).items()}
-    except ValueError as error:
-        raise RequestError(HTTPStatus.BAD_REQUEST, f"no address: {error}") from error
+
+    def answer(name: str, kind: str, request: Request) -> Response:
+        content = (files("burg_drake.apps") / folder / name).read_bytes()
+        return Response(content, headers={"Content-Type": kind})
+
+    return [get_route(path, partial(answer, *file)) for path, file in pages.items()]
 
 
-def read_json_body(headers: Message, stream: BufferedIOBase) -> dict[str, Any]:
+async def _read_json_body(request: Request) -> dict[str, Any]:
     """The JSON object of a POST; a form of another site cannot send that type.
 
     Raises:
         RequestError: another type, too long, or no JSON object.
     """
     max_body = 10_000  # Bytes.
-    if headers.get_content_type() != "application/json":
-        raise RequestError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
-    length = headers.get("Content-Length", "")
+    kind = request.headers.get("Content-Type", "").partition(";")[0]
+    if kind.strip().lower() != "application/json":
+        raise core.RequestError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
+    length = request.headers.get("Content-Length", "")
     if not _is_number(length) or int(length) > max_body:
-        raise RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
+        raise core.RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
     try:
-        body = parse_json(stream.read(int(length)).decode(), "the body")
+        body = core.parse_json((await request.body()).decode(), "the body")
     except ValueError as error:
-        raise RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
+        raise core.RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
     if not isinstance(body, dict):
-        raise RequestError(HTTPStatus.BAD_REQUEST, "send a JSON object")
+        raise core.RequestError(HTTPStatus.BAD_REQUEST, "send a JSON object")
     return body
 
 
-def parse_picture_number(query: dict[str, str]) -> int:
-    """`after=N`; 0 without.
+def parse_picture_number(request: Request, name: str = "after") -> int:
+    """A picture's number in the query, such as `after=N`; 0 without.
 
     Raises:
         RequestError: no number, or one that no picture has.
     """
-    text = query.get("after", "0")
+    text = request.query_params.get(name, "0")
     if not _is_number(text):
-        raise RequestError(HTTPStatus.BAD_REQUEST, f"after={text[:50]} is not a picture's number")
+        raise core.RequestError(
+            HTTPStatus.BAD_REQUEST, f"{name}={text[:50]} is not a picture's number"
+        )
     return int(text)
 
 
@@ -89,173 +117,69 @@ def _is_number(text: str) -> bool:
     return text.isdecimal() and len(text) <= max_digits
 
 
-MAX_REFUSALS = 8
-"""Maximum number of surplus connections answered with status 503 at a time; further ones are closed
-without an answer."""
-
-
-IDLE_TIMEOUT = 30.0  # Seconds between requests, and for a client to receive an answer.
-REQUEST_TIMEOUT = 10.0  # Seconds for a request's head and body, and for the first request to begin.
-REFUSAL_TIMEOUT = 2.0  # Seconds for the request of a surplus connection.
-
-
-Handler = Callable[[Any], None]
-"""Answers a request, with the body of a POST, or the query of a GET."""
-
-
-@dataclass
-class _Connection:
-    """An open connection: of which address, and what becomes of it."""
-
-    address: str
-    state: Literal["new", "admitted", "refused", "ending"] = "new"
-
-
-class PageServer(ThreadingHTTPServer):
-    """Serves a page until it is closed.
-
-    A connection is admitted with its first request that is not refused. Where there are too many
-    connections, those that are not admitted yet make room, so that they lock nobody out.
-
-    Args:
-        handler: answers requests.
-        host: address to listen on.
-        port: to listen on; the first free one from `first_port` on if None, any if 0.
-        connections: that are served at a time, half as many for one address of another machine
-            (but what a browser needs); where all are admitted the next ones are told so, with
-            status 503.
-
-    Attributes:
-        first_port: the first port that is tried.
-        title: of what is served, for messages.
-        poll: seconds between checks whether to stop serving.
-        host: as given.
+def request_header(request: Request, name: str) -> str | None:
+    """A header; None without.
 
     Raises:
-        InvalidInputError: the port is taken, or the address is not this machine's.
+        RequestError: it is given twice, and would mean one thing here and another thing there.
     """
+    values = request.headers.getlist(name)
+    if len(values) > 1:
+        raise core.RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
+    return values[0] if values else None
 
-    daemon_threads = True
-    allow_reuse_address = sys.platform != "win32"
-    request_queue_size = 64
-    first_port: int
-    title = "page"
-    poll = 0.5
 
-    def __init__(
-        self,
-        handler: type[BaseHTTPRequestHandler],
-        *,
-        host: str,
-        port: int | None = None,
-        connections: int = MAX_PAGE_CONNECTIONS,
-    ) -> None:
-        max_ports = 50  # Ports that are tried if none is given.
-        self.host, self.connections = host, connections
-        self._lock = threading.Lock()
-        self._open: dict[socket.socket, _Connection] = {}  # in the order in which they came
-        if ":" in host:
-            self.address_family = socket.AF_INET6
-        first = self.first_port if port is None else port
-        ports = range(first, first + (max_ports if port is None else 1))
-        for candidate in ports:
-            try:
-                super().__init__((host, candidate), handler)
-                break
-            except OSError as error:
-                failure = error
-                if error.errno != errno.EADDRINUSE:
-                    raise InvalidInputError(
-                        f"the {self.title} cannot be served on {host}: {error.strerror or error}"
-                    ) from error
-        else:
-            raise InvalidInputError(
-                address_in_use_error(host, ports, any_of_them=port is None)
-            ) from failure
+class _Connection(H11Protocol):
+    """An open connection: of which address, whether it has a place, and its deadlines."""
 
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return page_url(self.host, self.server_address[1])
+    places: ConnectionPlaces
+    state: Literal["new", "admitted", "refused"] = "new"
+    _deadline: asyncio.TimerHandle | None = None
 
-    def start(self) -> None:
-        """Serves in a thread of its own."""
-        serving = partial(self.serve_forever, poll_interval=self.poll)
-        threading.Thread(target=serving, name=f"{self.title} server", daemon=True).start()
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Takes a place, or is refused."""
+        super().connection_made(transport)
+        self.address = _address_key(self.client[0] if self.client else "127.0.0.1")
+        self.places.add(self)
+        self._expect_within(REFUSAL_TIMEOUT if self.state == "refused" else REQUEST_TIMEOUT)
 
-    def close(self) -> None:
-        """Stops serving; requests that are being answered end soon."""
-        self.shutdown()
-        self.server_close()
+    def data_received(self, data: bytes) -> None:
+        """Bounds the time for a whole request, and not only that between two bytes."""
+        is_next = self.cycle is not None and self.cycle.response_complete
+        if self._deadline is None and is_next:
+            self._expect_within(REQUEST_TIMEOUT)
+        super().data_received(data)
+        if self.cycle is not None and not self.cycle.more_body:
+            self._expect_within(None)
 
-    def refuses(self, connection: socket.socket) -> bool:
-        """Whether a connection is one too many, and is to be told so."""
-        return connection in self._in_state("refused")
+    def pause_writing(self) -> None:
+        """Bounds the time for the client to receive what waits to be sent."""
+        super().pause_writing()
+        self._expect_within(IDLE_TIMEOUT)
 
-    def admit(self, connection: socket.socket) -> None:
-        """Notes that a connection has made a request that was not refused."""
-        with self._lock:
-            if connection in self._in_state("new"):
-                self._open[connection].state = "admitted"
+    def resume_writing(self) -> None:
+        """The client received it."""
+        super().resume_writing()
+        self._expect_within(None)
 
-    def is_admitted(self, connection: socket.socket) -> bool:
-        """Whether a connection was admitted."""
-        return connection in self._in_state("admitted")
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Makes room for the next connection."""
+        self._expect_within(None)
+        self.places.remove(self)
+        super().connection_lost(exc)
 
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Answers a connection in a thread of its own, as long as there are not too many."""
-        connection = _Connection(_connection_key(str(client_address[0])))
-        with self._lock:
-            if not self._make_room(connection.address):
-                if len(self._in_state("refused", "ending")) >= MAX_REFUSALS:
-                    super().shutdown_request(request)
-                    return
-                connection.state = "refused"
-            self._open[request] = connection
-        super().process_request(request, client_address)
-
-    def shutdown_request(self, request: Any) -> None:
-        """Closes a connection, which makes room for the next one."""
-        with self._lock:
-            self._open.pop(request, None)
-        super().shutdown_request(request)
-
-    def _in_state(self, *states: str) -> list[socket.socket]:
-        """Connections in one of the states, in the order in which they came."""
-        return [c for c, one in tuple(self._open.items()) if one.state in states]
-
-    def _make_room(self, address: str) -> bool:
-        """Whether one more connection from an address can be served. If there are too many, this
-        closes one that is not admitted."""
-        browser_connections = 6  # Most connections that a browser opens to one server.
-        served = self._in_state("new", "admitted")
-        own = [c for c in served if self._open[c].address == address]
-        share = max(browser_connections, self.connections // 2)
-        most = self.connections if address == LOOPBACK_KEY else share
-        if len(own) < most and len(served) < self.connections:
-            return True
-        among = own if len(own) >= most else served
-        waiting = [c for c in among if self._open[c].state == "new"]
-        if not waiting or len(self._in_state("ending")) >= MAX_REFUSALS:
-            return False
-        counts = Counter(self._open[c].address for c in waiting)
-        # the first of those with equal counts
-        oldest = max(waiting, key=lambda c: counts[self._open[c].address])
-        self._open[oldest].state = "ending"
-        with contextlib.suppress(OSError):
-            oldest.shutdown(socket.SHUT_RDWR)  # its thread ends with it
-        return True
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away in the middle of an answer is no error."""
-        if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
-            super().handle_error(request, client_address)
+    def _expect_within(self, seconds: float | None) -> None:
+        """Closes the connection after this many seconds, in place of the deadline that it had."""
+        if self._deadline is not None:
+            self._deadline.cancel()
+        abort = self.transport.abort
+        self._deadline = None if seconds is None else self.loop.call_later(seconds, abort)
 
 
 LOOPBACK_KEY = "this machine"  # Key under which connections from this machine are counted.
 
 
-def _connection_key(host: str) -> str:
+def _address_key(host: str) -> str:
     """The key by which connections are counted: an IPv4 address, or the /64 network of an IPv6
     address."""
     ip = ipaddress.ip_address(host.partition("%")[0])
@@ -265,158 +189,196 @@ def _connection_key(host: str) -> str:
     return str(mapped) if mapped.version == 4 else ip.exploded[:19]
 
 
-class _TimedStream(io.RawIOBase):
-    """The stream of a connection's data, with a deadline."""
+class ConnectionPlaces:
+    """The connections that are open, of which not more than a number are served.
 
-    def __init__(self, connection: socket.socket, seconds: float) -> None:
-        self._connection = connection
-        self.expect_within(seconds)
+    A connection is admitted with its first request that is not refused. Where there are too many
+    connections, those that are not admitted yet make room, so that they lock nobody out.
 
-    def expect_within(self, seconds: float) -> None:
-        """Sets the deadline to this many seconds from now."""
-        self._deadline = time.monotonic() + seconds
-
-    def readable(self) -> bool:
-        """The stream can be read, and not written."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Reads the data that have arrived.
-
-        Raises:
-            TimeoutError: the deadline has passed.
-        """
-        left = self._deadline - time.monotonic()
-        if left <= 0.0:
-            raise TimeoutError("the request takes too long")
-        before = self._connection.gettimeout()
-        self._connection.settimeout(left)
-        try:
-            return self._connection.recv_into(buffer)
-        finally:
-            self._connection.settimeout(before)
-
-
-class PageHandler(BaseHTTPRequestHandler):
-    """Answers one connection's requests.
-
-    Attributes:
-        server: whose connection it is.
-        folder: of `burg_drake.apps`, with the files of the page.
-        pages: file and type by path.
-        policy: the Content-Security-Policy of every answer.
-        refused_code: status of the answer where an action is refused by a `BurgError`.
-        new_cookie: that the page brings along; empty if none.
+    Args:
+        limit: connections that are served at a time.
     """
 
-    protocol_version = "HTTP/1.1"
-    timeout = IDLE_TIMEOUT
-    server: PageServer
-    folder: str
-    pages: Mapping[str, tuple[str, str]]
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+        self._open: dict[Any, _Connection] = {}  # By address and port, in the order of arrival.
+
+    def of(self, request: Request) -> _Connection | None:
+        """The connection of a request; None if it was closed."""
+        return self._open.get(request.scope["client"])
+
+    def add(self, connection: _Connection) -> None:
+        """Gives a new connection a place, refuses it, or closes it if too many are refused."""
+        if not self._make_room(connection.address):
+            connection.state = "refused"
+            if sum(c.state == "refused" for c in self._open.values()) >= MAX_REFUSALS:
+                connection.transport.abort()
+                return
+        self._open[connection.client] = connection
+
+    def remove(self, connection: _Connection) -> None:
+        """Forgets a connection that is closed."""
+        self._open.pop(connection.client, None)
+
+    def _make_room(self, address: str) -> bool:
+        """Whether one more connection from an address can be served. If there are too many, this
+        closes one that is not admitted."""
+        browser_connections = 6  # Most connections that a browser opens to one server.
+        served = [c for c in self._open.values() if c.state != "refused"]
+        own = [c for c in served if c.address == address]
+        share = max(browser_connections, self.limit // 2)
+        most = self.limit if address == LOOPBACK_KEY else share
+        if len(own) < most and len(served) < self.limit:
+            return True
+        waiting = [c for c in (own if len(own) >= most else served) if c.state == "new"]
+        if not waiting:
+            return False
+        counts = Counter(c.address for c in waiting)
+        oldest = max(waiting, key=lambda c: counts[c.address])  # first of those with equal counts
+        oldest.transport.abort()
+        self.remove(oldest)
+        return True
+
+
+class PageServer:
+    """Serves a page in a thread of its own until it is closed.
+
+    Args:
+        routes: of the page.
+        host: address to listen on.
+        port: to listen on; the first free one from `first_port` on if None, any if 0.
+        connections: that are served at a time, half as many for one address of another machine
+            (but what a browser needs); where all are admitted the next ones are told so, with
+            status 503.
+
+    Attributes:
+        first_port: the first port that is tried.
+        title: of what is served, for messages.
+        policy: the Content-Security-Policy of every answer.
+        refused_code: status of the answer where an action is refused by a `BurgError`.
+        host: as given.
+        server_address: address and port that it listens on.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+    """
+
+    first_port: int
+    title = "page"
     policy: str
     refused_code = HTTPStatus.CONFLICT
-    new_cookie = ""
 
-    def setup(self) -> None:
-        """Bounds the time that requests take, and not only that between two bytes."""
-        super().setup()
-        self._stream = _TimedStream(self.connection, self._request_timeout)
-        self.rfile.close()
-        self.rfile = self._received = io.BufferedReader(self._stream)
-
-    def handle_one_request(self) -> None:
-        """Waits for a request, and answers it."""
-        if self.server.is_admitted(self.connection):
-            self._stream.expect_within(IDLE_TIMEOUT)
-            try:
-                self._received.peek(1)
-            except TimeoutError:
-                self.close_connection = True
-                return
-        self._stream.expect_within(self._request_timeout)
-        super().handle_one_request()
+    def __init__(
+        self,
+        routes: Sequence[Route],
+        *,
+        host: str,
+        port: int | None = None,
+        connections: int = options.MAX_PAGE_CONNECTIONS,
+    ) -> None:
+        self.host = host
+        self._socket = core.open_listener(host, port, first_port=self.first_port, title=self.title)
+        self.server_address = self._socket.getsockname()[:2]
+        self._places = ConnectionPlaces(connections)
+        app = Starlette(
+            routes=routes,
+            middleware=[Middleware(BaseHTTPMiddleware, dispatch=self._answer)],
+            exception_handlers={core.BurgError: self._answer_refusal, HTTPException: _no_route},
+        )
+        app.router.redirect_slashes = False
+        config = uvicorn.Config(
+            app,
+            http=type("_", (_Connection,), {"places": self._places}),
+            ws="none",
+            lifespan="off",
+            log_config=None,
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,  # a request does not say itself where it comes from
+            timeout_keep_alive=IDLE_TIMEOUT,  # type: ignore[arg-type]
+            timeout_graceful_shutdown=1,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run,
+            args=([self._socket],),
+            name=f"{self.title} server",
+            daemon=True,
+        )
 
     @property
-    def _request_timeout(self) -> float:
-        """Time for a request [s]."""
-        return REFUSAL_TIMEOUT if self.server.refuses(self.connection) else REQUEST_TIMEOUT
+    def url(self) -> str:
+        """Address of the page."""
+        return core.page_url(self.host, self.server_address[1])
 
-    def admitted(self) -> tuple[str, dict[str, str]]:
-        """Path and query of a request.
+    def start(self) -> None:
+        """Begins to serve."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stops serving; requests that are being answered end soon."""
+        self._server.should_exit = True
+        if self._thread.is_alive():
+            self._thread.join()
+        self._socket.close()
+
+    def admit(self, request: Request) -> str:
+        """Refuses a request that does not mean this machine, whatever it asks for.
+
+        Returns:
+            The cookie that the answer brings along; empty if none.
 
         Raises:
-            RequestError: it is refused, whatever it asks for.
+            RequestError: it is refused.
         """
-        raise NotImplementedError
+        header, is_page = partial(request_header, request), request.scope["path"] == "/"
+        core.require_local_host(header, served=self.host, is_page=is_page)
+        return ""
 
-    def find(self, routes: Mapping[str, Handler], path: str) -> Handler:
-        """Who answers a request for a path.
-
-        Raises:
-            RequestError: nobody does.
-        """
-        if self.command == "GET" and path in self.pages:
-            return partial(self._send_page, path)
-        if path not in routes:
-            raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path[:100]}")
-        return routes[path]
-
-    def refusal(self, error: BurgError) -> tuple[Any, HTTPStatus]:
-        """JSON values and status of the answer to what was refused."""
-        return {"error": str(error)}, self.refused_code
-
-    def answer(self, routes: Mapping[str, Handler]) -> None:
-        """Answers a request by whoever is in charge of its path."""
+    async def _answer(
+        self, request: Request, answer: Callable[[Request], Awaitable[Response]]
+    ) -> Response:
+        """Answers a request that is admitted; the headers of all answers."""
+        common = {**core.SECURITY_HEADERS, "Content-Security-Policy": self.policy}
         try:
-            path, query = self.admitted()
-            if self.server.refuses(self.connection):
-                raise RequestError(
-                    HTTPStatus.SERVICE_UNAVAILABLE,
-                    f"{self.server.connections} connections are open, the most that this"
-                    f" {self.server.title} serves at a time; close it in another browser, or allow"
-                    " more when it is started",
-                )
-            self.server.admit(self.connection)
-            found = self.find(routes, path)
-            found(read_json_body(self.headers, self.rfile) if self.command == "POST" else query)
-        except RequestError as error:
-            self.close_connection = True  # its body may not have been read
-            self.send_json({"error": str(error)}, error.code)
-        except BurgError as error:
-            self.send_json(*self.refusal(error))
+            cookie = self._admit_connection(request)
+            response = await answer(request)
+            if cookie:
+                response.headers["Set-Cookie"] = cookie
+        except core.RequestError as error:
+            # its body may not have been read
+            response = json_response({"error": str(error)}, error.code, {"Connection": "close"})
+        for name, value in common.items():
+            response.headers.setdefault(name, value)
+        return response
 
-    def send_json(self, data: Any, code: HTTPStatus = HTTPStatus.OK) -> None:
-        """Answers with JSON."""
-        self.send(code, "application/json", json.dumps(data, allow_nan=False).encode())
+    def _admit_connection(self, request: Request) -> str:
+        """The cookie that the answer brings along.
 
-    def send(
-        self,
-        code: HTTPStatus,
-        kind: str = "",
-        body: bytes = b"",
-        headers: Mapping[str, str] | None = None,
-    ) -> None:
-        """Answers with a body of a type."""
-        self.send_head(code, headers or {})
-        if code != HTTPStatus.NO_CONTENT:
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
+        Raises:
+            RequestError: the request is refused.
+        """
+        if not request.scope["path"].startswith("/"):
+            raise core.RequestError(HTTPStatus.BAD_REQUEST, "this is no address of a page")
+        if request.method not in ("GET", "POST"):
+            raise core.RequestError(HTTPStatus.NOT_IMPLEMENTED, "send GET or POST")
+        cookie = self.admit(request)
+        connection = self._places.of(request)
+        if connection is None or connection.state == "refused":
+            raise core.RequestError(
+                HTTPStatus.SERVICE_UNAVAILABLE,
+                f"{self._places.limit} connections are open, the most that this {self.title} serves"
+                " at a time; close it in another browser, or allow more when it is started",
+            )
+        connection.state = "admitted"
+        return cookie
 
-    def send_head(self, code: HTTPStatus, headers: Mapping[str, str]) -> None:
-        """Begins an answer: its status, the headers of all answers, and its own."""
-        self.send_response(code)
-        common = {**ACCESS_HEADERS, "Content-Security-Policy": self.policy}
-        for name, value in {**common, **headers}.items():
-            self.send_header(name, value)
+    def _answer_refusal(self, request: Request, error: Exception) -> Response:
+        """The answer to an action that is refused by a `BurgError`."""
+        return json_response({"error": str(error)}, self.refused_code)
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Requests are not worth a line."""
 
-    def _send_page(self, path: str, query: dict[str, str]) -> None:
-        name, kind = self.pages[path]
-        page = (files("burg_drake.apps") / self.folder / name).read_bytes()
-        cookie = {"Set-Cookie": self.new_cookie} if self.new_cookie else None
-        self.send(HTTPStatus.OK, kind, page, cookie)
+def _no_route(request: Request, error: Exception) -> Response:
+    """Raises the error of a path that nobody answers."""
+    raise core.RequestError(HTTPStatus.NOT_FOUND, f"there is no {request.scope['path'][:100]}")

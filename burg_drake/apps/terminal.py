@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from burg_drake import core, visualization
+
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
     from rich.text import Text
-
-    from burg_drake.visualization import ColorBar, GraspPicker, LegendEntry
 
 
 def print_remark(text: str) -> None:
@@ -34,6 +34,22 @@ def print_note_lines(notes: Iterable[str]) -> None:
     """Prints notes on the results, a line each."""
     for note in notes:
         print(f"note: {note}")
+
+
+@contextlib.contextmanager
+def show_progress(
+    phase: str, unit: str, total: float = 0, *, quiet: bool = False
+) -> Iterator[core.ProgressMeter]:
+    """Shows the progress of a job on standard error until the block is left.
+
+    Args:
+        phase: what is being done, such as `sampling`.
+        unit: what is counted.
+        total: how many there are; 0 if that is not known.
+        quiet: show nothing.
+    """
+    with core.Reporter(not quiet) as reporter:
+        yield core.ProgressMeter(reporter.show, core.Progress(phase, total=total, unit=unit))
 
 
 def wait_for_interrupt() -> NoReturn:
@@ -73,23 +89,21 @@ def _handle_signal(number: signal.Signals, handler: Any) -> Iterator[None]:
         signal.signal(number, before)
 
 
-def print_legend(legend: Sequence[LegendEntry | ColorBar]) -> None:
+def print_legend(legend: Sequence[visualization.LegendEntry | visualization.ColorBar]) -> None:
     """Prints what colours stand for; of numbers their histogram, the bar and its numbers."""
     from rich.console import Console
     from rich.text import Text
 
-    from burg_drake.visualization import ColorBar
-
     console = Console()
     for entry in legend:
-        if isinstance(entry, ColorBar):
+        if isinstance(entry, visualization.ColorBar):
             for line in _color_bar_lines(entry, with_colors=console.color_system is not None):
                 console.print(line, no_wrap=True, crop=False, overflow="ignore")
         else:
             console.print(Text("■ ", style=entry.color) + Text(entry.label, style="default"))
 
 
-def _color_bar_lines(bar: ColorBar, with_colors: bool) -> list[Text]:
+def _color_bar_lines(bar: visualization.ColorBar, with_colors: bool) -> list[Text]:
     columns_per_bin = 2  # Columns of the terminal that a bin of a colour bar takes.
     block_characters = " ▁▂▃▄▅▆▇█"
     from rich.text import Text
@@ -129,18 +143,15 @@ def open_view(arguments: argparse.Namespace) -> Meshcat:
     """
     from pathlib import Path
 
-    from burg_drake.core import InvalidInputError, ensure_writable_folder
-    from burg_drake.visualization import open_meshcat
-
     if arguments.html is not None:
         page = Path(arguments.html)
         if page.is_dir():
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"--html {page} is a folder; give a file such as {page}/view.html"
             )
-        ensure_writable_folder(page.parent)
+        core.ensure_writable_folder(page.parent)
     logging.getLogger("drake").setLevel(logging.WARNING)  # pydrake sets it when imported
-    return open_meshcat(arguments.port)
+    return visualization.open_meshcat(arguments.port)
 
 
 def present_view(
@@ -149,8 +160,8 @@ def present_view(
     *,
     title: str,
     caption: Sequence[str] = (),
-    legend: Sequence[LegendEntry | ColorBar] = (),
-    controls: GraspPicker | None = None,
+    legend: Sequence[visualization.LegendEntry | visualization.ColorBar] = (),
+    controls: visualization.GraspPicker | None = None,
 ) -> None:
     """Saves the page if --html was given; else prints the address and waits, unless told not to.
 
@@ -163,9 +174,7 @@ def present_view(
         controls: of the page; in the live view a slider of Meshcat does the same.
     """
     if arguments.html is not None:
-        from burg_drake.visualization import save_html
-
-        save_html(
+        visualization.save_html(
             meshcat, arguments.html, title=title, caption=caption, legend=legend, controls=controls
         )
         print(f"wrote {arguments.html}")

@@ -19,9 +19,10 @@ from .calibration.lens_fit import fit_lens as fit_lens, guess_camera as guess_ca
 from .calibration.lens_uncertainty import (
     BOUND_SIGMAS as BOUND_SIGMAS,
     COVERAGE_GRID as COVERAGE_GRID,
+    CalibrationAccuracy as CalibrationAccuracy,
     LensHypothesis as LensHypothesis,
     Promise as Promise,
-    calibration_promise as calibration_promise,
+    calibration_accuracy as calibration_accuracy,
     camera_covariance as camera_covariance,
     camera_error as camera_error,
     corner_coverage as corner_coverage,
@@ -68,6 +69,7 @@ from .frame_source import (
 )
 from .image_files import (
     decode_image as decode_image,
+    encode_jpeg as encode_jpeg,
     read_depth as read_depth,
     read_image as read_image,
     require_image_format as require_image_format,
@@ -147,7 +149,6 @@ from .placement.pinhole_view import (
     ImageWindow as ImageWindow,
     PinholeView as PinholeView,
     visible_outline as visible_outline,
-    window_around as window_around,
 )
 from .placement.silhouette_aligner import SilhouetteAligner as SilhouetteAligner
 from .pose.board_estimate import (

@@ -139,30 +139,25 @@ def _scaled_images(
         sizes: of the images, the usual one first; the whole if none is given.
         distortion: OpenCV's, of all sizes.
     """
-    calibrated = Intrinsics(
-        camera=camera,
-        width=whole[0],
-        height=whole[1],
-        focal=focal,
-        center=center,
-        distortion=distortion,
-    )
-    return tuple(_crop_and_scale(calibrated, *size) for size in sizes or (whole,))
-
-
-def _crop_and_scale(whole: Intrinsics, width: int, height: int) -> Intrinsics:
-    scale = max(width / whole.width, height / whole.height)
-    (fx, fy), (cx, cy) = whole.focal, whole.center
-    return replace(
-        whole,
-        width=width,
-        height=height,
-        focal=(scale * fx, scale * fy),
-        center=(
-            scale * (cx - (whole.width - 1) / 2) + (width - 1) / 2,
-            scale * (cy - (whole.height - 1) / 2) + (height - 1) / 2,
-        ),
-    )
+    images = []
+    for width, height in sizes or (whole,):
+        scale = max(width / whole[0], height / whole[1])
+        fx, fy = (scale * f for f in focal)
+        cx, cy = (
+            scale * (c - (n - 1) / 2) + (m - 1) / 2
+            for c, n, m in zip(center, whole, (width, height), strict=True)
+        )
+        images.append(
+            Intrinsics(
+                camera=camera,
+                width=width,
+                height=height,
+                focal=(fx, fy),
+                center=(cx, cy),
+                distortion=distortion,
+            )
+        )
+    return tuple(images)
 
 
 def _distortion(k: tuple[float, ...], p: tuple[float, float]) -> tuple[float, ...]:

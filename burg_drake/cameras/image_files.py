@@ -165,6 +165,12 @@ def write_image(path: str | Path, image: Image) -> None:
     atomic_write(path, data.tobytes())
 
 
+def encode_jpeg(image: Image, quality: int) -> bytes:
+    """JPEG of an RGB image (H, W, 3), of a quality from 0 to 100."""
+    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return bytes(data.tobytes())
+
+
 def read_depth(path: str | Path, unit: float | None = None) -> Single:
     """Reads a depth image.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context, InputPort, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from burg_drake.cameras.depth_camera_noise import noisy_depth
@@ -173,11 +173,7 @@ class DepthNoiseSystem(LeafSystem):
         )
 
     def _measure(self, context: Context, output: AbstractValue) -> None:
-        if not self._depth.HasValue(context):
-            raise InvalidInputError(
-                f"{self.get_name()}: input port depth_image has no value; connect or fix it"
-            )
-        perfect = self._depth.Eval(context).data[..., 0]
+        perfect = _require_value(self, self._depth, context).data[..., 0]
         color = None
         if self.noise.dark_probability:  # else it makes no difference, and may have to be rendered
             color = evaluate_optional(self._color, context)
@@ -253,7 +249,7 @@ class SceneOverlay(LeafSystem):
         )
 
     def _draw(self, context: Context, output: AbstractValue) -> None:
-        image = self._required(context, self._color_image).data
+        image = _require_value(self, self._color_image, context).data
         size = self._overlay.intrinsics
         size.require_size(image.shape[1], image.shape[0], "the image at port color_image")
         colors = np.ascontiguousarray(image[..., :3])
@@ -262,7 +258,7 @@ class SceneOverlay(LeafSystem):
         if self._valid.HasValue(context):
             valid = self._valid.Eval(context)[0] > 0.5
         if valid:
-            X_SC = self._required(context, self._X_SC).GetAsMatrix4()
+            X_SC = _require_value(self, self._X_SC, context).GetAsMatrix4()
             drawn = self._overlay.draw(colors, X_SC, placement=self._checked(context))
         else:
             reason = (estimate and estimate.reason) or "no pose of the camera"
@@ -275,9 +271,15 @@ class SceneOverlay(LeafSystem):
             return check
         raise InvalidInputError(f"port placement takes a PlacementCheck, not {check!r}")
 
-    def _required(self, context: Context, port: Any) -> Any:
-        if not port.HasValue(context):
-            raise InvalidInputError(
-                f"{self.get_name()}: input port {port.get_name()} has no value; connect or fix it"
-            )
-        return port.Eval(context)
+
+def _require_value(system: LeafSystem, port: InputPort, context: Context) -> Any:
+    """The value at an input port.
+
+    Raises:
+        InvalidInputError: there is none.
+    """
+    if not port.HasValue(context):
+        raise InvalidInputError(
+            f"{system.get_name()}: input port {port.get_name()} has no value; connect or fix it"
+        )
+    return port.Eval(context)

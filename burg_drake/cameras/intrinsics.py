@@ -94,10 +94,6 @@ class FisheyeLens:
         within = np.minimum(angle, self.max_angle)
         return np.asarray(self._radius(within) + (angle - within))
 
-    def slope(self, angle: Array) -> Array:
-        """Derivatives of `radius` by the angle."""
-        return np.where(angle < self.max_angle, self._slope(np.minimum(angle, self.max_angle)), 1.0)
-
     def angle(self, radius: Array) -> Array:
         """Angles off the axis [rad] that are seen at distances from the middle; pi beyond."""
         # Start values of the inversion, which Newton's method refines.
@@ -206,7 +202,7 @@ class Intrinsics:
         if self.model not in get_args(LensModel):
             known = suggest_names(str(self.model), get_args(LensModel))
             raise FieldError(f"model {self.model!r} does not exist; {known}", "model")
-        self._check_promise()
+        self._check_accuracy()
         if self.is_fisheye and len(self.distortion) != FISHEYE_COEFFICIENTS:
             raise FieldError(
                 f"distortion has {len(self.distortion)} coefficients; a fisheye model has"
@@ -220,7 +216,7 @@ class Intrinsics:
                 "distortion",
             )
 
-    def _check_promise(self) -> None:
+    def _check_accuracy(self) -> None:
         if self.known_to is not None and not 0.0 < self.known_to < np.inf:
             raise FieldError(
                 f"known_to is {self.known_to:g} pixels; it must be above 0", "known_to"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
+from xml.etree import ElementTree
 
 import yaml
 
@@ -83,60 +84,46 @@ def read_opencv(text: str, name: str) -> Tree:
         DocumentError: it is neither such YAML nor such XML, or beyond the limits of documents.
     """
     if text.lstrip().startswith("<"):
-        return _XmlReader(name).read(text)
+        return _read_xml(text, name)
     if text.startswith("%YAML"):  # `%YAML:1.0`, which YAML does not know, on a line of its own
         text = "#" + text
     return parse_plain_yaml(text, name, tags=STANDARD_TAGS | {"tag:yaml.org,2002:opencv-matrix"})
 
 
-class _XmlReader:
+def _read_xml(text: str, name: str) -> Tree:
     """Elements as dicts by tag; the text of one that is called `data` is a list of words."""
+    parser: Any = ElementTree.XMLPullParser(("start", "end"))
+    opened: list[dict[str, Any]] = [{}]
+    values, line = 0, 1
 
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._values = 0
-        self._opened: list[dict[str, Any]] = [{}]
-        self._text = ""
-        self._parser = expat.ParserCreate()
-        self._parser.buffer_text = True
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._characters
-        self._parser.StartDoctypeDeclHandler = self._doctype
+    def failure(what: str) -> DocumentError:
+        return DocumentError(f"{name}:{line}: {what}")
 
-    def read(self, text: str) -> Tree:
-        try:
-            self._parser.Parse(text.encode(), True)
-        except expat.ExpatError as error:
-            problem = expat.ErrorString(error.code)
-            raise DocumentError(f"{self._name}:{error.lineno}: not valid XML: {problem}") from error
-        return self._opened[0].get("opencv_storage", {})
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        self._values += 1
-        if len(self._opened) > FileLimits.document.depth:
-            raise self._failure(f"nested more than {FileLimits.document.depth} levels deep")
-        if self._values > FileLimits.document.values:
-            raise self._failure(f"more than {FileLimits.document.values:,} values")
-        self._opened.append({})
-        self._text = ""
-
-    def _end(self, tag: str) -> None:
-        inner = self._opened.pop()
-        value: Tree = inner or (self._text.split() if tag == "data" else self._text.strip())
-        if tag != "_" and tag in self._opened[-1]:  # `_` is the item of a list
-            raise self._failure(f"{tag!r} appears twice in the same element")
-        self._opened[-1][tag] = value
-        self._text = ""
-
-    def _characters(self, text: str) -> None:
-        self._text += text
-
-    def _doctype(self, *_: object) -> None:
-        raise self._failure("document type declarations (DOCTYPE) are not supported; remove it")
-
-    def _failure(self, what: str) -> DocumentError:
-        return DocumentError(f"{self._name}:{self._parser.CurrentLineNumber}: {what}")
+    try:
+        for number, words in enumerate(io.StringIO(text), 1):
+            line = number
+            if "<!DOCTYPE" in words:  # it may define entities, which grow beyond all limits
+                raise failure("document type declarations (DOCTYPE) are not supported; remove it")
+            parser.feed(words)
+            for event, element in parser.read_events():
+                if event == "start":
+                    values += 1
+                    if len(opened) > FileLimits.document.depth:
+                        raise failure(f"nested more than {FileLimits.document.depth} levels deep")
+                    if values > FileLimits.document.values:
+                        raise failure(f"more than {FileLimits.document.values:,} values")
+                    opened.append({})
+                    continue
+                inner, content = opened.pop(), element.text or ""
+                if element.tag != "_" and element.tag in opened[-1]:  # `_` is the item of a list
+                    raise failure(f"{element.tag!r} appears twice in the same element")
+                is_list = element.tag == "data"
+                opened[-1][element.tag] = inner or (content.split() if is_list else content.strip())
+        parser.close()
+    except ElementTree.ParseError as error:
+        line = error.position[0]
+        raise failure(f"not valid XML: {str(error).split(':')[0]}") from error
+    return opened[0].get("opencv_storage", {})
 
 
 ROS_MATRIX_KEYS = ("camera_matrix", "K", "k")

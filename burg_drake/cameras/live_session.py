@@ -10,8 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import cv2
-
 from burg_drake.cameras.frame_processing import (
     FrameProcessor,
     LocatedFrame,
@@ -22,6 +20,7 @@ from burg_drake.cameras.frame_processing import (
     time_call,
 )
 from burg_drake.cameras.frame_source import CameraLost, Frame, FrameSource
+from burg_drake.cameras.image_files import encode_jpeg
 from burg_drake.cameras.placement.document import PlacementCheck
 from burg_drake.core import BurgError, Bytes, InvalidInputError
 
@@ -90,13 +89,6 @@ class Picture:
     milliseconds: dict[str, float]
 
 
-def encode_jpeg(image: Bytes) -> bytes:
-    """JPEG of an RGB image (H, W, 3)."""
-    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
-    encoded: bytes = data.tobytes()
-    return encoded
-
-
 SourceState = Literal["waiting", "running", "lost", "ended"]
 
 
@@ -109,9 +101,10 @@ class FrameReader:
     Args:
         source: is closed with the reader.
         paced: play files as fast as they were taken, not as fast as frames are asked for.
-        on_change: called, in the reader's thread, when a frame has come or the state has changed.
+        changed: notified when a frame has come or the state has changed; notify it when frames
+            may be wanted again.
         events: are told when the camera is lost, is back, or a frame cannot be read.
-        wanted: whether anybody wants frames; as long as nobody does, none is read, until `wake`.
+        wanted: whether anybody wants frames; as long as nobody does, none is read.
     """
 
     def __init__(
@@ -119,7 +112,7 @@ class FrameReader:
         source: FrameSource,
         *,
         paced: bool,
-        on_change: Callable[[], None],
+        changed: threading.Condition,
         events: EventLog,
         wanted: Callable[[], bool] = lambda: True,
     ) -> None:
@@ -130,8 +123,7 @@ class FrameReader:
         self.failure: BaseException | None = None
         """What ended the thread, if that was no end of the source."""
         self._paced = paced and not source.live
-        self._on_change, self._events, self._wanted = on_change, events, wanted
-        self._changed = threading.Condition()
+        self._changed, self._events, self._wanted = changed, events, wanted
         self._next: Frame | None = None
         self._shown: tuple[float, float] | None = None
         self._closed = threading.Event()
@@ -148,11 +140,6 @@ class FrameReader:
             self._changed.notify_all()
         return frame
 
-    def wake(self) -> None:
-        """Tells that frames may be wanted again; the next one is read now."""
-        with self._changed:
-            self._changed.notify_all()
-
     @property
     def is_empty(self) -> bool:
         """There is no next frame now."""
@@ -161,7 +148,8 @@ class FrameReader:
     def close(self) -> None:
         """Ends the thread and closes the source."""
         self._closed.set()
-        self.wake()
+        with self._changed:
+            self._changed.notify_all()
         if self.source.live:  # a file is closed by its reader only: OpenCV's must not be disturbed
             self.source.close()
         if self._thread.ident is not None:
@@ -175,8 +163,7 @@ class FrameReader:
                     self._changed.wait_for(lambda: self._closed.is_set() or self._wanted())
         except BaseException as error:  # ends the thread; who waits for frames raises it
             self.failure = error
-        self.state = "ended"
-        self._on_change()
+        self._set_state("ended")
 
     def _read_one(self) -> bool:
         """Hands over a frame; whether there may be more."""
@@ -206,18 +193,22 @@ class FrameReader:
     def _deliver_frame(self, frame: Frame) -> None:
         if self.state == "lost":
             self._events.add(f"{self.source.name} is back")
-        self.state, self.fault = "running", ""
         with self._changed:
+            self.state, self.fault = "running", ""
             if not self.source.live:
                 self._changed.wait_for(lambda: self._next is None or self._closed.is_set())
             self._next = frame
-        self._on_change()
+            self._changed.notify_all()
 
     def _report_loss(self, fault: str) -> None:
         if self.state != "lost" and not self._closed.is_set():
             self._events.add(fault, bad=True)
-        self.state, self.fault = "lost", fault
-        self._on_change()
+        self._set_state("lost", fault)
+
+    def _set_state(self, state: SourceState, fault: str = "") -> None:
+        with self._changed:
+            self.state, self.fault = state, fault
+            self._changed.notify_all()
 
 
 RATE_WINDOW = 2.0
@@ -275,10 +266,11 @@ class LiveSession:
         self.picture: Picture | None = None
         self.counts = FrameCounts()
         self.last_located: LocatedFrame | None = None
+        self._changed = threading.Condition(threading.RLock())
         self.reader = FrameReader(
             source,
             paced=paced,
-            on_change=self._wake,
+            changed=self._changed,
             events=events,
             wanted=lambda: not self.is_idle,
         )
@@ -288,7 +280,6 @@ class LiveSession:
         self._settings = check_settings(processor.scene, settings)
         self._placement: PlacementCheck | None = None
         self._on_frame: list[Callable[[Picture], None]] = []
-        self._changed = threading.Condition(threading.RLock())
         self._redraw = self._closed = self._busy = False
         self._limit: int | None = None
         self._failure: BaseException | None = None
@@ -336,7 +327,7 @@ class LiveSession:
             waits = self.picture is not None and self.is_idle and not self._settings.frozen
             stale = self.picture.number if self.picture is not None and waits else 0
             self._asked = time.monotonic()
-        self.reader.wake()
+            self._changed.notify_all()
         return stale
 
     @property
@@ -380,8 +371,8 @@ class LiveSession:
         with self._changed:
             after = max(after, self.request_pictures())
             self._waiting += 1
+            self._changed.notify_all()
             try:
-                self.reader.wake()
                 self._changed.wait_for(
                     lambda: self._closed or (self.picture and self.picture.number > after), seconds
                 )
@@ -389,6 +380,11 @@ class LiveSession:
                 self._waiting -= 1
             picture = self.picture
         return picture if picture is not None and picture.number > after else None
+
+    def newest_picture(self, seconds: float) -> Picture | None:
+        """The newest picture; of a session that idles, the next one within a time [s]."""
+        stale = self.request_pictures()
+        return self.next_picture(stale, seconds) if stale else self.picture
 
     def wait(self, *, seconds: float | None = None, to_end: bool = True) -> None:
         """Until all frames were looked at, or so much time has gone by.
@@ -425,17 +421,14 @@ class LiveSession:
     def _has_all_frames(self) -> bool:
         return self._limit is not None and self.counts.frames >= self._limit
 
-    def _wake(self) -> None:
-        with self._changed:
-            self._changed.notify_all()
-
     def _run(self) -> None:
         try:
             while not self._closed:
                 self._run_once()
         except BaseException as error:  # ends the thread; who waits for it raises it
             self._failure = error
-        self._wake()
+        with self._changed:
+            self._changed.notify_all()
 
     def _run_once(self) -> None:
         """Waits for something to do, and does it."""
@@ -487,7 +480,7 @@ class LiveSession:
         """Draws a picture with the settings as they are."""
         settings = self._settings
         overlay, drawing = time_call(lambda: self.processor.draw(located, settings, placement))
-        jpeg, encoding = time_call(lambda: encode_jpeg(overlay))
+        jpeg, encoding = time_call(lambda: encode_jpeg(overlay, 88))
         return Picture(
             number=1 if self.picture is None else self.picture.number + 1,
             located=located,

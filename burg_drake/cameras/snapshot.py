@@ -10,11 +10,11 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
-import cv2
 import numpy as np
 
+from burg_drake.cameras.image_files import read_image, write_image
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement.document import CheckedScene, PlacementCheck, camera_versions
 from burg_drake.cameras.pose.board_estimate import BoardEstimate
@@ -22,12 +22,10 @@ from burg_drake.core import (
     Array,
     Bytes,
     DocumentError,
-    FileLimits,
     InvalidInputError,
     Pose,
     load_document,
     open_npy,
-    read_bytes,
     require_writable,
     save_document,
 )
@@ -36,6 +34,7 @@ if TYPE_CHECKING:
     from burg_drake.scene import Scene
 
 
+T = TypeVar("T")
 IMAGE_FILE = "image.png"
 OVERLAY_FILE = "overlay.png"
 DEPTH_FILE = "depth.npy"
@@ -142,8 +141,8 @@ def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
         folder.parent.mkdir(parents=True, exist_ok=True)
         beside = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
         beside.mkdir()
-        _write_image(beside / IMAGE_FILE, snapshot.image)
-        _write_image(beside / OVERLAY_FILE, snapshot.overlay)
+        write_image(beside / IMAGE_FILE, snapshot.image)
+        write_image(beside / OVERLAY_FILE, snapshot.overlay)
         if snapshot.depth is not None:
             np.save(beside / DEPTH_FILE, snapshot.depth.astype(np.float32))
         save_document(snapshot.document, beside / DOCUMENT_FILE)
@@ -183,12 +182,12 @@ def load_snapshot(folder: str | Path) -> Snapshot:
     if not (folder / DOCUMENT_FILE).is_file():
         raise DocumentError(f"{folder} is not the folder of a snapshot: {DOCUMENT_FILE} is missing")
     document = load_document(folder / DOCUMENT_FILE, SnapshotDocument)
-    image, overlay = _read_image(folder / IMAGE_FILE), _read_image(folder / OVERLAY_FILE)
+    image, overlay = (_read(read_image, folder / name) for name in (IMAGE_FILE, OVERLAY_FILE))
     height, width = image.shape[:2]
     document.intrinsics.require_size(width, height, str(folder / IMAGE_FILE))
     depth = None
     if (folder / DEPTH_FILE).exists():
-        depth = _read_depth(folder / DEPTH_FILE, (height, width))
+        depth = _read(lambda path: _read_depth(path, (height, width)), folder / DEPTH_FILE)
     return Snapshot(document=document, image=image, overlay=overlay, depth=depth)
 
 
@@ -240,30 +239,14 @@ def _finite_or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _write_image(path: Path, image: Bytes) -> None:
-    done, data = cv2.imencode(".png", image[..., ::-1])
-    if not done:
-        raise OSError(f"OpenCV cannot encode an image of shape {image.shape}")
-    path.write_bytes(data.tobytes())
-
-
-def _read_image(path: Path) -> Bytes:
-    data: Any = (
-        np.frombuffer(read_bytes(path, FileLimits.image_bytes), np.uint8)
-        if path.is_file()
-        else np.empty(0)
-    )
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    if image is None:
-        raise InvalidInputError(
-            f"{path} is missing or cannot be read as an image; take the snapshot again"
-        )
-    return np.ascontiguousarray(image[..., ::-1])
+def _read(read: Callable[[Path], T], path: Path) -> T:
+    """What a file of a snapshot holds; of a missing or damaged one, the error says what to do."""
+    try:
+        return read(path)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{error}; take the snapshot again") from error
 
 
 def _read_depth(path: Path, shape: tuple[int, int]) -> Array:
-    try:
-        with open_npy(path) as stored:
-            return stored.read("f", shape)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{error}; take the snapshot again") from error
+    with open_npy(path) as stored:
+        return stored.read("f", shape)

@@ -243,10 +243,10 @@ class VideoSource(FrameSource):
     def _next_image(self) -> Image | None:
         """The next frame that can be read; None at the end."""
         for _ in range(100):  # Consecutive unreadable frames after which the file ends.
-            good, bgr = self._capture.read()
-            if good and bgr is not None and bgr.size:
+            image = _read_rgb(self._capture)
+            if image is not None:
                 self._taken += 1
-                return np.ascontiguousarray(bgr[..., ::-1])
+                return image
             if self._taken + 1 >= self._count:
                 return None
             self._taken += 1

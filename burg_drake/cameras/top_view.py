@@ -22,7 +22,8 @@ from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE, consistent_mar
 from burg_drake.cameras.pose.marker_detection import (
     MarkerDetector,
     find_foreign_markers,
-    format_ids,
+    misplaced_reason,
+    no_markers_reason,
     side_lengths,
 )
 from burg_drake.core import Array, Bytes, InvalidInputError, inverse, transform_points
@@ -174,9 +175,7 @@ def _sample_image(image: Image, pixels: Array) -> Image:
             cv2.resize(image[:height, :width], size, interpolation=cv2.INTER_AREA), np.uint8
         )
         pixels = (pixels + 0.5) / shrink - 0.5
-    at = pixels.astype(np.float32)
-    # RGB of places that the photo does not show.
-    u, v = np.moveaxis(at, 2, 0)
+    u, v = np.moveaxis(pixels.astype(np.float32), 2, 0)
     outside = (128, 128, 128)  # RGB of places that the photo does not show.
     return np.asarray(
         cv2.remap(
@@ -231,7 +230,8 @@ class SheetFinder:
         grey = grey_image(image)
         seen = self._detector.detect(grey)
         if not len(seen.index):
-            raise InvalidInputError(self._no_markers_reason(grey, seen.candidates))
+            reason = no_markers_reason(grey, self._layout, seen.candidates)
+            raise InvalidInputError(f"the image shows {reason}; improve the light, or move closer")
         size = np.array(grey.shape[::-1], dtype=float)
         middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
         p_SQ = self._layout.p_SQ[seen.index][..., :2]
@@ -243,10 +243,7 @@ class SheetFinder:
             kept = consistent_markers(p_SQ, corners, tolerance)
         n, fit = len(kept), int(kept.sum())
         if fit < max(1, n / 2) or (n > 1 and fit < 2):
-            raise InvalidInputError(
-                f"the image shows another board: only {fit} of {n} markers in sight are where this"
-                " one has them; are columns, rows and first_id right?"
-            )
+            raise InvalidInputError(f"the image shows {misplaced_reason(n, fit)}")
         if 2 * fit < len(self._layout.ids):
             self._require_no_foreign_markers(grey, fit)
         p_SQ, corners = p_SQ[kept].reshape(-1, 2), corners[kept].reshape(-1, 2)
@@ -277,17 +274,6 @@ class SheetFinder:
                 f"the image shows another board: {len(foreign_markers)} markers in sight have ids"
                 f" above {layout.ids[-1]}, the last of this one; are columns and rows right?"
             )
-
-    def _no_markers_reason(self, grey: Bytes, candidates: int) -> str:
-        layout = self._layout
-        other = find_foreign_markers(grey, layout) if candidates else None
-        if other is None:
-            return "the image shows no marker of the board; improve the light, or move closer"
-        own = f"this one has {layout.dictionary} with ids {layout.ids[0]} to {layout.ids[-1]}"
-        return (
-            f"the image shows another board: {len(other.ids)} markers of {other.dictionary} with"
-            f" ids {format_ids(other.ids)}; {own}"
-        )
 
 
 def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:

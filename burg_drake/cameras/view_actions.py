@@ -21,6 +21,8 @@ from burg_drake.cameras.snapshot import (
 )
 from burg_drake.core import BurgError, InvalidInputError
 
+FIRST_PICTURE_TIMEOUT = 5.0  # Seconds to wait for the first picture of an idle session.
+
 
 class ViewActions:
     """Acts on a live session; every method may be called from any thread.
@@ -58,7 +60,7 @@ class ViewActions:
         Raises:
             InvalidInputError: there is no picture yet, or the folder cannot be written.
         """
-        picture = picture or self._newest()
+        picture = picture or self.live.newest_picture(FIRST_PICTURE_TIMEOUT)
         if picture is None:
             raise InvalidInputError("there is no picture yet")
         located = picture.located
@@ -149,7 +151,7 @@ class ViewActions:
         Raises:
             InvalidInputError: there is no picture with a pose, or a check is at work.
         """
-        picture = self._newest()
+        picture = self.live.newest_picture(FIRST_PICTURE_TIMEOUT)
         if picture is None or not picture.located.estimate.valid:
             raise InvalidInputError("a placement check needs a picture in which the board is found")
         with self._lock:
@@ -165,12 +167,6 @@ class ViewActions:
         """Until the placement check that is at work, if any, is done."""
         if self._check is not None:
             self._check.join(seconds)
-
-    def _newest(self) -> Picture | None:
-        """The newest picture; of a session that idled, the next one."""
-        stale = self.live.request_pictures()
-        # Seconds to wait for the first picture of an idle session.
-        return self.live.next_picture(stale, 5.0) if stale else self.live.picture
 
     def _measure(self, picture: Picture) -> None:
         try:

@@ -1,8 +1,9 @@
 from .background_tasks import (
+    BackgroundJob as BackgroundJob,
+    BackgroundWorker as BackgroundWorker,
     SettlingProposal as SettlingProposal,
     names_of_moved_instances as names_of_moved_instances,
 )
-from .background_worker import BackgroundJob as BackgroundJob, BackgroundWorker as BackgroundWorker
 from .commands import (
     BOARD_SIZES as BOARD_SIZES,
     Command as Command,
@@ -25,7 +26,6 @@ from .moving_commands import (
     SnapToGrid as SnapToGrid,
     Turn as Turn,
 )
-from .opening import OpenedScene as OpenedScene
 from .placing_commands import (
     MAX_RANDOM_OBJECTS as MAX_RANDOM_OBJECTS,
     AddObject as AddObject,
@@ -46,6 +46,7 @@ from .scene_checker import (
 )
 from .scene_storage import (
     FileChanged as FileChanged,
+    OpenedScene as OpenedScene,
     SceneInUse as SceneInUse,
     SceneLock as SceneLock,
     SceneStorage as SceneStorage,

@@ -1,4 +1,4 @@
-"""The base class of commands, and the command that changes the board."""
+"""The base class of commands, and the commands that change the board or the library."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 from burg_drake.compose.scene_checker import Surroundings
-from burg_drake.compose.state import State
-from burg_drake.core import InvalidInputError, UnknownNameError, suggest_names
+from burg_drake.compose.state import State, instance_name
+from burg_drake.core import InvalidInputError, UnknownNameError, list_names, suggest_names
+from burg_drake.objects import ObjectLibrary
 from burg_drake.printout import PAPER_SIZES
 from burg_drake.scene import Board
 
@@ -118,3 +119,47 @@ def board_size_name(size: tuple[float, float]) -> str | None:
         if all(abs(a - b) < 1e-6 for a, b in zip(sides, paper, strict=True)):
             return name
     return None
+
+
+def require_objects_of_scene(state: State, library: ObjectLibrary) -> None:
+    """Refuses a library that lacks objects of a scene.
+
+    Raises:
+        UnknownNameError: it does; the message lists them.
+        InvalidInputError: it gives a free instance no mass.
+    """
+    used = {instance.object for instance in state.instances.values()}
+    missing = sorted(used - library.objects.keys())
+    if missing:
+        raise UnknownNameError(
+            f"library {library.root} has no {list_names([repr(m) for m in missing])}; delete their"
+            " instances first, or choose a library that has them"
+        )
+    heavy = [instance_name(i) for i in state.document.instances if library.entry(i.object).is_fixed]
+    if heavy:
+        raise InvalidInputError(
+            f"library {library.root} has no mass for {list_names(heavy)}; make them background"
+            " first"
+        )
+
+
+@dataclass(frozen=True)
+class UseLibrary:
+    """Takes the objects from another library.
+
+    Attributes:
+        library: which must have all objects of the scene.
+        reference: how the scene's document refers to it.
+    """
+
+    library: ObjectLibrary
+    reference: str
+
+    @property
+    def label(self) -> str:
+        return f"use library {self.library.name}"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        require_objects_of_scene(state, self.library)
+        document = replace(state.document, library=self.reference)
+        return replace(state, document=document, library=self.library)

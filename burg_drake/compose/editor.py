@@ -7,16 +7,14 @@ import logging
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from burg_drake.compose.commands import Command, command_label
 from burg_drake.compose.moving_commands import MoveObjects
-from burg_drake.compose.opening import OpenedScene
 from burg_drake.compose.scene_checker import SceneChecker, Surroundings
-from burg_drake.compose.scene_storage import SceneStorage
+from burg_drake.compose.scene_storage import OpenedScene, SceneStorage
 from burg_drake.compose.session_view import SessionView, instance_statuses
 from burg_drake.compose.state import (
     History,
@@ -25,29 +23,9 @@ from burg_drake.compose.state import (
     StepAmendment,
     require_instance_names,
 )
-from burg_drake.core import BurgError, InvalidInputError, make_pose, rot_z
+from burg_drake.core import Array, BurgError, InvalidInputError, make_pose, rot_z
 from burg_drake.scene import SceneIssue
 from burg_drake.station import StationLike, as_station
-
-
-class DragOwner(Protocol):
-    """What a drag needs of the session that it belongs to."""
-
-    @property
-    def view(self) -> SessionView:
-        """What one sees."""
-
-    def is_current(self, drag: Drag) -> bool:
-        """Whether a drag is the one that goes on."""
-
-    def preview_drag(self, drag: Drag, move: MoveObjects) -> SessionView:
-        """Shows what is dragged elsewhere."""
-
-    def end_drag(self, drag: Drag) -> SessionView:
-        """Makes a drag a step."""
-
-    def cancel_drag(self, drag: Drag) -> SessionView:
-        """Ends a drag without a step."""
 
 
 class Drag:
@@ -60,12 +38,11 @@ class Drag:
         names: instances that are held.
     """
 
-    def __init__(self, session: DragOwner, names: tuple[str, ...], start: SessionView) -> None:
+    def __init__(self, session: Editor, names: tuple[str, ...], start: SessionView) -> None:
         self.names = names
         self._session = session
         self._start = {name: start.X_SO(name) for name in names}
-        self._X_SO: dict[str, ArrayLike] = dict(self._start)
-        self._changes_height = False
+        self._move = MoveObjects(self._start)
         self._asked = self._checked = 0
         self._newest = threading.Lock()
         self._checking = threading.Lock()
@@ -73,7 +50,7 @@ class Drag:
     @property
     def is_over(self) -> bool:
         """It was ended or cancelled, or something else changed the scene."""
-        return not self._session.is_current(self)
+        return self._session._drag is not self
 
     def move(self, X_SO: Mapping[str, ArrayLike], *, changes_height: bool = False) -> SessionView:
         """Holds instances at poses.
@@ -94,15 +71,18 @@ class Drag:
                     f"{name!r} is not part of this drag; start a drag that includes it"
                 )
         with self._newest:
-            self._X_SO, self._changes_height = {**self._X_SO, **X_SO}, changes_height
+            self._move = MoveObjects({**self._move.X_SO, **X_SO}, changes_height)
             self._asked += 1
             number = self._asked
         with self._checking:
             with self._newest:
                 if number <= self._checked:  # newer poses were checked while this call waited
                     return self._session.view
-                self._checked, move = self._asked, MoveObjects(self._X_SO, self._changes_height)
-            return self._session.preview_drag(self, move)
+                self._checked, move = self._asked, self._move
+            session = self._session
+            with session._exclusive():
+                self._require_current()
+                return session._show(move.apply(session._history.state, session._surroundings))
 
     def move_by(self, offset: tuple[float, float, float], yaw: float = 0.0) -> SessionView:
         """Holds all instances away from where they were taken, as one.
@@ -112,16 +92,37 @@ class Drag:
             yaw: turned about the vertical through the middle of their origins [rad].
         """
         middle = np.mean([X[:3, 3] for X in self._start.values()], axis=0)
-        X = make_pose(rot_z(yaw), middle + offset) @ make_pose(p_AB=-middle)
-        return self.move({name: X @ X_SO for name, X_SO in self._start.items()})
+        return self.transform(make_pose(rot_z(yaw), middle + offset) @ make_pose(p_AB=-middle))
+
+    def transform(self, X: Array, *, changes_height: bool = False) -> SessionView:
+        """Holds all instances where a motion (4, 4) in S brings them from where they were taken;
+        see `move`."""
+        X_SO = {name: X @ X_SOi for name, X_SOi in self._start.items()}
+        return self.move(X_SO, changes_height=changes_height)
 
     def end(self) -> SessionView:
         """Lets the instances go: one step, or none if they did not move."""
-        return self._session.end_drag(self)
+        session = self._session
+        with session._exclusive():
+            self._require_current()
+            session._drag = None
+            state = replace(session._state, library=session._history.state.library)
+            return session._edit(command_label("move", self.names), state)
 
     def cancel(self) -> SessionView:
         """Puts the instances back where they were taken."""
-        return self._session.cancel_drag(self)
+        session = self._session
+        with session._exclusive():
+            if self.is_over:
+                return session.view
+            session._drag = None
+            return session._show(session._history.state.select(self.names))
+
+    def _require_current(self) -> None:
+        if self.is_over:
+            raise InvalidInputError(
+                "the scene was changed during the drag, which ended it; drag again"
+            )
 
 
 Callback = Callable[[SessionView], None]
@@ -258,36 +259,6 @@ class Editor:
             self._publish()
             return self._drag
 
-    def is_current(self, drag: Drag) -> bool:
-        """Whether a drag is not over."""
-        return self._drag is drag
-
-    def preview_drag(self, drag: Drag, move: MoveObjects) -> SessionView:
-        """Shows what is dragged elsewhere; see `Drag.move`.
-
-        Raises:
-            InvalidInputError: a pose is none, or the drag is over.
-        """
-        with self._exclusive():
-            self._require_current(drag)
-            return self._show(move.apply(self._history.state, self._surroundings))
-
-    def end_drag(self, drag: Drag) -> SessionView:
-        """Makes a drag a step; see `Drag.end`."""
-        with self._exclusive():
-            self._require_current(drag)
-            self._drag = None
-            state = replace(self._state, library=self._history.state.library)
-            return self._edit(command_label("move", drag.names), state)
-
-    def cancel_drag(self, drag: Drag) -> SessionView:
-        """Ends a drag without a step; see `Drag.cancel`."""
-        with self._exclusive():
-            if not self.is_current(drag):
-                return self._view
-            self._drag = None
-            return self._show(self._history.state.select(drag.names))
-
     def _begin(self, opened: OpenedScene) -> None:
         """Another scene, with its own history."""
         self._drag = None
@@ -375,13 +346,12 @@ class Editor:
         return self._publish()
 
     def _issues(self) -> tuple[SceneIssue, ...] | None:
+        self._check_problem = None
         try:
-            issues = self._checker.issues(self._state, self._storage.place)
+            return self._checker.issues(self._state, self._storage.place)
         except BurgError as error:
             self._check_problem = f"the scene cannot be checked: {error}"
             return None
-        self._check_problem = None
-        return issues
 
     def _gaps(self) -> dict[str, float]:
         try:
@@ -420,8 +390,5 @@ class Editor:
         )
         return self._notices + tuple(t for t in problems if t and t not in self._dismissed)
 
-    def _require_current(self, drag: Drag) -> None:
-        if self._drag is not drag:
-            raise InvalidInputError(
-                "the scene was changed during the drag, which ended it; drag again"
-            )
+
+DragOwner = Editor  # A drag's session.

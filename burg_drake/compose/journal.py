@@ -88,24 +88,37 @@ class JournalWriter:
         return values
 
 
+@dataclass
+class RecoveredSession:
+    """What a journal holds.
+
+    Attributes:
+        history: of the session.
+        saved: what the scene's file held; None if there was none.
+        known: fingerprint of that file.
+        origin: what the session was opened with, where that was no file of its own.
+        damage: what of the journal could not be read; empty if all of it was.
+    """
+
+    history: History | None = None
+    saved: SceneDocument | None = None
+    known: str | None = None
+    origin: str = ""
+    damage: str = ""
+
+
 class JournalReader:
     """Reads the lines of one journal, in their order.
 
+    Args:
+        libraries: by their folders.
+
     Attributes:
-        origin: what the session was opened with, where that was no file of its own.
-        history: of the session, as soon as there is one.
-        saved: what the scene's file holds; None if there is none.
-        known: fingerprint of that file.
+        session: what was read by now.
     """
 
     def __init__(self, libraries: dict[str, ObjectLibrary]) -> None:
-        """Args:
-        libraries: by their folders.
-        """
-        self.origin = ""
-        self.history: History | None = None
-        self.saved: SceneDocument | None = None
-        self.known: str | None = None
+        self.session = RecoveredSession()
         self._libraries = libraries
         self._library: ObjectLibrary | None = None
         self._instances: dict[int, Instance] = {}
@@ -136,7 +149,7 @@ class JournalReader:
         if "journal" in values:
             if values["journal"] != JOURNAL_VERSION:
                 raise ValueError(f"version {values['journal']!r}")
-            self.origin = _read_text(values["origin"])
+            self.session.origin = _read_text(values["origin"])
         elif "step" in values:
             self._read_step(values)
         elif "at" in values:
@@ -146,7 +159,7 @@ class JournalReader:
             known = values["known"]
             if not isinstance(known, str | None):
                 raise TypeError("known")
-            self.saved, self.known = saved, known
+            self.session.saved, self.session.known = saved, known
         else:
             raise ValueError("unknown line")
 
@@ -157,24 +170,26 @@ class JournalReader:
         state = State(self._document(values), library)
         label, there = _read_text(values["step"]), state.instances
         state = state.select(name for name in values["selection"] if name in there)
-        last = self._positions[self.history.position] if self.history else -1
+        history = self.session.history
+        last = self._positions[history.position] if history else -1
         position = _read_integer(values.get("at", last + 1))
         self._library = library
-        if self.history is None:
-            self.history = History(state)
+        if history is None:
+            self.session.history = History(state)
             self._positions = [position]
             return
         if position <= self._positions[0]:
             raise ValueError(f"step {position} of a history that begins later")
         self._go_to(position - 1)
-        self.history.add(HistoryStep(label, state))
-        self._positions[self.history.position :] = [position]
+        history.add(HistoryStep(label, state))
+        self._positions[history.position :] = [position]
 
     def _go_to(self, position: int) -> None:
         """Goes to a step by its number; to the one before it that was read if it was not."""
-        if self.history is None or position < self._positions[0]:
+        history = self.session.history
+        if history is None or position < self._positions[0]:
             raise ValueError(f"no step {position}")
-        self.history.go_to(sum(known <= position for known in self._positions) - 1)
+        history.position = sum(known <= position for known in self._positions) - 1
 
     def _document(self, values: dict[str, Any]) -> SceneDocument:
         head = self._head
@@ -276,25 +291,6 @@ class LibraryMissing(InvalidInputError):
     """A journal needs a library that is not where it was."""
 
 
-@dataclass(frozen=True)
-class RecoveredSession:
-    """What a journal holds.
-
-    Attributes:
-        history: of the session.
-        saved: what the scene's file held; None if there was none.
-        known: fingerprint of that file.
-        origin: what the session was opened with, where that was no file of its own.
-        damage: what of the journal could not be read; empty if all of it was.
-    """
-
-    history: History | None = None
-    saved: SceneDocument | None = None
-    known: str | None = None
-    origin: str = ""
-    damage: str = ""
-
-
 def journal_path(scene: Path) -> Path:
     """The journal beside a scene's file."""
     return scene.with_name(f".{scene.name}.journal")
@@ -329,13 +325,8 @@ def recover_journal(path: Path) -> RecoveredSession | None:
             " restore the library, or delete that file"
         ) from error
     damaged = [number for number, line in enumerate(lines, 1) if not reader.read(line)]
-    return RecoveredSession(
-        reader.history,
-        reader.saved,
-        reader.known,
-        reader.origin,
-        _describe_damage(damaged, len(lines)),
-    )
+    reader.session.damage = _describe_damage(damaged, len(lines))
+    return reader.session
 
 
 def set_journal_aside(path: Path) -> Path:

@@ -26,14 +26,16 @@ from burg_drake.compose.scene_checker import (
     object_vertices,
     scene_of_known_objects,
 )
-from burg_drake.compose.state import (
-    State,
-    instance_name,
-    rename_instance,
-    require_instance_names,
+from burg_drake.compose.state import State, instance_name, rename_instance, require_instance_names
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Pose,
+    list_names,
+    make_pose,
+    transform_points,
     unused_name,
 )
-from burg_drake.core import Array, InvalidInputError, Pose, list_names, make_pose, transform_points
 from burg_drake.scene import (
     Instance,
     LayoutName,
@@ -78,10 +80,8 @@ class AddObject:
         if position is None:
             X_SO, yaw_deg, position = self._free_place(state, surroundings, yaw_deg)
         yaw = np.deg2rad(yaw_deg)
-        x, y = (
-            require_coordinate(value, f"{axis} of the new {self.object!r}")
-            for axis, value in zip("xy", position, strict=True)
-        )
+        x = require_coordinate(position[0], f"x of the new {self.object!r}")
+        y = require_coordinate(position[1], f"y of the new {self.object!r}")
         name = unused_name(self.object, surroundings.taken_names(state))
         X_new = Pose.readable(pose_on_board(X_SO, (x, y), yaw))
         instance = rename_instance(Instance(object=self.object, X_SO=X_new), name)
@@ -138,10 +138,8 @@ class Duplicate(InstancesCommand):
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_instance_names(self.names, state)
         offset = _copy_offset(state, surroundings, names) if self.offset is None else self.offset
-        x, y = (
-            require_coordinate(value, f"offset along {axis}")
-            for axis, value in zip("xy", offset, strict=True)
-        )
+        x = require_coordinate(offset[0], "offset along x")
+        y = require_coordinate(offset[1], "offset along y")
         X = make_pose(p_AB=(x, y, 0.0))
         taken, copies = set(surroundings.taken_names(state)), []
         fixed = set()

@@ -58,16 +58,9 @@ def _hull_vertices(path: Path, build: str) -> Array:
         return p_OV
 
 
-def instance_bounds(state: State, name: str, X_SO: Array | None = None) -> Array:
-    """(2, 3) lower and upper corner of an instance's bounding box in the scene frame [m].
-
-    Args:
-        state: that has the instance.
-        name: of the instance.
-        X_SO: (4, 4) pose, where it is not its present one.
-    """
-    X = state.X_SO(name) if X_SO is None else X_SO
-    return object_bounds(state.library, state.instance(name).object, X)
+def instance_bounds(state: State, name: str) -> Array:
+    """(2, 3) lower and upper corner of an instance's bounding box in the scene frame [m]."""
+    return object_bounds(state.library, state.instance(name).object, state.X_SO(name))
 
 
 def object_bounds(library: ObjectLibrary, object: str, X_SO: Array) -> Array:

@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
-from burg_drake.compose.background_editor import BackgroundEditor
-from burg_drake.compose.opening import OpenedScene, new_scene, open_reference, open_scene_file
-from burg_drake.compose.scene_checker import Surroundings, scene_of_known_objects
-from burg_drake.compose.scene_storage import UnsavedChanges, file_fingerprint, scene_path
+from burg_drake.compose.background_tasks import (
+    BackgroundJob,
+    BackgroundWorker,
+    GraspCountJob,
+    GraspWatch,
+    SettlingProposal,
+    SettlingTask,
+)
+from burg_drake.compose.commands import UseLibrary
+from burg_drake.compose.editor import Editor
+from burg_drake.compose.scene_checker import (
+    missing_objects,
+    restore_missing_objects,
+    scene_of_known_objects,
+)
+from burg_drake.compose.scene_storage import (
+    OpenedScene,
+    UnsavedChanges,
+    file_fingerprint,
+    new_scene,
+    open_reference,
+    open_scene_file,
+    scene_path,
+)
 from burg_drake.compose.session_view import SessionView
-from burg_drake.compose.state import HistoryStep, State, instance_name
+from burg_drake.compose.state import HistoryStep, State
 from burg_drake.core import (
     BurgError,
     InvalidInputError,
+    TaskCancelled,
     UnknownNameError,
     builtin_names,
     list_names,
@@ -24,47 +45,17 @@ from burg_drake.core import (
 )
 from burg_drake.objects import LIBRARY_FILE, ObjectLibrary, load_library
 from burg_drake.scene import load_scene
-from burg_drake.station import StationLike, as_station
+from burg_drake.station import StationLike
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation import GraspCount
     from burg_drake.printout import Printout, PrintSettings
-
-Stamp = tuple[int, int, int] | None
-
-
-class LibraryWatch:
-    """Looks at a library's document now and then; without a change that costs nothing.
-
-    Args:
-        library: as it is now.
-    """
-
-    def __init__(self, library: ObjectLibrary) -> None:
-        self.library = library
-        self._stamp = _library_stamp(library.root)
-
-    def reload_if_changed(self) -> ObjectLibrary | None:
-        """The library, if it was changed since; None if not.
-
-        Raises:
-            BurgError: it cannot be loaded. It is tried again when it has changed once more.
-        """
-        stamp = _library_stamp(self.library.root)
-        if stamp == self._stamp:
-            return None
-        self._stamp = stamp
-        library = load_library(self.library.root)
-        if library.document == self.library.document and library.content == self.library.content:
-            return None
-        self.library = library
-        return library
 
 
 def library_change_notice(state: State, library: ObjectLibrary) -> str:
     """One line on what a changed library means for a scene."""
-    placed = [*state.document.instances, *state.document.background]
-    used = list(dict.fromkeys(i.object for i in placed))
-    missing = [instance_name(i) for i in placed if i.object not in library.objects]
+    missing = missing_objects(replace(state, library=library))
+    used = dict.fromkeys(instance.object for instance in state.instances.values())
     other = [
         name
         for name in used
@@ -78,51 +69,8 @@ def library_change_notice(state: State, library: ObjectLibrary) -> str:
     return f"library {library.root} has changed: {'; '.join(parts) or 'no object of this scene'}"
 
 
-def require_objects_of_scene(state: State, library: ObjectLibrary) -> None:
-    """Refuses a library that lacks objects of a scene.
-
-    Raises:
-        UnknownNameError: it does; the message lists them.
-        InvalidInputError: it gives a free instance no mass.
-    """
-    placed = (*state.document.instances, *state.document.background)
-    missing = sorted({i.object for i in placed if i.object not in library.objects})
-    if missing:
-        raise UnknownNameError(
-            f"library {library.root} has no {list_names([repr(m) for m in missing])}; delete their"
-            " instances first, or choose a library that has them"
-        )
-    heavy = [instance_name(i) for i in state.document.instances if library.entry(i.object).is_fixed]
-    if heavy:
-        raise InvalidInputError(
-            f"library {library.root} has no mass for {list_names(heavy)}; make them background"
-            " first"
-        )
-
-
-@dataclass(frozen=True)
-class UseLibrary:
-    """Takes the objects from another library.
-
-    Attributes:
-        library: which must have all objects of the scene.
-        reference: how the scene's document refers to it.
-    """
-
-    library: ObjectLibrary
-    reference: str
-
-    @property
-    def label(self) -> str:
-        return f"use library {self.library.name}"
-
-    def apply(self, state: State, surroundings: Surroundings) -> State:
-        require_objects_of_scene(state, self.library)
-        document = replace(state.document, library=self.reference)
-        return replace(state, document=document, library=self.library)
-
-
-def _library_stamp(root: Path) -> Stamp:
+def _library_stamp(root: Path) -> tuple[int, int, int] | None:
+    """What differs if a library's document was written again; None if it is not there."""
     try:
         stat = (root / LIBRARY_FILE).stat()
     except OSError:
@@ -130,7 +78,7 @@ def _library_stamp(root: Path) -> Stamp:
     return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
-class ComposeSession(BackgroundEditor):
+class ComposeSession(Editor):
     """Document, selection, commands and history of one scene, without any user interface.
 
     All methods may be called from any thread. What is refused raises a `BurgError`, and changes
@@ -147,9 +95,14 @@ class ComposeSession(BackgroundEditor):
     ) -> None:
         self.folder = folder
         self._address = address
-        self._watch: LibraryWatch | None = None
+        self._library_seen: tuple[Path, object] | None = None
         self._seen: str | None = opened.storage.known
-        super().__init__(opened, as_station(station))
+        self._settler = BackgroundWorker()
+        self._settling: BackgroundJob[SettlingProposal] | None = None
+        self._proposal: SettlingProposal | None = None
+        self._grasp_watch: GraspWatch | None = None
+        self._grasps: tuple[Mapping[str, GraspCount], int] = ({}, 0)
+        super().__init__(opened, station)
         self.refresh()
 
     @classmethod
@@ -184,12 +137,7 @@ class ComposeSession(BackgroundEditor):
     def __enter__(self) -> ComposeSession:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def announce(self, address: str) -> None:
@@ -201,7 +149,8 @@ class ComposeSession(BackgroundEditor):
     def close(self) -> None:
         """Lets others open the scene. Changes that are in no file stay in the journal, and are
         there when the scene is opened again."""
-        self._end_background()
+        self.watch_grasps(None)
+        self._settler.close()
         with self._exclusive():
             self._callbacks.clear()
             self._storage.close(keep=self._changed)
@@ -334,6 +283,70 @@ class ComposeSession(BackgroundEditor):
             self._update_surroundings()
             return self._view
 
+    def settle(self, *, time_limit: float = 10.0) -> BackgroundJob[SettlingProposal]:
+        """Lets the scene come to rest in a worker process; editing goes on meanwhile.
+
+        What comes of it is `SessionView.proposal`. What was asked before is cancelled.
+
+        Args:
+            time_limit: simulated time allowed [s].
+        """
+        with self._exclusive():
+            self._drop_settling()
+            scene = scene_of_known_objects(self._history.state, self._storage.place)
+            self._settling = self._settler.submit(
+                SettlingTask(scene, self.station, time_limit), self._settled
+            )
+            self._publish()
+            return self._settling
+
+    def accept(self, proposal: SettlingProposal | None = None) -> SessionView:
+        """Makes a proposal a step.
+
+        Args:
+            proposal: the one in the view if None.
+
+        Raises:
+            InvalidInputError: there is none, or the scene has changed since it was made.
+        """
+        with self._exclusive():
+            proposal = proposal or self._proposal
+            if proposal is None:
+                raise InvalidInputError("there is no proposal to accept; settle the scene first")
+            before = self._history.state
+            if scene_of_known_objects(before, self._storage.place).document != proposal.start:
+                raise InvalidInputError(
+                    "the scene has changed since it was settled; settle it again, or undo"
+                )
+            self._proposal = None
+            self._drag = None
+            state = replace(before, document=restore_missing_objects(proposal.document, before))
+            moved = [n for n, i in state.instances.items() if i != before.instance(n)]
+            return self._edit(proposal.label, state.select(moved))
+
+    def revert(self) -> SessionView:
+        """Drops the proposal, and what is being done for one."""
+        with self._exclusive():
+            self._drop_settling()
+            return self._publish()
+
+    def watch_grasps(self, grasps_per_object: int | None = 50) -> SessionView:
+        """Counts grasps from now on, in a worker process, a while after each change: how many of
+        each object are clear and reachable, and what is in the way of the others. They are in
+        `SessionView.grasps`.
+
+        Args:
+            grasps_per_object: grasps that are sampled for each object; no more counting if None.
+        """
+        with self._exclusive():
+            watch, self._grasp_watch = self._grasp_watch, None
+            if grasps_per_object is not None:
+                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
+            view = self._publish()
+        if watch is not None:
+            watch.close()
+        return view
+
     def _switch_scene(self, opened: OpenedScene) -> SessionView:
         """Goes over to another scene."""
         self._drop_settling()
@@ -350,14 +363,15 @@ class ComposeSession(BackgroundEditor):
     def _update_surroundings(self) -> None:
         self._check_scene_file()
         library = self._history.state.library
-        if self._watch is None or self._watch.library.root != library.root:
-            self._watch = LibraryWatch(library)
+        seen, self._library_seen = self._library_seen, (library.root, _library_stamp(library.root))
+        if seen is None or seen[0] != library.root or seen == self._library_seen:
+            return
         try:
-            changed = self._watch.reload_if_changed()
-        except BurgError as error:
+            changed = load_library(library.root)
+        except BurgError as error:  # tried again when the library has changed once more
             self.notify(f"library {library.root} can no longer be read: {error}")
             return
-        if changed is None:
+        if changed.document == library.document and changed.content == library.content:
             return
         self.notify(library_change_notice(self._history.state, changed))
         self._history.replace_library(changed)
@@ -377,3 +391,49 @@ class ComposeSession(BackgroundEditor):
             what = "is gone" if found is None else "was changed by another program"
             self.notify(f"{path} {what}; load it, or overwrite it by saving")
         self._seen = found
+
+    def _counted(self, job: GraspCountJob, revision: int) -> None:
+        """Called by the worker's thread."""
+        with self._exclusive():
+            if self._grasp_watch is None or job.cancelled:
+                return
+            if job.error is not None:
+                self.notify(f"grasps cannot be counted: {job.error}")
+                self._grasps = ({}, revision)  # nobody waits for more
+            elif job.done:
+                self._grasps = (job.result, revision)
+            elif job.partial is not None:
+                self._grasps = ({**self._grasps[0], **job.partial}, self._grasps[1])
+            self._publish()
+
+    def _settled(self, job: BackgroundJob[SettlingProposal]) -> None:
+        """Called by the worker's thread."""
+        with self._exclusive():
+            if job is not self._settling:
+                return
+            if job.done:
+                self._settling = None
+                if job.error is None:
+                    self._proposal = job.result
+                elif not isinstance(job.error, TaskCancelled):
+                    self.notify(f"cannot settle the scene: {job.error}")
+            self._publish()
+
+    def _drop_settling(self) -> None:
+        job, self._settling = self._settling, None
+        self._proposal = None
+        if job is not None:
+            job.cancel()
+
+    def _with_background(self, view: SessionView) -> SessionView:
+        if self._grasp_watch is not None:
+            scene = scene_of_known_objects(self._history.state, self._storage.place)
+            self._grasp_watch.update(scene, self._revision, self._state.selection)
+        working = None
+        if self._settling is not None:
+            share, word = self._settling.progress
+            working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
+        grasps, revision = self._grasps
+        return replace(
+            view, working=working, proposal=self._proposal, grasps=grasps, grasps_revision=revision
+        )

@@ -113,17 +113,14 @@ def instance_statuses(
         state: with the instances.
         issues: of the scene; None if it cannot be checked.
     """
-    worst_first = ("collision", "in_ground", "out_of_bounds", "hovering", "sunken")
+    worst_first = ("collision", "in_ground", "out_of_bounds", "hovering", "sunken", "ok")
     if issues is None:
         return dict.fromkeys(state.instances, "unknown")
-    found_statuses: dict[str, set[InstanceStatus]] = {name: set() for name in state.instances}
+    found: dict[str, InstanceStatus] = dict.fromkeys(state.instances, "ok")
     for issue in issues:
+        status = STATUS_OF_ISSUE[issue.kind]
         for name in (issue.instance, issue.other):
             stands_below = issue.kind == "hovering" and name == issue.other
-            if name in found_statuses and not stands_below:
-                found_statuses[name].add(STATUS_OF_ISSUE[issue.kind])
-    found: dict[str, InstanceStatus] = {
-        name: next((status for status in worst_first if status in all_said), "ok")
-        for name, all_said in found_statuses.items()
-    }
+            if name in found and not stands_below:
+                found[name] = min(status, found[name], key=worst_first.index)
     return found | dict.fromkeys(missing_objects(state), "unknown")

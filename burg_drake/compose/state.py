@@ -75,13 +75,12 @@ class State:
         """The same with each instance replaced, or taken away where `change` gives None."""
         document = replace(
             self.document,
-            instances=_map_instances(self.document.instances, change),
-            background=_map_instances(self.document.background, change),
+            instances=tuple(filter(None, map(change, self.document.instances))),
+            background=tuple(filter(None, map(change, self.document.background))),
         )
-        there = {instance_name(i) for i in (*document.instances, *document.background)}
-        return replace(
-            self, document=document, selection=tuple(n for n in self.selection if n in there)
-        )
+        changed = replace(self, document=document)
+        there = changed.instances
+        return replace(changed, selection=tuple(n for n in self.selection if n in there))
 
     def with_poses(self, X_SO: Mapping[str, Array]) -> State:
         """The same with instances at other poses (4, 4); rounded as `Pose.readable` has it.
@@ -124,16 +123,6 @@ def rename_instance(instance: Instance, name: str) -> Instance:
     return replace(instance, name="" if name == instance.object else name)
 
 
-def unused_name(wanted: str, taken: Collection[str]) -> str:
-    """`wanted`, or with the first number behind it that makes it unused: mug, mug_2, mug_3."""
-    if wanted not in taken:
-        return wanted
-    number = 2
-    while f"{wanted}_{number}" in taken:
-        number += 1
-    return f"{wanted}_{number}"
-
-
 def require_instance_names(names: Iterable[str], state: State, least: int = 1) -> tuple[str, ...]:
     """Names that a command was given, each once.
 
@@ -150,12 +139,6 @@ def require_instance_names(names: Iterable[str], state: State, least: int = 1) -
             what = f"only {len(names)} objects are selected"
         raise InvalidInputError(f"{what}; select {least} or more objects")
     return names
-
-
-def _map_instances(
-    instances: tuple[Instance, ...], change: Callable[[Instance], Instance | None]
-) -> tuple[Instance, ...]:
-    return tuple(new for new in map(change, instances) if new is not None)
 
 
 @dataclass(frozen=True)
@@ -223,16 +206,6 @@ class History:
         self.position += 1
         return self.state
 
-    def go_to(self, position: int) -> None:
-        """Goes to a step by its number, the first state being 0.
-
-        Raises:
-            IndexError: there is none.
-        """
-        if not 0 <= position < len(self.steps):
-            raise IndexError(f"step {position} of {len(self.steps)}")
-        self.position = position
-
     def rename(self, name: str, reference: str, library: ObjectLibrary) -> None:
         """Gives the scene of every step another name, and a library another reference."""
 
@@ -260,7 +233,7 @@ class History:
 
 def _select_changes(state: State, other: State) -> State:
     """`state` with those instances selected that are not the same in `other`."""
-    there = {instance_name(i): i for i in (*other.document.instances, *other.document.background)}
+    there = other.instances
     fixed = set(state.document.background), set(other.document.background)
     changed = [
         name

@@ -68,6 +68,7 @@ from .documents import (
     parse_document as parse_document,
     plain_data as plain_data,
     read_document as read_document,
+    read_plain_data as read_plain_data,
     save_document as save_document,
     schema_text as schema_text,
     write_schemas as write_schemas,
@@ -136,9 +137,11 @@ from .grasp_set import (
     FIXED_COLUMNS as FIXED_COLUMNS,
     GraspSet as GraspSet,
     GraspSetFormat as GraspSetFormat,
+    distinct_texts as distinct_texts,
 )
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,
+    count_with_noun as count_with_noun,
     format_count as format_count,
     format_duration as format_duration,
     format_number as format_number,
@@ -176,6 +179,7 @@ from .paths import (
     require_names as require_names,
     resolve_reference as resolve_reference,
     shareable_reference as shareable_reference,
+    unused_name as unused_name,
     with_resolved_references as with_resolved_references,
     with_shareable_references as with_shareable_references,
 )
@@ -247,7 +251,7 @@ from .web_access import (
     SECURITY_HEADERS as SECURITY_HEADERS,
     BrowserToken as BrowserToken,
     RequestError as RequestError,
-    address_in_use_error as address_in_use_error,
+    open_listener as open_listener,
     page_url as page_url,
     require_local_host as require_local_host,
 )

@@ -3,7 +3,8 @@
 A document is a frozen dataclass with a `version: int` field whose default is the version that this
 release writes. Loading checks every key and value; errors name file, line and key. Field types:
 `bool, int, float, str`, `Literal`, `Enum`, `X | None`, `list[X]`, `tuple[X, ...]`,
-`tuple[X, Y, Z]`, `dict[str, X]` and nested dataclasses. Numbers must be finite.
+`tuple[X, Y, Z]`, `dict[str, X]`, nested dataclasses, and `Any` for dicts, lists and scalars of any
+structure. Numbers must be finite.
 
 The JSON Schemas for editors are made from the same dataclasses: types, defaults, ranges (`RANGES`
 of a class) and docstrings.
@@ -51,6 +52,14 @@ from burg_drake.core.frames import (
 from burg_drake.core.settings import Quaternion, Vector3
 from burg_drake.core.structured_text import parse_yaml_node
 
+_SCALARS = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a finite number",
+    str: "a text",
+}
+"""What is expected of a value, by its type."""
+
 
 class Reader:
     """Turns YAML nodes into typed values; every error names file, line and key.
@@ -89,6 +98,10 @@ class Reader:
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
+        if kind in _SCALARS:
+            return self.read_scalar(node, kind, where)
+        if kind is Any:
+            return self.read_plain(node, where)
         origin = typing.get_origin(kind)
         if origin in (typing.Union, types.UnionType):
             if node.tag == "tag:yaml.org,2002:null":
@@ -100,14 +113,14 @@ class Reader:
             return self.choice(node, where, dict(zip(allowed, typing.get_args(kind), strict=True)))
         if origin in (list, tuple):
             return self.read_sequence(node, kind, origin, where)
-        if origin is dict:
+        if origin in (dict, Mapping):
             return self.read_dict(node, typing.get_args(kind)[1], where)
         if dataclasses.is_dataclass(kind):
             return self.read_dataclass(node, typing.cast(type, kind), where)
         if isinstance(kind, type) and issubclass(kind, enum.Enum):
             members = {str(m.value): m for m in kind}
             return self.choice(node, where, members, ordered=True)
-        return self.read_scalar(node, kind, where)
+        raise TypeError(f"schema type {kind} is not supported")
 
     def choice(
         self, node: yaml.Node, where: str, options: dict[str, Any], *, ordered: bool = False
@@ -181,16 +194,8 @@ class Reader:
             raise self.fail(node, where, str(error)) from error
 
     def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
-        expected = {
-            bool: "true or false",
-            int: "a whole number",
-            float: "a finite number",
-            str: "a text",
-        }
-        if kind not in expected:
-            raise TypeError(f"schema type {kind} is not supported")
         if not isinstance(node, yaml.ScalarNode) or node.tag == "tag:yaml.org,2002:null":
-            raise self.fail(node, where, f"expected {expected[kind]}")
+            raise self.fail(node, where, f"expected {_SCALARS[kind]}")
         if kind is str:
             if "\0" in node.value:  # which no path and no name has
                 raise self.fail(node, where, f"{quote_value(node.value)} has a NUL character")
@@ -206,7 +211,19 @@ class Reader:
             return value
         if abs(value) < math.inf:
             raise self.fail(node, where, f"{quote_value(node.value)} is too large a number")
-        raise self.fail(node, where, f"{quote_value(node.value)} is not {expected[kind]}")
+        raise self.fail(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
+
+    def read_plain(self, node: yaml.Node, where: str) -> Any:
+        """A node of any structure as dicts, lists and scalars."""
+        if isinstance(node, yaml.MappingNode):
+            return self.read_dict(node, Any, where)
+        if isinstance(node, yaml.SequenceNode):
+            return self.read_sequence(node, list[Any], list, where)
+        kind = node.tag.rpartition(":")[2]
+        if kind == "null":
+            return None
+        kinds: dict[str, type] = {"bool": bool, "int": int, "float": float}
+        return self.read_scalar(node, kinds.get(kind, str), where)
 
 
 @functools.cache
@@ -313,6 +330,53 @@ def read_document(node: yaml.Node, schema: type[T], name: str) -> T:
     if isinstance(node, yaml.MappingNode):
         reader.check_version(node, schema)
     return typing.cast(T, reader.read(node, schema, ""))
+
+
+def read_plain_data(data: Mapping[str, Any], schema: type[T], name: str) -> T:
+    """As `load_document`, from dicts, lists and scalars, such as `plain_data` makes them, or those
+    of a JSON file; `name` stands for the place that they are from in messages, which have no line.
+    """
+    reader, node = _PlainReader(name), _plain_node(data)
+    if isinstance(node, yaml.MappingNode):
+        reader.check_version(node, schema)
+    return typing.cast(T, reader.read(node, schema, ""))
+
+
+class _PlainReader(Reader):
+    """Reads dicts, lists and scalars, which become nodes when their type is known."""
+
+    LINES = False
+
+    def read(self, node: Any, kind: Any, where: str) -> Any:
+        if not isinstance(node, yaml.Node):
+            if kind is Any:
+                return node
+            node = _plain_node(node)
+        return super().read(node, kind, where)
+
+
+def _plain_node(value: Any) -> yaml.Node:
+    """Plain data as a node of YAML; dicts and lists in it stay as they are."""
+    if isinstance(value, Mapping):
+        entries = [(_plain_node(str(key)), _node_of_scalar(item)) for key, item in value.items()]
+        return yaml.MappingNode(_TAGS[dict], entries)
+    if isinstance(value, (list, tuple)):
+        return yaml.SequenceNode(_TAGS[list], [_node_of_scalar(item) for item in value])
+    return yaml.ScalarNode(_TAGS.get(type(value), _TAGS[str]), str(value))
+
+
+def _node_of_scalar(value: Any) -> Any:
+    return value if isinstance(value, (Mapping, list, tuple)) else _plain_node(value)
+
+
+_TAGS: dict[type, str] = {
+    kind: f"tag:yaml.org,2002:{tag}"
+    for kind, tag in (
+        *((dict, "map"), (list, "seq"), (type(None), "null")),
+        *((str, "str"), (bool, "bool"), (int, "int"), (float, "float")),
+    )
+}
+"""Tags of YAML by the types of plain data."""
 
 
 def save_document(document: Any, path: str | Path, header: str = "") -> None:

@@ -24,11 +24,10 @@ import tokenize
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, shorten_text
 
@@ -96,7 +95,7 @@ UNFINISHED_FILE = re.compile(r"\..+\.[0-9a-f]{16}")
 """Names of files that `atomic_write` has not renamed yet."""
 
 
-def open_regular(path: str | Path) -> BinaryIO:
+def open_regular(path: str | Path) -> io.BufferedReader:
     """Opens a file for reading bytes; a folder, device or pipe is refused, as it may never end.
 
     Raises:
@@ -116,14 +115,18 @@ def open_regular(path: str | Path) -> BinaryIO:
     raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
 
 
-def atomic_write(path: str | Path, content: str | bytes) -> None:
+FileContent = str | bytes | Callable[[io.BufferedWriter], object]
+"""Text (stored as UTF-8), bytes, or a function that writes bytes to an open file."""
+
+
+def atomic_write(path: str | Path, content: FileContent) -> None:
     """Writes `content` beside `path` and renames it into place; parent folders are made.
 
     A file that is replaced keeps its permissions, and a link to it stays one.
 
     Args:
         path: file to write or replace.
-        content: text (stored as UTF-8) or bytes.
+        content: what is to be in it.
 
     Raises:
         InvalidInputError: the place cannot be written to.
@@ -131,12 +134,12 @@ def atomic_write(path: str | Path, content: str | bytes) -> None:
     atomic_write_all({Path(path): content})
 
 
-def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
+def atomic_write_all(contents: Mapping[Path, FileContent]) -> None:
     """Writes several files, and renames them into place only when all of them are on the disk; see
     `atomic_write`.
 
     Args:
-        contents: text (stored as UTF-8) or bytes by file.
+        contents: what is to be in each file.
 
     Raises:
         InvalidInputError: one of the places cannot be written to; then none is replaced, unless it
@@ -153,7 +156,10 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
             with temporary.open("xb") as stream:  # with the permissions that the umask leaves
                 written[target] = temporary
                 copy_permissions(target, stream.fileno())
-                stream.write(content.encode() if isinstance(content, str) else content)
+                if callable(content):
+                    content(stream)
+                else:
+                    stream.write(content.encode() if isinstance(content, str) else content)
                 stream.flush()
                 os.fsync(stream.fileno())
         for path, temporary in written.items():

@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,19 +23,31 @@ from burg_drake.core.paths import with_resolved_references, with_shareable_refer
 from burg_drake.core.structured_text import parse_json
 
 
+def distinct_texts(texts: NDArray[np.str_]) -> set[str]:
+    """The different ones of some texts (N,)."""
+    step = 1 << 14  # Texts that are looked at together, as objects of Python.
+    parts = (texts[begin : begin + step].tolist() for begin in range(0, len(texts), step))
+    return set().union(*parts)
+
+
 def grasp_identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> NDArray[np.str_]:
     """(N,) hashes of names, poses and widths (BLAKE2b, which takes a microsecond a grasp)."""
-    numbers = np.column_stack([X_OG.reshape(-1, 16), width]).astype("<f8")
     prefixes = {
         name: hashlib.blake2b(f"{name}\0".encode(), digest_size=6)
-        for name in np.unique(object).tolist()
+        for name in distinct_texts(object)
     }
-    ids = []
-    for name, row in zip(object.tolist(), numbers, strict=True):
-        digest = prefixes[name].copy()
-        digest.update(row.data)
-        ids.append(digest.hexdigest())
-    return np.array(ids, dtype="<U12")  # of 100,000 grasps two share one with probability 2e-5
+    # of 100,000 grasps two share one with probability 2e-5
+    ids = np.empty(len(X_OG), dtype="<U12")
+    step = 1 << 14  # Grasps whose numbers are copied together.
+    for begin in range(0, len(X_OG), step):
+        part = slice(begin, begin + step)
+        numbers = np.column_stack([X_OG[part].reshape(-1, 16), width[part]]).astype("<f8")
+        rows = zip(object[part].tolist(), numbers, strict=True)
+        for place, (name, row) in enumerate(rows, begin):
+            digest = prefixes[name].copy()
+            digest.update(row.data)
+            ids[place] = digest.hexdigest()
+    return ids
 
 
 FIXED_COLUMNS = ("width", "id", "object", "score")
@@ -90,12 +102,12 @@ def _read_columns(
     return fixed, columns
 
 
-def _npz_bytes(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> bytes:
-    buffer = io.BytesIO()
+def _write_npz(
+    stream: BinaryIO, header: dict[str, Any], fixed: SetColumns, columns: SetColumns
+) -> None:
     further = {COLUMN_PREFIX + name: values for name, values in columns.items()}
     arrays: dict[str, Any] = {"header": np.array(json.dumps(header)), **fixed, **further}
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
+    np.savez_compressed(stream, **arrays)
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
@@ -249,7 +261,7 @@ class GraspSet:
         return len(self.X_OG)
 
     def __repr__(self) -> str:
-        objects = list_names(sorted(set(self.object.tolist())))
+        objects = list_names(sorted(distinct_texts(self.object)))
         columns = f"; columns {', '.join(self.columns)}" if self.columns else ""
         return f"GraspSet({len(self)} grasps of {objects}{columns})"
 
@@ -316,7 +328,7 @@ class GraspSet:
             columns=self.columns,
         )
 
-    def select(self, index: ArrayLike) -> GraspSet:
+    def select(self, index: ArrayLike | slice) -> GraspSet:
         """Subset by boolean mask, integer array or slice; the provenance is kept."""
         i = index if isinstance(index, slice) else np.atleast_1d(np.asarray(index))
         if not isinstance(i, slice) and i.size == 0 and i.dtype != bool:
@@ -345,6 +357,9 @@ class GraspSet:
         if not parts:
             raise InvalidInputError("cannot concatenate zero grasp sets; give at least one")
         names = dict.fromkeys(name for s in parts for name in s.columns)
+        one = parts[0]
+        if len(parts) == 1:  # its arrays need no copy
+            return replace(one, provenance={"parts": [dict(one.provenance)]})
         return GraspSet(
             np.concatenate([s.X_OG for s in parts]),
             np.concatenate([s.width for s in parts]),
@@ -376,8 +391,11 @@ class GraspSet:
             "provenance": provenance,
         }
         fixed = {name: getattr(self, name) for name in ("X_OG", *FIXED_COLUMNS)}
-        write = _npz_bytes if suffix == ".npz" else _hdf5_bytes
-        atomic_write(path, write(header, fixed, dict(self.columns)))
+        columns = dict(self.columns)
+        if suffix == ".npz":
+            atomic_write(path, lambda stream: _write_npz(stream, header, fixed, columns))
+        else:
+            atomic_write(path, _hdf5_bytes(header, fixed, columns))
 
     @classmethod
     def load(cls, path: str | Path) -> GraspSet:

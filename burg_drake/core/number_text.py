@@ -39,6 +39,11 @@ def format_count(value: int | None) -> str:
     return f"{value:,}" if abs(value) < 1_000_000_000 else format_number(float(value))
 
 
+def count_with_noun(count: int, noun: str) -> str:
+    """Such as `1 object` and `2 objects`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def format_percent(share: float) -> str:
     """A share of 0 to 1."""
     if math.isnan(share):

@@ -12,7 +12,7 @@ import importlib.util
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -63,6 +63,15 @@ def make_name(text: str) -> str:
     """A name made of any text: `my scene (2)` becomes `my_scene_2`, and nothing `unnamed`."""
     name = re.sub(r"[^\w.-]+", "_", text).lstrip(".").strip("_")
     return name.encode()[:MAX_NAME_BYTES].decode(errors="ignore") or "unnamed"
+
+
+def unused_name(wanted: str, taken: Collection[str]) -> str:
+    """`wanted`, or with the first number behind it that makes it unused: mug, mug_2, mug_3."""
+    name, number = wanted, 1
+    while name in taken:
+        number += 1
+        name = f"{wanted}_{number}"
+    return name
 
 
 PACKAGE_REFERENCE = re.compile(r"(?:package|model)://([^/]*)/*(.*)", re.DOTALL)

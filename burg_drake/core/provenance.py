@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -43,14 +43,16 @@ def _hash_part(digest: Any, part: Any) -> None:
             tag, data = "file", stream.read()
     elif isinstance(part, np.ndarray) and not part.dtype.hasobject:
         array = np.ascontiguousarray(part)
-        tag, data = f"array{array.dtype.str}{array.shape}", array.tobytes()
+        digest.update(f"array{array.dtype.str}{array.shape}{array.nbytes}:".encode())
+        digest.update(array.reshape(-1).view(np.uint8) if array.nbytes else b"")
+        return
     elif isinstance(part, dict):
         digest.update(f"dict{len(part)}:".encode())
         for key in sorted(part):
             _hash_part(digest, key)
             _hash_part(digest, part[key])
         return
-    elif isinstance(part, (list, tuple)):
+    elif isinstance(part, Sequence) and not isinstance(part, (str, bytes)):
         digest.update(f"list{len(part)}:".encode())
         for item in part:
             _hash_part(digest, item)

@@ -136,14 +136,19 @@ def require_ranges(settings: WithRanges, what: str = "") -> None:
                 )
 
 
-def require_ascending(pair: tuple[float, float], name: str) -> None:
-    """Refuses a range that falls.
+def require_ascending(settings: WithRanges) -> None:
+    """Refuses pairs of values that fall.
+
+    Args:
+        settings: dataclass with the fields.
 
     Raises:
-        FieldError: the first value is above the second.
+        FieldError: the first value of a pair is above the second.
     """
-    if pair[0] > pair[1]:
-        raise FieldError(f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise", name)
+    for name in settings.RANGES:
+        pair = getattr(settings, name)
+        if isinstance(pair, tuple) and pair[0] > pair[1]:
+            raise FieldError(f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise", name)
 
 
 def require_finite(document: object) -> None:

@@ -11,19 +11,18 @@ Z_95 = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
 
 
-def wilson_interval(successes: float, trials: float, z: float = Z_95) -> tuple[float, float]:
-    """Wilson's score interval for a proportion (E. B. Wilson, JASA 22, 1927).
+def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
+    """Wilson's 95 % score interval for a proportion (E. B. Wilson, JASA 22, 1927).
 
     Args:
         successes, trials: counts, or effective ones of weighted trials.
-        z: quantile of the normal distribution; 95 % by default.
 
     Returns:
         Lower and upper bound in [0, 1]; all of it if there were no trials.
     """
     if trials == 0:
         return 0.0, 1.0
-    share = successes / trials
+    share, z = successes / trials, Z_95
     scale = 1.0 + z * z / trials
     center = (share + z * z / (2 * trials)) / scale
     half = z / scale * math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hmac
 import ipaddress
 import re
@@ -11,7 +12,7 @@ import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 
-from burg_drake.core.errors import shorten_text
+from burg_drake.core.errors import InvalidInputError, shorten_text
 
 SECURITY_HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
@@ -91,20 +92,39 @@ def page_url(host: str, port: int) -> str:
     return f"http://{name}:{port}/"
 
 
-def address_in_use_error(host: str, ports: range, *, any_of_them: bool) -> str:
-    """Says that no port was free.
+def open_listener(host: str, port: int | None, *, first_port: int, title: str) -> socket.socket:
+    """A socket that listens.
 
     Args:
-        host: the address.
-        ports: that were tried.
-        any_of_them: the user left the choice to us.
+        host: address to listen on.
+        port: to listen on; any if 0, the first free one of 50 if None.
+        first_port: of these 50.
+        title: of what is served, for messages.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
     """
-    if any_of_them:
-        return f"all ports of {host} from {ports[0]} to {ports[-1]} are in use; choose another one"
-    return (
-        f"port {ports[0]} of {host} is in use; choose another one, or leave it out to take"
-        " the first free one"
-    )
+    ports = range(first_port, first_port + 50) if port is None else range(port, port + 1)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for candidate in ports:
+        try:
+            return socket.create_server(
+                (host, candidate), family=family, backlog=64, dualstack_ipv6=host == "::"
+            )
+        except OSError as error:
+            failure = error
+            if error.errno != errno.EADDRINUSE:
+                raise InvalidInputError(
+                    f"the {title} cannot be served on {host}: {error.strerror or error}"
+                ) from error
+    if port is None:
+        taken = f"all ports of {host} from {ports[0]} to {ports[-1]} are in use; choose another one"
+    else:
+        taken = (
+            f"port {port} of {host} is in use; choose another one, or leave it out to take the"
+            " first free one"
+        )
+    raise InvalidInputError(taken) from failure
 
 
 TOKEN_BYTES = 24  # Random bytes of a token or session secret.

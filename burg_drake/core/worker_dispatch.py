@@ -11,7 +11,7 @@ import signal
 import subprocess
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, Pipe, wait
@@ -73,6 +73,8 @@ class PendingTask:
 
 Batch = deque[PendingTask]
 """Tasks of one session that go to a worker together."""
+MAX_SESSIONS = 2
+"""Sessions that a worker keeps; more would take memory."""
 
 
 @dataclass(eq=False)
@@ -81,7 +83,6 @@ class Worker:
 
     Attributes:
         number: of the worker in its pool.
-        max_sessions: sessions that it keeps at most.
         own_group: whether the process leads a group of processes, so that what it starts ends
             with it.
         process, connection: the process and our end of the pipe, if there is one.
@@ -95,7 +96,6 @@ class Worker:
     """
 
     number: int
-    max_sessions: int
     own_group: bool
     process: subprocess.Popen[bytes] | None = None
     connection: Connection | None = None
@@ -149,7 +149,7 @@ class Worker:
         return True
 
     def _opening(self, session: Session) -> OpenSession:
-        drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - self.max_sessions)]
+        drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - MAX_SESSIONS)]
         for key in drop:
             del self.sessions[key]
         return OpenSession(session.key, session.pickled, drop, session.limit)
@@ -199,48 +199,6 @@ def _time_limit_message(limit: TimeLimit, number: int) -> str:
     return f"took longer than {limit.cpu:g} s of CPU time"
 
 
-class SharedQueue:
-    """Work of any session, by session."""
-
-    def __init__(self) -> None:
-        self._batches: dict[str | None, deque[Batch]] = {}
-
-    def put(self, batch: Batch) -> None:
-        """Adds work at the end."""
-        self._batches.setdefault(batch[0].task.session_key, deque()).append(batch)
-
-    def take(self, sessions: Iterable[str]) -> Batch | None:
-        """Takes the oldest work of one of these sessions, the first that has any."""
-        for key in sessions:
-            if key in self._batches:
-                return self._take(key)
-        return None
-
-    def take_oldest(self) -> Batch | None:
-        """Takes the oldest work of all."""
-        if not self._batches:
-            return None
-        return self._take(min(self._batches, key=lambda key: self._batches[key][0][0].number))
-
-    def clear(self) -> list[Batch]:
-        """Takes all."""
-        batches = list(self)
-        self._batches.clear()
-        return batches
-
-    def __iter__(self) -> Iterator[Batch]:
-        return itertools.chain.from_iterable(self._batches.values())
-
-    def __bool__(self) -> bool:
-        return bool(self._batches)
-
-    def _take(self, key: str | None) -> Batch:
-        batch = self._batches[key].popleft()
-        if not self._batches[key]:
-            del self._batches[key]
-        return batch
-
-
 _log = logging.getLogger("burg_drake")
 
 
@@ -259,7 +217,7 @@ class Dispatcher:
 
     def __init__(self, workers: list[Worker]) -> None:
         self.workers = workers
-        self._shared = SharedQueue()
+        self._shared: deque[Batch] = deque()
         self._lock = threading.Lock()
         self._requests: deque[Callable[[], None]] = deque()
         self._wake_receiver, self._wake_sender = Pipe(duplex=False)
@@ -273,7 +231,7 @@ class Dispatcher:
             if self._ended:
                 raise RuntimeError("cannot schedule new futures: the pool has ended")
             if worker is None:
-                self._shared.put(batch)
+                self._shared.append(batch)
             else:
                 self.workers[worker].own_batches.append(batch)
         self._wake()
@@ -358,13 +316,11 @@ class Dispatcher:
             suspect, worker.retry_task = worker.retry_task, None
             return deque([suspect])
         with self._lock:
-            if worker.own_batches:
-                return worker.own_batches.popleft()
-            return self._shared.take(reversed(worker.sessions))
+            return worker.own_batches.popleft() if worker.own_batches else None
 
     def _take_any(self, worker: Worker) -> Batch | None:
         with self._lock:
-            return self._shared.take_oldest()
+            return self._shared.popleft() if self._shared else None
 
     def _give(self, worker: Worker, batch: Batch) -> None:
         calls = [(task, call) for task in batch if (call := _begin_task(task)) is not None]
@@ -472,7 +428,8 @@ class Dispatcher:
                 worker.kill()
                 worker.clear_process()
         with self._lock:
-            left += itertools.chain.from_iterable(self._shared.clear())
+            left += itertools.chain.from_iterable(self._shared)
+            self._shared.clear()
             self._ended = True
             self._wake_receiver.close()
             self._wake_sender.close()

@@ -15,8 +15,8 @@ survive, and do not import the program's main module, so that scripts and notebo
 Functions must therefore be defined in a module that can be imported.
 
 **Sessions.** What is expensive to build (a scene with its renderer, a judge) is built once in each
-worker and passed to every task of the session as first argument. A worker keeps the last few
-sessions, and stays with a session while that has tasks::
+worker and passed to every task of the session as first argument. A worker keeps the last two
+sessions::
 
     scene = Session("kitchen", partial(SceneRenderer, "kitchen.yaml"))
     futures = [pool.submit_task(Task(render_view, (X_WC,), session=scene)) for X_WC in poses]
@@ -43,7 +43,6 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
@@ -65,7 +64,6 @@ class WorkerPool(Executor):
         workers: int | None = None,
         *,
         retries: int = 1,
-        kept_sessions: int = 2,
         own_group: bool = False,
     ) -> None:
         """Starts nothing yet.
@@ -73,7 +71,6 @@ class WorkerPool(Executor):
         Args:
             workers: number of processes at most; as many as there are processors if None.
             retries: how often a task is tried again whose worker dies.
-            kept_sessions: how many sessions a worker keeps; more would take memory.
             own_group: whether each worker leads a group of processes, so that what it starts ends
                 with it; then what a terminal sends to the program's group does not reach it.
 
@@ -82,7 +79,7 @@ class WorkerPool(Executor):
         """
         self.workers = worker_count(workers)
         self._retries = retries
-        self._places = [Worker(k, max(1, kept_sessions), own_group) for k in range(self.workers)]
+        self._places = [Worker(k, own_group) for k in range(self.workers)]
         self._numbers = itertools.count()
         self._lock = threading.Lock()
         self._dispatcher: Dispatcher | None = None
@@ -129,28 +126,6 @@ class WorkerPool(Executor):
             if pending:
                 dispatcher.put(pending, worker)
         return [task.future for task in pending]
-
-    def map(
-        self,
-        fn: Callable[..., T],
-        *iterables: Iterable[Any],
-        timeout: float | None = None,
-        chunksize: int = 1,
-    ) -> Iterator[T]:
-        """Results of a function in the order of its arguments; see `Executor.map`.
-
-        Args:
-            fn: the function.
-            iterables: of its arguments.
-            timeout: from now until each result [s].
-            chunksize: so many calls travel together; 1 is best for those of more than some
-                milliseconds.
-        """
-        tasks = [Task(fn, args) for args in zip(*iterables, strict=False)]
-        starts = range(0, len(tasks), max(1, chunksize))
-        chunks = [self.submit_tasks(tasks[k : k + starts.step]) for k in starts]
-        end = None if timeout is None else time.monotonic() + timeout
-        return _iterate_results(deque(itertools.chain.from_iterable(chunks)), end)
 
     def sessions(self, worker: int) -> tuple[str, ...]:
         """Keys of the sessions that a worker has built; used last comes last."""
@@ -203,16 +178,6 @@ class WorkerPool(Executor):
         retries = self._retries if task.retries is None else task.retries
         future = WorkerFuture[T](dispatcher.end_task)
         return PendingTask(next(self._numbers), task, future, 1 + retries)
-
-
-def _iterate_results(futures: deque[WorkerFuture[T]], end: float | None) -> Iterator[T]:
-    try:
-        while futures:
-            left = None if end is None else end - time.monotonic()
-            yield futures.popleft().result(left)
-    finally:
-        for future in futures:
-            future.cancel()
 
 
 Work = TypeVar("Work")

@@ -121,7 +121,6 @@ from .scene_renderer import (
     station_view as station_view,
 )
 from .scene_samples import (
-    DatasetInputs as DatasetInputs,
     SampleTask as SampleTask,
     SceneWork as SceneWork,
     make_scene as make_scene,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
@@ -14,8 +13,8 @@ from burg_drake.core import (
     Pose,
     Ranges,
     Vector3,
-    parse_document,
     plain_data,
+    read_plain_data,
     require_ascending,
     require_ranges,
 )
@@ -92,9 +91,7 @@ class AppearanceSettings:
 
     def __post_init__(self) -> None:
         require_ranges(self)
-        for name in self.RANGES:
-            if isinstance(pair := getattr(self, name), tuple):
-                require_ascending(pair, name)
+        require_ascending(self)
 
 
 WHITE_LIGHT: Vector3 = (1.0, 1.0, 1.0)  # Red, green and blue of white light.
@@ -260,4 +257,4 @@ def read_appearance(data: Mapping[str, Any], name: str = "appearance") -> Appear
     Raises:
         DocumentError: it does not fit; the message names the key.
     """
-    return parse_document(json.dumps(data), Appearance, name)
+    return read_plain_data(data, Appearance, name)

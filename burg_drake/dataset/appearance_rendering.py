@@ -25,6 +25,7 @@ from pydrake.geometry import (
     RenderLabel,
     Rgba,
     Role,
+    Shape,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
@@ -168,8 +169,7 @@ def _cover_table(built: StationDiagram, appearance: Appearance) -> None:
         mesh = textured_box(
             size, TEXTURE_EXTENTS[appearance.table.pattern], table_texture(appearance)
         )
-        instance = GeometryInstance(X_TB, mesh, "table_texture")
-        instance.set_perception_properties(_unlabelled_properties())
+        instance = _unlabelled_geometry(X_TB, mesh, "table_texture")
         frame = built.plant.GetBodyFrameIdOrThrow(table.index())
         built.scene_graph.RegisterGeometry(built.plant.get_source_id(), frame, instance)
     _hide_from_cameras(built, table)
@@ -183,8 +183,7 @@ def _add_distractors(built: StationDiagram, appearance: Appearance) -> None:
     for k, one in enumerate(appearance.distractors):
         mesh = Mesh(str(library.path(library.entry(one.object).mesh)))
         X_WO = RigidTransform(X_WS @ one.X_SO.matrix())
-        instance = GeometryInstance(X_WO, mesh, f"distractor_{k}")
-        instance.set_perception_properties(_unlabelled_properties())
+        instance = _unlabelled_geometry(X_WO, mesh, f"distractor_{k}")
         built.scene_graph.RegisterAnchoredGeometry(built.plant.get_source_id(), instance)
 
 
@@ -194,10 +193,8 @@ def _add_shadow_speck(built: StationDiagram) -> None:
     speck_size = 5e-4  # Metres, less than a pixel.
     x, y = built.scene.board.size
     X_WQ = built.station.document.X_WS.matrix() @ make_pose(p_AB=(x / 2, y / 2, speck_height))
-    instance = GeometryInstance(
-        RigidTransform(X_WQ), Box(speck_size, speck_size, speck_size), "headroom"
-    )
-    instance.set_perception_properties(_unlabelled_properties())
+    speck = Box(speck_size, speck_size, speck_size)
+    instance = _unlabelled_geometry(RigidTransform(X_WQ), speck, "headroom")
     built.scene_graph.RegisterAnchoredGeometry(built.plant.get_source_id(), instance)
 
 
@@ -210,10 +207,13 @@ def _hide_from_cameras(built: StationDiagram, body: RigidBody) -> None:
             built.scene_graph.RemoveRole(source, geometry, Role.kPerception)
 
 
-def _unlabelled_properties() -> PerceptionProperties:
+def _unlabelled_geometry(X_FG: RigidTransform, shape: Shape, name: str) -> GeometryInstance:
+    """What cameras see, and no label tells of."""
     properties = PerceptionProperties()
     properties.AddProperty("label", "id", RenderLabel.kDontCare)
-    return properties
+    instance = GeometryInstance(X_FG, shape, name)
+    instance.set_perception_properties(properties)
+    return instance
 
 
 def textured_box(size: Array, extent: float, png: bytes) -> Mesh:

@@ -23,8 +23,8 @@ from burg_drake.dataset.export_common import (
     group_by_scene,
     new_folder,
     object_index,
-    require_images,
     require_pinhole,
+    required_image,
 )
 from burg_drake.dataset.model_files import find_symmetries, uncolored_model, visual_model, write_ply
 from burg_drake.dataset.sample import Box, InstanceLabel, Sample
@@ -107,10 +107,9 @@ class _Scene:
 
     def add(self, sample: Sample, depth: NDArray[np.float32]) -> None:
         """Writes the images of a view."""
-        require_images(sample, "BOP", "color", "labels")
         require_pinhole(sample, "BOP")
-        color, labels = sample.images.color, sample.images.labels
-        assert color is not None and labels is not None
+        color = required_image(sample, "BOP", "color")
+        labels = required_image(sample, "BOP", "labels")
         view, name = str(sample.number), f"{sample.number:06d}"
         numbers = depth_in_units(depth, self._unit, sample.key)
         self._write("rgb", f"{name}{self._suffix}", encode_color_image(color, self._suffix))

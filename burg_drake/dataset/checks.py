@@ -363,26 +363,15 @@ def _sample_faults(
             yield RECORD_KIND, f"files has {kind!r}, which no sample has"
             continue
         try:
-            part = shard.sample(record, [kind])
+            sample = shard.sample(replace(record, sample=sample), [kind])
         except InvalidInputError as error:
             yield kind, _message_without_place(error, shard, key, kind)
-        else:
-            sample = _replace_part(sample, part, kind)
     yield from _sample_contradictions(sample, record, document)
     if scene is not None and redraw is not None:
         try:
             yield from drawing_faults(sample, redraw(scene, sample), record.depth_unit)
         except BurgError as error:
             yield RECORD_KIND, f"it cannot be rendered again: {error}"
-
-
-def _replace_part(sample: Sample, part: Sample, kind: str) -> Sample:
-    """A sample with that which another one was read with."""
-    # Kinds of files that are fields of a sample; all others belong to its images.
-    sample_fields = ("sensor_depth", "grasps")
-    if kind in sample_fields:
-        return replace(sample, **{kind: getattr(part, kind)})
-    return replace(sample, images=replace(sample.images, **{kind: getattr(part.images, kind)}))
 
 
 def _sample_contradictions(

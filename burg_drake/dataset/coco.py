@@ -6,12 +6,15 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from burg_drake.dataset.export_common import (
     Samples,
     encode_color_image,
     new_folder,
     object_index,
-    require_images,
+    required_image,
 )
 from burg_drake.dataset.sample import Sample
 from burg_drake.dataset.sample_encoding import encode_mask
@@ -43,15 +46,15 @@ def write_coco(
     with new_folder(folder) as fresh:
         (fresh / "images").mkdir()
         for number, sample in enumerate(samples, start=1):
-            require_images(sample, "COCO", "color", "labels")
-            assert sample.images.color is not None
+            color = required_image(sample, "COCO", "color")
+            labels = required_image(sample, "COCO", "labels")
             file = f"{sample.key}.{images}"
-            data = encode_color_image(sample.images.color, f".{images}")
+            data = encode_color_image(color, f".{images}")
             (fresh / "images" / file).write_bytes(data)
-            height, width = sample.images.color.shape[:2]
+            height, width = color.shape[:2]
             size = {"width": width, "height": height}
             listed.append({"id": number, "file_name": file, **size, "scene": sample.scene})
-            for annotation in _instance_annotations(samples.objects, sample):
+            for annotation in _instance_annotations(samples.objects, sample, labels):
                 identity = {"id": len(annotations) + 1, "image_id": number}
                 annotations.append({**identity, **annotation})
         content = {
@@ -68,10 +71,10 @@ def write_coco(
     return ("COCO has instances in colour images alone: no depth, poses, cameras or grasps.",)
 
 
-def _instance_annotations(objects: tuple[str, ...], sample: Sample) -> list[dict[str, Any]]:
+def _instance_annotations(
+    objects: tuple[str, ...], sample: Sample, labels: NDArray[np.uint16]
+) -> list[dict[str, Any]]:
     """Instances that are visible, without ids."""
-    labels = sample.images.labels
-    assert labels is not None
     found = []
     for label in sample.instances:
         mask = labels == label.number

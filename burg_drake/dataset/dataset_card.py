@@ -11,7 +11,6 @@ import numpy as np
 
 from burg_drake.core import (
     Array,
-    Indices,
     InvalidInputError,
     UnknownNameError,
     atomic_write_all,
@@ -22,7 +21,7 @@ from burg_drake.dataset.export_common import Samples
 from burg_drake.dataset.reader import Dataset
 from burg_drake.dataset.sample import Sample
 from burg_drake.dataset.sample_sheet import evenly_spaced_indices, sheet_png
-from burg_drake.visualization import Child, element
+from burg_drake.visualization import bars_of_counts_file, histogram_file
 
 
 @dataclass(eq=False)
@@ -98,122 +97,6 @@ def count_dataset(samples: Samples) -> DatasetCounts:
 def camera_elevation(X_SC: Array) -> float:
     """By how much the optical axis of a camera points down [rad]: pi / 2 from straight above."""
     return float(np.arcsin(np.clip(-X_SC[2, 2], -1.0, 1.0)))
-
-
-CHART_TEXT_COLOR = "#5b656e"  # Colour of the axis and its labels.
-
-
-def histogram(
-    values: Sequence[float], title: str, unit: str, *, limits: tuple[float, float] | None = None
-) -> str:
-    """How values are distributed.
-
-    Args:
-        values: in the unit to show.
-        title: above the bars.
-        unit: below them.
-        limits: of the axis; those of the values if None.
-
-    Returns:
-        An SVG document.
-    """
-    data = np.asarray(values, dtype=float)
-    edges = _bin_edges(data, limits)
-    counts = np.histogram(data, edges)[0]
-    labels = _axis_ticks(float(edges[0]), float(edges[-1]))
-    places = [(x - edges[0]) / (edges[-1] - edges[0]) for x in labels]
-    return _bar_chart(counts, title, unit, list(zip(places, labels, strict=True)))
-
-
-def bars_of_counts(values: Sequence[int], title: str, unit: str) -> str:
-    """How often each whole number occurs: a bar for each from 0 to the largest.
-
-    Returns:
-        An SVG document.
-    """
-    counts = np.bincount(np.asarray(values, dtype=int), minlength=2)
-    step = 1 + (len(counts) - 1) // 12
-    ticks = [((k + 0.5) / len(counts), float(k)) for k in range(0, len(counts), step)]
-    return _bar_chart(counts, title, unit, ticks)
-
-
-def _bin_edges(data: Array, limits: tuple[float, float] | None) -> Array:
-    lower, upper = limits or (0.0, 1.0)
-    if limits is None and data.size:
-        lower, upper = float(data.min()), float(data.max())
-    if upper - lower < 1e-9:
-        lower, upper = lower - 0.5, upper + 0.5
-    return np.linspace(lower, upper, 20 + 1)
-
-
-def _axis_ticks(lower: float, upper: float, most: int = 6) -> list[float]:
-    """Round numbers between two limits."""
-    axis_steps = (1.0, 2.0, 2.5, 5.0, 10.0)  # Steps of an axis, times powers of ten.
-    power = 10.0 ** np.floor(np.log10((upper - lower) / most))
-    step = next(n * power for n in axis_steps if (upper - lower) / (n * power) <= most)
-    first, last = int(np.ceil(lower / step - 1e-9)), int(np.floor(upper / step + 1e-9))
-    return [float(k * step) for k in range(first, last + 1)]
-
-
-def _bar_chart(counts: Indices, title: str, unit: str, ticks: list[tuple[float, float]]) -> str:
-    """Bars, with ticks at shares of the axis."""
-    width = 360  # Pixels.
-    height = 200  # Pixels.
-    left = 46  # Pixels between the bars and the left edge.
-    right = 14  # Pixels between the bars and the right edge.
-    top = 30  # Pixels above the bars.
-    bottom = 40  # Pixels below the bars.
-    inner, tall = width - left - right, height - top - bottom
-    most = max(1, int(counts.max(initial=0)))
-    parts: list[Child] = [element("rect", width=width, height=height, fill="#ffffff")]
-    parts.append(_chart_text(left, 18, title, size=13, color="#1d2328", weight="bold"))
-    for k, count in enumerate(counts.tolist()):
-        high = tall * count / most
-        x = left + inner * k / len(counts)
-        box = {"x": round(x + 0.5, 2), "y": round(top + tall - high, 2)}
-        size = {"width": round(inner / len(counts) - 1.0, 2), "height": round(high, 2)}
-        parts.append(element("rect", **box, **size, fill="#31688e"))
-    base = top + tall
-    ends = {"x1": left, "x2": left + inner, "y1": base, "y2": base}
-    parts.append(element("line", **ends, stroke=CHART_TEXT_COLOR))
-    for share, value in ticks:
-        parts.append(_chart_text(left + inner * share, base + 15, f"{value:g}", anchor="middle"))
-    parts.append(_chart_text(left + inner / 2, height - 8, unit, anchor="middle"))
-    parts.append(_chart_text(left - 6, top + 8, f"{most:,}", anchor="end"))
-    parts.append(_chart_text(left - 6, base, "0", anchor="end"))
-    return str(
-        element(
-            "svg",
-            *parts,
-            xmlns="http://www.w3.org/2000/svg",
-            width=width,
-            height=height,
-            viewBox=f"0 0 {width} {height}",
-            font_family="system-ui, sans-serif",
-        )
-    )
-
-
-def _chart_text(
-    x: float,
-    y: float,
-    text: str,
-    *,
-    size: int = 11,
-    color: str = CHART_TEXT_COLOR,
-    anchor: str = "start",
-    weight: str | None = None,
-) -> Child:
-    return element(
-        "text",
-        text,
-        x=round(x, 2),
-        y=round(y, 2),
-        fill=color,
-        font_size=size,
-        font_weight=weight,
-        text_anchor=anchor,
-    )
 
 
 CARD_FILE = "README.md"  # File name of the card in the folder of a data set.
@@ -299,16 +182,16 @@ def _chart_files(counted: DatasetCounts) -> dict[str, str]:
     degrees = np.rad2deg(counted.elevations).tolist()
     percent = [100.0 * share for share in counted.visibilities]
     return {
-        "distance.svg": histogram(
+        "distance.svg": histogram_file(
             counted.distances, "Distance of visible objects", "from the camera [m]"
         ),
-        "elevation.svg": histogram(
+        "elevation.svg": histogram_file(
             degrees, "Elevation of views", "by which the camera looks down [°]"
         ),
-        "visibility.svg": histogram(
+        "visibility.svg": histogram_file(
             percent, "Visibility of objects", "share of the silhouette [%]", limits=(0.0, 100.0)
         ),
-        "objects.svg": bars_of_counts(counted.objects, "Objects in images", "visible objects"),
+        "objects.svg": bars_of_counts_file(counted.objects, "Objects in images", "visible objects"),
     }
 
 

@@ -38,7 +38,6 @@ from burg_drake.dataset.recipe import (
 from burg_drake.dataset.sample import Images, Sample
 from burg_drake.dataset.scene_grasps import grasps_of_run
 from burg_drake.dataset.scene_samples import (
-    DatasetInputs,
     SampleTask,
     SceneSamples,
     SceneWork,
@@ -123,7 +122,7 @@ def _make_on_cluster(
     if not able:
         return
     world = make_bundle(catalogue_scene(library, scenes.values()), station, looks=True)
-    run = open_results(run_folder(recipe, able[0].inputs.folder)) if recipe.run else None
+    run = open_results(run_folder(recipe, able[0].folder)) if recipe.run else None
     version = running_blender().version if recipe.colors and recipe.renderer == "blender" else ""
     sent = replace(recipe, given=(), run="")
 
@@ -131,7 +130,7 @@ def _make_on_cluster(
         scene, grasps = scenes.get(one.number), None
         if scene is not None and run is not None:
             grasps = grasps_of_run(run, scene)
-        document, path = (scene.document, scene.path) if scene else (None, one.inputs.folder)
+        document, path = (scene.document, scene.path) if scene else (None, one.folder)
         return SampleTask(
             replace(world, data=b""), sent, one.number, document, path, grasps, version
         )
@@ -141,7 +140,7 @@ def _make_on_cluster(
             if isinstance(made, BaseException):
                 yield one, made
                 continue
-            folder = one.inputs.folder
+            folder = one.folder
             scene = Scene(made.document, library, folder)
             try:
                 entry = write_made_scene(folder, one.number, scene, made.shard, made.entry)
@@ -245,11 +244,13 @@ def generate_dataset(
         DatasetWriter(folder, document) as writer,
     ):
         root = library.root if recipe.sampled is not None else None
-        inputs = DatasetInputs(recipe, writer.folder, station.path, root)
         writer.discard_damaged()
         missing = writer.missing(range(len(paths)))
         failed: dict[int, str] = {}
-        work = [SceneWork(inputs, number, paths[number]) for number in missing]
+        work = [
+            SceneWork(number, paths[number], recipe, writer.folder, station.path, root)
+            for number in missing
+        ]
         with closing(make(work)) as made:
             for one, outcome in made:
                 if isinstance(outcome, BurgError) and "folder" in outcome.arguments:

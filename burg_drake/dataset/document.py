@@ -4,29 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from burg_drake.core import (
     DocumentError,
     InvalidInputError,
     Limits,
-    Reader,
     atomic_write,
+    load_document,
     load_json,
-    load_yaml_node,
     plain_data,
     quote_value,
     require_name,
     save_document,
 )
-from burg_drake.dataset.sample_files import PlainFields
-from burg_drake.dataset.shards import SHARD_FOLDER, ShardEntry, shard_entry
+from burg_drake.dataset.shards import (
+    SHARD_FOLDER,
+    SHARD_URL,
+    ShardEntry,
+    shard_entry,
+    shard_name,
+)
 
 DATASET_FILE = "dataset.yaml"  # File name of the document.
 RECIPE_KEY = "recipe"  # Key of the recipe in the document.
@@ -88,22 +89,7 @@ def load_dataset_document(path: str | Path) -> DatasetDocument:
         DocumentError: it is missing, of another version, or a key or value does not fit; the
             message names file, line and key.
     """
-    root = load_yaml_node(path)
-    reader = Reader(str(path))
-    if not isinstance(root, yaml.MappingNode):
-        raise reader.fail(root, "", "expected the keys of a data set ('key: value' lines)")
-    reader.check_version(root, DatasetDocument)
-    recipe = [node for key, node in root.value if key.value == RECIPE_KEY]
-    root.value = [(key, node) for key, node in root.value if key.value != RECIPE_KEY]
-    if len(recipe) > 1:
-        raise reader.fail(recipe[1], "", f"key {quote_value(RECIPE_KEY)} is given twice")
-    document: DatasetDocument = reader.read(root, DatasetDocument, "")
-    if not recipe:
-        return document
-    plain = _plain_node(recipe[0], reader, RECIPE_KEY)
-    if not isinstance(plain, dict | None):
-        raise reader.fail(recipe[0], RECIPE_KEY, "expected keys with values ('key: value' lines)")
-    return dataclasses.replace(document, recipe=plain)
+    return load_document(path, DatasetDocument)
 
 
 def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
@@ -142,34 +128,15 @@ def _format_value(value: Any) -> str:
     return "none" if value is None or value == "" else quote_value(value).strip("'")
 
 
-def _plain_node(node: yaml.Node, reader: Reader, where: str) -> Any:
-    """A node of any structure as dicts, lists and scalars."""
-    if isinstance(node, yaml.MappingNode):
-        return {
-            name: _plain_node(value, reader, f"{where}.{name}")
-            for name, (_, value) in reader.entries(node, where).items()
-        }
-    if isinstance(node, yaml.SequenceNode):
-        return [_plain_node(item, reader, f"{where}[{i}]") for i, item in enumerate(node.value)]
-    kind = node.tag.rpartition(":")[2]
-    if kind == "null":
-        return None
-    kinds: dict[str, type] = {"bool": bool, "int": int, "float": float}
-    return reader.read(node, kinds.get(kind, str), where)
-
-
 SHARD_INDEX_FILE = "index.json"  # File name of the index.
 WIDS_VERSION = 1  # Version of the index format of WebDataset.
-SHARD_NAME = re.compile(r"(\d{6,12})\.tar", re.ASCII)
-"""Pattern of the file names of shards."""
 
 
 def shard_numbers(folder: Path) -> list[int]:
     """Scenes whose shards lie in a data set, in their order."""
     shards = folder / SHARD_FOLDER
-    names = [path.name for path in shards.iterdir()] if shards.is_dir() else []
-    matches = filter(None, map(SHARD_NAME.fullmatch, names))
-    return sorted(int(match[1]) for match in matches)
+    urls = [f"{SHARD_FOLDER}/{path.name}" for path in shards.iterdir()] if shards.is_dir() else []
+    return sorted({_scene_number(url) for url in urls if SHARD_URL.fullmatch(url)})
 
 
 def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = None) -> None:
@@ -185,11 +152,9 @@ def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = Non
     """
     folder, known = Path(folder), known or {}
     document = load_dataset_document(folder / DATASET_FILE)
-    urls = {f"{SHARD_FOLDER}/{number:06d}.tar" for number in shard_numbers(folder)}
-    entries = [
-        known[url] if url in known else shard_entry(folder / url)
-        for url in sorted(urls, key=_scene_number)
-    ]
+    entries = []
+    for url in map(shard_name, shard_numbers(folder)):
+        entries.append(known[url] if url in known else shard_entry(folder / url))
     values = {
         "wids_version": WIDS_VERSION,
         "name": document.name,
@@ -206,7 +171,6 @@ def read_index(folder: Path) -> list[ShardEntry]:
         InvalidInputError: it is missing.
     """
     limits = Limits(size=256 << 20, values=10_000_000)  # a shard takes 150 bytes and 6 values
-    entry_keys = ("url", "nsamples", "filesize", "md5sum")
     path = folder / SHARD_INDEX_FILE
     if not path.exists():
         raise InvalidInputError(
@@ -214,25 +178,18 @@ def read_index(folder: Path) -> list[ShardEntry]:
             " that makes it again, or call burg_drake.dataset.write_index on the folder to use the"
             " samples that are there"
         )
-    fields = PlainFields(load_json(path, limits), ("wids_version", "name", "shardlist"), str(path))
-    fields.integer("wids_version", WIDS_VERSION, WIDS_VERSION)
-    entries = [
-        ShardEntry(
-            line.text("url"),
-            line.integer("nsamples"),
-            line.integer("filesize"),
-            line.text("md5sum"),
+    values = load_json(path, limits)
+    version = values.get("wids_version") if isinstance(values, dict) else None
+    if version != WIDS_VERSION:
+        raise DocumentError(
+            f"{path}: wids_version is {quote_value(version)}; this release reads version"
+            f" {WIDS_VERSION}"
         )
-        for line in fields.nested_list("shardlist", entry_keys)
-    ]
+    try:
+        entries = [ShardEntry(**line) for line in values["shardlist"]]
+    except (InvalidInputError, KeyError, TypeError) as error:
+        raise DocumentError(f"{path}: shardlist: {error}") from error
     urls = [entry.url for entry in entries]
-    for url in urls:
-        place, _, name = url.rpartition("/")
-        if place != SHARD_FOLDER or not SHARD_NAME.fullmatch(name):
-            raise DocumentError(
-                f"{path}: shardlist: url is {url!r}; expected a value such as"
-                f" {SHARD_FOLDER}/000012.tar"
-            )
     if urls != sorted(set(urls), key=_scene_number):
         raise DocumentError(f"{path}: shardlist: shards are repeated or not in ascending order")
     return entries

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -66,23 +66,24 @@ def group_by_scene(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sa
         yield number, views
 
 
-def require_images(sample: Sample, format: str, *names: str) -> None:
-    """Refuses a sample without images that a format is made of.
+def required_image(sample: Sample, format: str, name: str) -> NDArray[Any]:
+    """An image of a sample that a format is made of.
 
     Args:
         sample: of the data set.
         format: its name, for the message.
-        names: of attributes of `Images`.
+        name: of an attribute of `Images`.
 
     Raises:
-        InvalidInputError: one of them is missing.
+        InvalidInputError: it is missing.
     """
-    for name in names:
-        if getattr(sample.images, name) is None:
-            raise InvalidInputError(
-                f"sample {sample.key} has no {name} image, which {format} needs; generate a data"
-                f" set with {name}"
-            )
+    image = getattr(sample.images, name)
+    if image is None:
+        raise InvalidInputError(
+            f"sample {sample.key} has no {name} image, which {format} needs; generate a data"
+            f" set with {name}"
+        )
+    return np.asarray(image)
 
 
 def require_pinhole(sample: Sample, format: str) -> None:
@@ -110,14 +111,13 @@ def exported_depth(sample: Sample, format: str, *, sensor: bool) -> Single:
         InvalidInputError: there is none.
     """
     if not sensor:
-        require_images(sample, format, "depth")
-    depth = sample.sensor_depth if sensor else sample.images.depth
-    if depth is None:
+        return required_image(sample, format, "depth")
+    if sample.sensor_depth is None:
         raise InvalidInputError(
             f"sample {sample.key} has no depth of a simulated sensor; write the exact depth, or"
             " generate the data set with a sensor"
         )
-    return depth
+    return sample.sensor_depth
 
 
 def describe_lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str]:

@@ -20,7 +20,7 @@ from burg_drake.core import (
     quaternion_from_rotation,
     swap_fingers,
 )
-from burg_drake.dataset.point_clouds import field_of_view
+from burg_drake.dataset.camera_rays import camera_rays
 from burg_drake.dataset.sample import LabelledGrasps
 from burg_drake.dataset.tsdf import VGN_VOLUME_SIZE, VGN_VOXELS, voxel_size_and_truncation
 
@@ -123,7 +123,7 @@ def _are_in_view(X_CG: Array, intrinsics: Intrinsics, most_angle: float) -> Bool
     p = X_CG[:, :3, 3]
     chosen: Booleans = (X_CG[:, 2, 2] >= np.cos(most_angle)) & (p[:, 2] >= NEAR_DISTANCE)
     if not intrinsics.is_pinhole:  # far outside, a lens model leads back into the image
-        chosen &= field_of_view(intrinsics).sees(p)
+        chosen &= camera_rays(intrinsics).sees(p)
     pixel = intrinsics.project(p[chosen])
     size = np.array((intrinsics.width, intrinsics.height))
     chosen[chosen] = ((pixel >= -0.5) & (pixel < size - 0.5)).all(axis=1)

@@ -28,8 +28,8 @@ from burg_drake.dataset.export_common import (
     group_by_scene,
     new_folder,
     object_index,
-    require_images,
     require_pinhole,
+    required_image,
 )
 from burg_drake.dataset.grasp_labels import grasp_rectangles
 from burg_drake.dataset.model_files import visual_model, write_ply
@@ -151,8 +151,9 @@ class _Camera:
 
     def add(self, sample: Sample, depth: NDArray[np.float32]) -> None:
         """Writes all of a view."""
-        require_images(sample, "GraspNet", "color", "labels")
         require_pinhole(sample, "GraspNet")
+        color = required_image(sample, "GraspNet", "color")
+        labels = required_image(sample, "GraspNet", "labels")
         K = sample.view.intrinsics.K
         if self._K is not None and not np.array_equal(K, self._K):
             raise InvalidInputError(
@@ -160,15 +161,14 @@ class _Camera:
                 " has one camera matrix for all views of a camera; write a folder for each camera"
                 " of the scene (camera=None), or generate views with the same intrinsics"
             )
-        self._K, ids = K, self._object_ids(sample)
-        self._ids = ids
+        self._K, self._ids = K, self._object_ids(sample)
+        ids = self._ids
         name = f"{len(self._X_SC):04d}"
         self._X_SC.append(sample.view.X_SC)
-        assert sample.images.color is not None and sample.images.labels is not None
-        self._write("rgb", f"{name}.png", encode_png(sample.images.color))
+        self._write("rgb", f"{name}.png", encode_png(color))
         numbers = depth_in_units(depth, GRASPNET_DEPTH_UNIT, sample.key)
         self._write("depth", f"{name}.png", encode_png(numbers))
-        self._write("label", f"{name}.png", encode_png(self._labels(sample, ids)))
+        self._write("label", f"{name}.png", encode_png(self._object_labels(sample, labels, ids)))
         self._write("meta", f"{name}.mat", _meta_mat_file(sample, ids))
         self._write("annotations", f"{name}.xml", _pose_annotations(sample, ids))
         if sample.grasps is not None:
@@ -195,10 +195,10 @@ class _Camera:
                 )
         return ids
 
-    def _labels(self, sample: Sample, ids: list[int]) -> NDArray[Any]:
+    def _object_labels(
+        self, sample: Sample, labels: NDArray[np.uint16], ids: list[int]
+    ) -> NDArray[Any]:
         """(H, W) object ids from 1; 0 for all else."""
-        labels = sample.images.labels
-        assert labels is not None
         shown = np.zeros(int(labels.max(initial=0)) + 1, dtype=np.uint16)
         for label, number in zip(sample.instances, ids, strict=True):
             if label.number < len(shown):

@@ -6,18 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Bytes, InvalidInputError, Single
+from burg_drake.core import Bytes, InvalidInputError, Single, linear_to_srgb, srgb_to_linear
 from burg_drake.dataset.appearance import Appearance
-from burg_drake.visualization import linear_light
 
 LINEAR_LEVELS = 1 << 14
 """Levels of linear light in the encoding table; the first sRGB steps span 5 of them."""
-
-
-def srgb_from_linear(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """sRGB values of linear light, both from 0 to 1."""
-    low = values <= 0.0031308
-    return np.where(low, values * 12.92, 1.055 * np.maximum(values, 0.0) ** (1 / 2.4) - 0.055)
 
 
 def apply_photometry(
@@ -46,7 +39,7 @@ def apply_photometry(
             are gains for.
     """
     read_noise = 3.0  # Electrons; standard deviation of an unlit pixel of a usual CMOS sensor.
-    light = _LINEAR_OF_SRGB[color]
+    light = srgb_to_linear(color)
     if appearance.object_gains:
         light *= _pixel_gains(labels, color.shape[:2], appearance)
     made = appearance.photometry
@@ -81,8 +74,4 @@ def _pixel_gains(
 def _srgb_encoding_table(gamma: float) -> Bytes:
     """(LINEAR_LEVELS,) sRGB of linear light."""
     light = np.linspace(0.0, 1.0, LINEAR_LEVELS) ** (1.0 / gamma)
-    return np.asarray(srgb_from_linear(light) * 255.0 + 0.5, dtype=np.uint8)
-
-
-_LINEAR_OF_SRGB: Single = linear_light(np.arange(256) / 255.0).astype(np.float32)
-"""Linear light of each of the 256 values of a channel."""
+    return linear_to_srgb(light)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.cameras import FieldOfView, Intrinsics
+from burg_drake.cameras import Intrinsics
 from burg_drake.core import Array, Bytes, InvalidInputError, Single, transform_points
+from burg_drake.dataset.camera_rays import camera_rays
 from burg_drake.dataset.sample import instance_numbers
 from burg_drake.scene import SceneLike, as_scene
 
@@ -75,7 +75,7 @@ def depth_cloud(
         if image is not None:
             require_image(image, intrinsics, f"the {name} image")
     there = np.flatnonzero((metres > 0.0) & (metres < np.inf))
-    points = _ray_directions(intrinsics).reshape(-1, 3)[there] * metres.reshape(-1, 1)[there]
+    points = camera_rays(intrinsics).single.reshape(-1, 3)[there] * metres.reshape(-1, 1)[there]
     return DepthCloud(
         points,
         None if color is None else np.asarray(color).reshape(-1, 3)[there],
@@ -153,15 +153,3 @@ def require_image(image: ArrayLike, intrinsics: Intrinsics, name: str) -> None:
     if len(shape) < 2:
         raise InvalidInputError(f"{name} has shape {shape}; expected (H, W, ...)")
     intrinsics.require_size(shape[1], shape[0], name)
-
-
-@lru_cache(maxsize=4)
-def field_of_view(intrinsics: Intrinsics) -> FieldOfView:
-    """The field of view of a camera, kept for its next image."""
-    return FieldOfView(intrinsics)
-
-
-@lru_cache(maxsize=4)
-def _ray_directions(intrinsics: Intrinsics) -> Single:
-    """(H, W, 3) where the pixels' centres look, at z = 1."""
-    return field_of_view(intrinsics).directions.astype(np.float32)

@@ -4,38 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras import NEAR_DISTANCE, FieldOfView, Intrinsics
+from burg_drake.cameras import NEAR_DISTANCE, Intrinsics
 from burg_drake.core import Array, Indices, Single, inverse, transform_points
-from burg_drake.dataset.sample import SURROUNDINGS_LABEL, Images
+from burg_drake.dataset.camera_rays import PixelBox, camera_rays
+from burg_drake.dataset.sample import SURROUNDINGS_LABEL, Images, box_of_mask
 from burg_drake.dataset.views import View
 from burg_drake.geometry import RayCaster
-
-PixelBox = tuple[int, int, int, int]
-"""A rectangle: left, top, right, bottom, the last two not within; it may leave the image."""
-
-
-def normalized_coordinates(intrinsics: Intrinsics) -> tuple[Single, Single]:
-    """x / z and y / z of the rays through the pixels' centres: (1, W) and (H, 1) of a camera
-    without distortion, else (H, W) each."""
-    return _ray_grid(intrinsics).flat
-
-
-def unit_directions(intrinsics: Intrinsics, pixels: PixelBox) -> Single:
-    """(N, 3) unit vectors through the pixels of a rectangle, row by row; it may leave the image of
-    a camera without distortion."""
-    left, top, right, bottom = pixels
-    if not intrinsics.is_pinhole:
-        unit = _ray_grid(intrinsics).unit[top:bottom, left:right]
-        return np.ascontiguousarray(unit).reshape(-1, 3)
-    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
-    x = (np.arange(left, right, dtype=float) - cx) / fx
-    y = (np.arange(top, bottom, dtype=float) - cy) / fy
-    return _unit_vectors(x, y[:, None]).reshape(-1, 3)
 
 
 def pixels_around(
@@ -61,7 +40,7 @@ def pixels_around(
     flat = p_CQ[:, :2] / p_CQ[:, 2:]
     lower, upper = flat.min(axis=0), flat.max(axis=0)
     if not intrinsics.is_pinhole:
-        return _ray_grid(intrinsics).pixel_box(lower, upper)
+        return camera_rays(intrinsics).pixel_box(lower, upper)
     size = np.array([intrinsics.width, intrinsics.height])
     reach = size if beyond else 0
     low = np.maximum(-reach, np.floor(lower * intrinsics.focal + intrinsics.center))
@@ -77,42 +56,6 @@ def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Arra
     a, b = p_CQ[edges[before[edges[:, 0]] != before[edges[:, 1]]].T]
     share = (NEAR_DISTANCE - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
     return np.asarray(np.concatenate([p_CQ[before], a + share * (b - a)]))
-
-
-def _unit_vectors(x: Array, y: Array) -> Single:
-    """(H, W, 3) unit vectors along (x, y, 1)."""
-    length = np.sqrt(x * x + y * y + 1.0)
-    unit = np.empty((*length.shape, 3), np.float32)
-    np.divide(x, length, out=unit[..., 0], casting="same_kind")
-    np.divide(y, length, out=unit[..., 1], casting="same_kind")
-    np.divide(1.0, length, out=unit[..., 2], casting="same_kind")
-    return unit
-
-
-class _RayGrid:
-    """The rays of a camera's pixels; those of lenses with distortion cost much to find."""
-
-    def __init__(self, intrinsics: Intrinsics) -> None:
-        flat = FieldOfView(intrinsics).directions[..., :2]
-        x, y = flat[..., 0], flat[..., 1]
-        if intrinsics.is_pinhole:
-            x, y = x[:1], y[:, :1]
-        self.flat = x.astype(np.float32), y.astype(np.float32)
-        self.unit = _unit_vectors(x, y)
-
-    def pixel_box(self, lower: Array, upper: Array) -> PixelBox | None:
-        """The pixels that look between bounds of x / z and y / z."""
-        x, y = self.flat
-        inside = (x >= lower[0]) & (x <= upper[0]) & (y >= lower[1]) & (y <= upper[1])
-        rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-        if not len(rows):
-            return None
-        return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-
-
-@lru_cache(maxsize=8)
-def _ray_grid(intrinsics: Intrinsics) -> _RayGrid:
-    return _RayGrid(intrinsics)
 
 
 BOX_NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
@@ -197,7 +140,7 @@ class RayBox:
     def _planes(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
         """The number of each plane, and (H, W) 1 / z of where rays meet it, below 0 behind the
         camera."""
-        x, y = normalized_coordinates(intrinsics)
+        x, y = camera_rays(intrinsics).slopes
         planes = BOX_NORMALS @ X_CB[:3, :3].T / self._distances(X_CB)[:, None]
         for number, (a, b, c) in enumerate(planes.astype(np.float32)):
             yield number, (a * x + c) + b * y
@@ -258,7 +201,7 @@ class RaySurface:
         pixels = pixels_around(p_CQ, self._faces, intrinsics, beyond=beyond)
         if pixels is None:
             return None
-        unit = unit_directions(intrinsics, pixels)
+        unit = camera_rays(intrinsics).unit_in(pixels)
         R_BC = X_CB[:3, :3].T
         face, distance = self._rays.seen_from(-R_BC @ X_CB[:3, 3], _rotate_vectors(unit, R_BC))
         distance *= unit[:, 2]
@@ -382,12 +325,12 @@ class RayScene:
         """As `SceneRenderer.silhouette`."""
         met = self._cast_whole_surface(number, view)
         mask = np.zeros((0, 0), bool) if met is None else met.face != NO_FACE
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if met is None or not len(rows):
+        box = box_of_mask(mask)
+        if met is None or box is None:
             return Silhouette(0, 0, np.zeros((0, 0), bool))
-        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        left, top, _, _ = met.pixels
-        return Silhouette(left + int(columns[0]), top + int(rows[0]), cut)
+        left, top, width, height = box
+        cut = mask[top : top + height, left : left + width]
+        return Silhouette(met.pixels[0] + left, met.pixels[1] + top, cut)
 
     def _render_boxes(
         self, view: View, normals: bool

@@ -284,6 +284,7 @@ class ReadableSamples:
 
     Attributes:
         dataset: where they are.
+        name, objects: of the data set.
         damaged: how many samples were left out so far, by what is wrong with them: shard, file, and
             what mends it. All samples of a shard that cannot be opened count as one line.
     """
@@ -291,16 +292,7 @@ class ReadableSamples:
     def __init__(self, dataset: Dataset) -> None:
         self.dataset = dataset
         self.damaged: dict[str, int] = {}
-
-    @property
-    def name(self) -> str:
-        """Of the data set."""
-        return self.dataset.name
-
-    @property
-    def objects(self) -> tuple[str, ...]:
-        """Names of the library's objects, in the order of their ids."""
-        return self.dataset.objects
+        self.name, self.objects = dataset.name, dataset.objects
 
     @property
     def library(self) -> ObjectLibrary:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,9 +17,9 @@ from burg_drake.core import (
     Ranges,
     builtin_names,
     content_hash,
-    parse_document,
     plain_data,
     portable_reference,
+    read_plain_data,
     require_ranges,
     resolve_reference,
     setting,
@@ -133,7 +132,7 @@ def read_recipe(data: Mapping[str, Any], name: str = "recipe") -> DatasetRecipe:
     Raises:
         DocumentError: it does not fit; the message names the key.
     """
-    return parse_document(json.dumps(data), DatasetRecipe, name)
+    return read_plain_data(data, DatasetRecipe, name)
 
 
 CONTENT_DIGITS = 16  # Digits of the content hashes in `dataset.yaml`.

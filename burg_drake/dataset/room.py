@@ -12,10 +12,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from burg_drake.cameras import FieldOfView, Intrinsics
-from burg_drake.core import Array, Booleans, Bytes, Single, rng_from
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, Booleans, Bytes, Single, linear_to_srgb, rng_from
 from burg_drake.dataset.appearance import Appearance
-from burg_drake.dataset.photometry import srgb_from_linear
+from burg_drake.dataset.camera_rays import camera_rays
 from burg_drake.dataset.textures import layered_noise
 from burg_drake.visualization import linear_light
 
@@ -276,7 +276,7 @@ def blend_over_background(
         part = share[mixed, None] / 255.0
         before = linear_light(found[mixed] / 255.0)
         light = part * before + (1.0 - part) * linear_light(behind / 255.0)
-        found[mixed] = srgb_from_linear(light) * 255.0 + 0.5
+        found[mixed] = linear_to_srgb(light)
     return found
 
 
@@ -287,7 +287,7 @@ def _background_colors(
     behind = np.empty((*where.shape, 3), np.uint8)
     behind[:] = NO_APPEARANCE_COLOR if look is None else BACKGROUND_GREY
     if look is not None and look.room is not None:
-        d_W = _pixel_directions(intrinsics)[where] @ X_WC[:3, :3].T
+        d_W = camera_rays(intrinsics).unit[where] @ X_WC[:3, :3].T
         behind[where] = _sample_environment_map(environment_map(look.room), environment_pixels(d_W))
     return behind
 
@@ -321,10 +321,3 @@ def _sample_environment_map(room: Bytes, pixels: Array) -> Bytes:
         for k in range(0, at.shape[1], most)
     ]
     return np.asarray(np.concatenate(parts, axis=1)[0])
-
-
-@lru_cache(maxsize=4)
-def _pixel_directions(intrinsics: Intrinsics) -> Array:
-    """(H, W, 3) unit vectors in the camera's frame."""
-    along = FieldOfView(intrinsics).directions
-    return np.asarray(along / np.linalg.norm(along, axis=2, keepdims=True))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import Any, cast
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,11 +16,14 @@ from burg_drake.core import (
     Array,
     DocumentError,
     InvalidInputError,
+    Ranges,
     UnknownNameError,
     check_pose,
     parse_json,
     plain_data,
     quote_value,
+    read_plain_data,
+    require_ranges,
     suggest_names,
 )
 from burg_drake.dataset.sample import Box, Images, InstanceLabel, Sample
@@ -36,156 +38,8 @@ from burg_drake.dataset.sample_encoding import (
 )
 from burg_drake.dataset.views import View
 
-MAX_EXACT_INTEGER = 1 << 53
-"""Largest integer that every JSON reader represents exactly."""
-
-
-class PlainFields:
-    """The values of a JSON mapping.
-
-    Attributes:
-        where: it is, for messages.
-    """
-
-    def __init__(self, values: Any, names: Iterable[str], where: str) -> None:
-        """Takes a mapping that has exactly these names.
-
-        Raises:
-            DocumentError: it has not.
-        """
-        self.where = where
-        if not isinstance(values, dict):
-            raise DocumentError(f"{where}: {quote_value(values)} is not a mapping")
-        names = list(names)
-        for name in values:
-            if name not in names:
-                raise DocumentError(
-                    f"{where}: unknown key {quote_value(name)}; {suggest_names(name, names)}"
-                )
-        for name in names:
-            if name not in values:
-                raise DocumentError(f"{where}: key {name!r} is missing")
-        self._values = values
-
-    def nested(self, name: str, names: Iterable[str]) -> PlainFields:
-        """A mapping in this one."""
-        return PlainFields(self._values[name], names, f"{self.where}: {name}")
-
-    def nested_list(self, name: str, names: Iterable[str]) -> list[PlainFields]:
-        """The mappings of a list."""
-        names, where = list(names), f"{self.where}: {name}"
-        return [
-            PlainFields(item, names, f"{where}[{i}]") for i, item in enumerate(self._list(name))
-        ]
-
-    def text(self, name: str) -> str:
-        """A text."""
-        value = self._values[name]
-        if not isinstance(value, str) or "\0" in value:
-            raise self._unexpected(name, "a text")
-        return value
-
-    def texts(self, name: str) -> list[str]:
-        """A list of texts."""
-        values = self._list(name)
-        if not all(isinstance(value, str) for value in values):
-            raise self._unexpected(name, "a list of texts")
-        return values
-
-    def integer(self, name: str, low: int = 0, high: int = MAX_EXACT_INTEGER) -> int:
-        """A whole number in this range."""
-        value = self._values[name]
-        if type(value) is not int or not low <= value <= high:
-            raise self._unexpected(name, f"a whole number from {low} to {high}")
-        return value
-
-    def integers(self, name: str, count: int) -> tuple[int, ...] | None:
-        """So many whole numbers, or None for null."""
-        values = self._values[name]
-        if values is None:
-            return None
-        good = isinstance(values, list) and len(values) == count
-        if not good or any(
-            type(value) is not int or abs(value) > MAX_EXACT_INTEGER for value in values
-        ):
-            raise self._unexpected(name, f"{count} whole numbers, or null")
-        return tuple(values)
-
-    def number(self, name: str, low: float = -math.inf, high: float = math.inf) -> float:
-        """A finite number in this range."""
-        value = self._values[name]
-        if not _is_number(value) or not low <= value <= high:
-            among = "" if low == -math.inf else f" from {low:g} to {high:g}"
-            raise self._unexpected(name, f"a finite number{among}")
-        return float(value)
-
-    def numbers(self, name: str, count: int | None = None) -> tuple[float, ...]:
-        """Finite numbers, so many if that is given."""
-        values = self._list(name)
-        if len(values) != (len(values) if count is None else count) or not all(
-            map(_is_number, values)
-        ):
-            raise self._unexpected(name, f"a list of {'' if count is None else f'{count} '}numbers")
-        return tuple(map(float, values))
-
-    def pose(self, name: str) -> Array:
-        """A (4, 4) pose, as four lists of four numbers."""
-        rows = self._list(name)
-        if not all(isinstance(row, list) and all(map(_is_number, row)) for row in rows):
-            raise self._unexpected(name, "a pose, four lists of four numbers")
-        try:
-            return check_pose(rows, name)
-        except ValueError as error:  # rows of different lengths, too
-            raise DocumentError(f"{self.where}: {name} is not a pose: {error}") from error
-
-    def mapping(self, name: str) -> dict[str, Any]:
-        """A mapping, with whatever it holds."""
-        value = self._values[name]
-        if not isinstance(value, dict):
-            raise self._unexpected(name, "a mapping")
-        return value
-
-    def is_null(self, name: str) -> bool:
-        """There is nothing under this name."""
-        return self._values[name] is None
-
-    def _unexpected(self, name: str, expected: str) -> DocumentError:
-        """The error about a value that is not what is expected."""
-        value = quote_value(self._values[name])
-        return DocumentError(f"{self.where}: {name} is {value}; expected {expected}")
-
-    @contextmanager
-    def locate_errors(self) -> Iterator[None]:
-        """Puts this mapping's place before errors that do not name it."""
-        try:
-            yield
-        except DocumentError:
-            raise
-        except InvalidInputError as error:
-            raise DocumentError(f"{self.where}: {error}") from error
-
-    def _list(self, name: str) -> list[Any]:
-        value = self._values[name]
-        if not isinstance(value, list):
-            raise self._unexpected(name, "a list")
-        return value
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return abs(value) < 1e300
-
-
-RECORD_VERSION = 1
-"""Version of the record's format."""
 INTRINSICS_KEYS = ("camera", "width", "height", "focal", "center", "distortion", "residual")
 """Keys of the intrinsics in a record."""
-INSTANCE_KEYS = (
-    *("name", "object", "number", "X_CO", "visible_pixels", "silhouette_pixels", "visibility"),
-    *("visible_box", "amodal_box", "amodal"),
-)
-"""Keys of an instance in a record."""
 
 
 class SampleLimits:
@@ -240,7 +94,7 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
             f" together {SampleLimits.mask_pixels:,}"
         )
     values = {
-        "version": RECORD_VERSION,
+        "version": RecordFields.version,
         "scene": sample.scene,
         "number": sample.number,
         "files": sorted(files),
@@ -258,6 +112,80 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
         ) from error
 
 
+MAX_COUNT = 1 << 53
+"""Largest integer that every JSON reader represents exactly."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewFields:
+    """The view of a record, its pose not yet checked; see `View`."""
+
+    camera: str
+    intrinsics: Intrinsics
+    X_SC: Any
+    depth_range: tuple[float, float]
+    posture: tuple[float, ...] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstanceFields:
+    """An instance of a record, its pose not yet checked, its mask as text; see `InstanceLabel`."""
+
+    RANGES: ClassVar[Ranges] = {
+        "number": (1, SampleLimits.instances),
+        "visible_pixels": (0, MAX_COUNT),
+        "silhouette_pixels": (0, MAX_COUNT),
+        "visibility": (0.0, 1.0),
+    }
+
+    name: str
+    object: str
+    number: int
+    X_CO: Any
+    visible_pixels: int
+    silhouette_pixels: int
+    visibility: float
+    visible_box: Box | None
+    amodal_box: Box | None
+    amodal: str
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFields:
+    """A record as JSON has it, its pose not yet checked; see `Sample` and `SampleRecord`."""
+
+    RANGES: ClassVar[Ranges] = {
+        "scene": (0, MAX_COUNT),
+        "number": (0, MAX_COUNT),
+        "depth_unit": (1e-6, 1.0),
+    }
+
+    version: int = 1
+    scene: int
+    number: int
+    files: tuple[str, ...]
+    view: ViewFields
+    X_WS: Any
+    depth_unit: float
+    instances: tuple[InstanceFields, ...]
+    appearance: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+        width, height = self.view.intrinsics.width, self.view.intrinsics.height
+        if width * height > SampleLimits.image_pixels:
+            raise InvalidInputError(
+                f"{width} x {height} pixels are too many; an image may have"
+                f" {SampleLimits.image_pixels:,}"
+            )
+        count = len(self.instances)
+        if count > SampleLimits.instances or count * width * height > SampleLimits.mask_pixels:
+            raise InvalidInputError(f"{count} instances are too many for images of this size")
+
+
 def parse_record(text: str, where: str) -> SampleRecord:
     """The record of a sample.
 
@@ -268,41 +196,48 @@ def parse_record(text: str, where: str) -> SampleRecord:
     Raises:
         DocumentError: of another version, or a value that does not fit; the message names it.
     """
-    # Keys of the record.
-    record_keys = (
-        *("version", "scene", "number", "files", "view", "X_WS", "depth_unit", "instances"),
-        "appearance",
-    )
-    view_keys = ("camera", "intrinsics", "X_SC", "depth_range", "posture")  # Keys of the view.
-    values = parse_json(text, where)
-    version = values.get("version") if isinstance(values, dict) else None
-    if version != RECORD_VERSION:
-        raise DocumentError(
-            f"{where}: the sample has version {version!r}; this release reads version"
-            f" {RECORD_VERSION}"
-        )
-    fields = PlainFields(values, record_keys, where)
-    view = _read_view(fields.nested("view", view_keys))
-    width, height = view.intrinsics.width, view.intrinsics.height
-    instances = fields.nested_list("instances", INSTANCE_KEYS)
-    if (
-        len(instances) > SampleLimits.instances
-        or len(instances) * width * height > SampleLimits.mask_pixels
-    ):
-        raise DocumentError(
-            f"{where}: {len(instances)} instances are too many for images of this size"
-        )
+    fields = read_plain_data(parse_json(text, where), RecordFields, where)
+    with _locate_errors(f"{where}: view"):
+        view = View(**vars(fields.view) | {"X_SC": _read_pose(fields.view.X_SC, "X_SC")})
+    instances = []
+    for i, one in enumerate(fields.instances):
+        with _locate_errors(f"{where}: instances[{i}]"):
+            X_CO = _read_pose(one.X_CO, "X_CO")
+            amodal = decode_mask(one.amodal, view.intrinsics.height, view.intrinsics.width)
+        instances.append(InstanceLabel(**vars(one) | {"X_CO": X_CO, "amodal": amodal}))
+    with _locate_errors(where):
+        X_WS = _read_pose(fields.X_WS, "X_WS")
     sample = Sample(
-        scene=fields.integer("scene"),
-        number=fields.integer("number"),
+        scene=fields.scene,
+        number=fields.number,
         view=view,
-        X_WS=fields.pose("X_WS"),
+        X_WS=X_WS,
         images=Images(),
-        instances=tuple(_read_instance(one, height, width) for one in instances),
-        appearance=fields.mapping("appearance"),
+        instances=tuple(instances),
+        appearance=fields.appearance,
     )
-    unit = fields.number("depth_unit", 1e-6, 1.0)
-    return SampleRecord(sample, tuple(fields.texts("files")), unit)
+    return SampleRecord(sample, fields.files, fields.depth_unit)
+
+
+def _read_pose(rows: Any, name: str) -> Array:
+    """(4, 4) pose of four lists of four numbers."""
+    try:
+        X = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        X = np.empty(0)
+    if X.shape != (4, 4):
+        raise InvalidInputError(
+            f"{name} is {quote_value(rows)}; expected a pose, four lists of four numbers"
+        )
+    return check_pose(X, name)
+
+
+@contextmanager
+def _locate_errors(where: str) -> Iterator[None]:
+    try:
+        yield
+    except InvalidInputError as error:
+        raise DocumentError(f"{where}: {error}") from error
 
 
 def _matrix_rows(X: Array) -> list[list[float]]:
@@ -312,69 +247,14 @@ def _matrix_rows(X: Array) -> list[list[float]]:
 
 def _write_view(view: View) -> dict[str, Any]:
     intrinsics = {name: getattr(view.intrinsics, name) for name in INTRINSICS_KEYS}
-    return {
-        "camera": view.camera,
-        "intrinsics": intrinsics,
-        "X_SC": _matrix_rows(view.X_SC),
-        "depth_range": view.depth_range,
-        "posture": view.posture,
-    }
+    return vars(view) | {"intrinsics": intrinsics, "X_SC": _matrix_rows(view.X_SC)}
 
 
 def _write_instance(instance: InstanceLabel) -> dict[str, Any]:
-    values = {name: getattr(instance, name) for name in INSTANCE_KEYS}
-    return values | {"X_CO": _matrix_rows(instance.X_CO), "amodal": encode_mask(instance.amodal)}
-
-
-def _read_view(fields: PlainFields) -> View:
-    intrinsics = _read_intrinsics(fields.nested("intrinsics", INTRINSICS_KEYS))
-    near, far = fields.numbers("depth_range", 2)
-    with fields.locate_errors():
-        view = View(
-            camera=fields.text("camera"),
-            intrinsics=intrinsics,
-            X_SC=fields.pose("X_SC"),
-            depth_range=(near, far),
-        )
-    return view if fields.is_null("posture") else replace(view, posture=fields.numbers("posture"))
-
-
-def _read_intrinsics(fields: PlainFields) -> Intrinsics:
-    max_side = 1 << 15  # Pixels.
-    width, height = (fields.integer(name, 1, max_side) for name in ("width", "height"))
-    if width * height > SampleLimits.image_pixels:
-        raise DocumentError(
-            f"{fields.where}: {width} x {height} pixels are too many; an image may have"
-            f" {SampleLimits.image_pixels:,}"
-        )
-    focal, center = fields.numbers("focal", 2), fields.numbers("center", 2)
-    with fields.locate_errors():
-        return Intrinsics(
-            camera=fields.text("camera"),
-            width=width,
-            height=height,
-            focal=(focal[0], focal[1]),
-            center=(center[0], center[1]),
-            distortion=fields.numbers("distortion"),
-            residual=None if fields.is_null("residual") else fields.number("residual"),
-        )
-
-
-def _read_instance(fields: PlainFields, height: int, width: int) -> InstanceLabel:
-    with fields.locate_errors():
-        amodal = decode_mask(fields.text("amodal"), height, width)
-    return InstanceLabel(
-        name=fields.text("name"),
-        object=fields.text("object"),
-        number=fields.integer("number", 1, SampleLimits.instances),
-        X_CO=fields.pose("X_CO"),
-        visible_pixels=fields.integer("visible_pixels"),
-        silhouette_pixels=fields.integer("silhouette_pixels"),
-        visibility=fields.number("visibility", 0.0, 1.0),
-        visible_box=cast(Box | None, fields.integers("visible_box", 4)),
-        amodal_box=cast(Box | None, fields.integers("amodal_box", 4)),
-        amodal=amodal,
-    )
+    return vars(instance) | {
+        "X_CO": _matrix_rows(instance.X_CO),
+        "amodal": encode_mask(instance.amodal),
+    }
 
 
 RECORD_KIND = "json"  # Kind of file of a sample's record.
@@ -383,22 +263,18 @@ FILE_SUFFIXES = {RECORD_KIND: "json", GRASPS_KIND: "grasps.npz"} | {
     name: f"{name}.png" for name in PNG_KINDS
 }
 """Suffixes of file names by kind."""
-MEMBER_NAME = re.compile(
-    r"(\d{6,12})_(\d{3,12})\.(" + "|".join(re.escape(end) for end in FILE_SUFFIXES.values()) + ")",
-    re.ASCII,
-)
-"""Pattern of the file names of samples."""
+FILE_KINDS = {suffix: kind for kind, suffix in FILE_SUFFIXES.items()}
+"""Kinds of file by the suffixes of their names."""
+SAMPLE_KEY = re.compile(r"\d{6,12}_\d{3,12}", re.ASCII)
+"""Pattern of the keys of samples."""
 READABLE_PARTS = (*PNG_KINDS, GRASPS_KIND)
 """Parts of a sample that can be read besides its record."""
 
 
 def member_kind(name: str) -> tuple[str, str] | None:
     """Key and kind of a file by its name; None for a file that is none of a sample."""
-    match = MEMBER_NAME.fullmatch(name)
-    if match is None:
-        return None
-    kinds = {suffix: kind for kind, suffix in FILE_SUFFIXES.items()}
-    return f"{match[1]}_{match[2]}", kinds[match[3]]
+    key, _, suffix = name.partition(".")
+    return (key, FILE_KINDS[suffix]) if suffix in FILE_KINDS and SAMPLE_KEY.fullmatch(key) else None
 
 
 def encode_sample(sample: Sample) -> Iterator[tuple[str, bytes]]:

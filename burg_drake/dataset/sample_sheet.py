@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from burg_drake.core import (
 )
 from burg_drake.dataset.sample import InstanceLabel, Sample
 from burg_drake.dataset.sample_encoding import encode_png
-from burg_drake.visualization import Html, element, html_document, map_colors
+from burg_drake.visualization import map_colors, render_page
 
 LUMA_WEIGHTS = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in the lightness of a colour (ITU-R BT.601)."""
@@ -38,13 +37,6 @@ class SheetStyle:
 
 SMALL_PNG_OPTIONS = (cv2.IMWRITE_PNG_COMPRESSION, 9)
 """Options of OpenCV for the smallest PNG files, with 0.8 of the usual bytes."""
-SHEET_CSS = """
-body { font: 14px/1.4 system-ui, sans-serif; color: #1d2328; background: #fff; margin: 16px; }
-main { display: grid; gap: 16px; }
-figure { margin: 0; } img { max-width: 100%; height: auto; display: block; }
-figcaption { color: #5b656e; overflow-wrap: anywhere; }
-"""
-"""Style of the HTML page."""
 
 
 def contact_sheet(
@@ -240,24 +232,22 @@ def _captioned_picture(sample: Sample) -> Bytes:
 
 
 def _sheet_html(samples: Sequence[Sample], columns: int, title: str) -> str:
-    heading = title or "Samples"
-    grid = f"{SHEET_CSS}main {{ grid-template-columns: repeat({columns}, minmax(0, 1fr)); }}"
-    figures = [_sample_html(sample) for sample in samples]
-    return html_document(heading, grid, element("h1", heading), element("main", *figures))
-
-
-def _sample_html(sample: Sample) -> Html:
-    picture = sample_picture(sample)
-    data = base64.b64encode(encode_png(picture, SMALL_PNG_OPTIONS)).decode()
-    names = list_names([label.name for label in sample.instances if label.visible_pixels])
-    return element(
-        "figure",
-        element(
-            "img",
-            src=f"data:image/png;base64,{data}",
-            alt=f"images of sample {sample.key}: {names}",
-            width=picture.shape[1],
-            height=picture.shape[0],
-        ),
-        element("figcaption", sample_caption(sample)),
+    figures = []
+    for sample in samples:
+        picture = sample_picture(sample)
+        names = list_names([label.name for label in sample.instances if label.visible_pixels])
+        figures.append(
+            {
+                "png": encode_png(picture, SMALL_PNG_OPTIONS),
+                "alt": f"images of sample {sample.key}: {names}",
+                "width": picture.shape[1],
+                "height": picture.shape[0],
+                "caption": sample_caption(sample),
+            }
+        )
+    return render_page(
+        "dataset/sample_sheet.html.jinja",
+        title=title or "Samples",
+        columns=columns,
+        figures=figures,
     )

@@ -11,7 +11,6 @@ from burg_drake.cameras import Intrinsics
 from burg_drake.core import (
     Array,
     Bytes,
-    InvalidInputError,
     Outcome,
     Single,
     rot_z,
@@ -19,8 +18,9 @@ from burg_drake.core import (
 )
 from burg_drake.dataset.point_clouds import depth_cloud
 from burg_drake.dataset.sample import LabelledGrasps, Sample
+from burg_drake.dataset.views import set_posture
 from burg_drake.scene import Scene
-from burg_drake.station import Station, StationDiagram
+from burg_drake.station import Station
 from burg_drake.visualization import (
     GRASPS_PATH,
     LegendEntry,
@@ -71,7 +71,11 @@ def show_sample(
     X_WC = sample.X_WS @ view.X_SC
     built = show_scene(scene, station, meshcat, robot="none" if view.posture is None else "arm")
     if view.posture is not None:
-        _publish_posture(built, view.posture)
+        context = built.diagram.CreateDefaultContext()
+        set_posture(
+            built.arm_joints, built.plant.GetMyMutableContextFromRoot(context), view.posture
+        )
+        built.diagram.ForcedPublish(context)
     legend = [LegendEntry("models", "#9aa3ad", ("/drake/visualizer", "/drake/labels"))]
     for path in (SamplePaths.cloud, SamplePaths.sensor, SamplePaths.camera, GRASPS_PATH):
         meshcat.Delete(path)  # of a sample that was shown before
@@ -98,20 +102,6 @@ def picture_corners(intrinsics: Intrinsics, depth: float) -> Array:
     corners = np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
     rays = (corners - intrinsics.center) / intrinsics.focal
     return depth * np.column_stack([rays, np.ones(4)])
-
-
-def _publish_posture(built: StationDiagram, posture: tuple[float, ...]) -> None:
-    """Shows the arm in a posture."""
-    if len(posture) != len(built.arm_joints):
-        raise InvalidInputError(
-            f"the view has joint positions of {len(posture)} joints; the arm of the station has"
-            f" {len(built.arm_joints)}"
-        )
-    context = built.diagram.CreateDefaultContext()
-    plant_context = built.plant.GetMyMutableContextFromRoot(context)
-    for joint, position in zip(built.arm_joints, posture, strict=True):
-        joint.set_angle(plant_context, position)
-    built.diagram.ForcedPublish(context)
 
 
 def _draw_depth(

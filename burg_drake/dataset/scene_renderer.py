@@ -6,9 +6,8 @@ Drake or Blender renders the colours; `ray_casting` gives depth, labels and norm
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from functools import cached_property, lru_cache
-from typing import Literal
+from functools import cached_property
+from typing import Literal, get_args
 
 import cv2
 import numpy as np
@@ -16,12 +15,11 @@ from pydrake.geometry import ClippingRange, ColorRenderCamera, QueryObject, Rend
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.cameras import FieldOfView, Intrinsics, camera_info, camera_intrinsics
+from burg_drake.cameras import Intrinsics, camera_info, camera_intrinsics
 from burg_drake.core import (
     Array,
     Bytes,
     InvalidInputError,
-    Single,
     UnknownNameError,
     inverse,
     suggest_names,
@@ -30,6 +28,7 @@ from burg_drake.dataset.appearance import Appearance
 from burg_drake.dataset.appearance_rendering import apply_appearance, place_appearance
 from burg_drake.dataset.blender_process import RENDERERS, RendererName, running_blender
 from burg_drake.dataset.blender_scene import BlenderScene, make_blender_scene
+from burg_drake.dataset.camera_rays import camera_rays
 from burg_drake.dataset.photometry import apply_photometry
 from burg_drake.dataset.ray_casting import RayScene, RaySurface, Silhouette, surfaces_of_body
 from burg_drake.dataset.room import blend_over_background, fill_background
@@ -40,7 +39,7 @@ from burg_drake.dataset.sample import (
     box_of_mask,
     instance_numbers,
 )
-from burg_drake.dataset.views import View
+from burg_drake.dataset.views import View, set_posture
 from burg_drake.scene import SceneLike, as_scene
 from burg_drake.station import (
     RENDERER_NAME,
@@ -50,35 +49,6 @@ from burg_drake.station import (
     build_station_diagram,
     visible_surfaces,
 )
-
-
-@lru_cache(maxsize=8)
-def covering_pinhole(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
-    """A pinhole camera that sees all that one with distortion sees, and (H, W, 2) where the pixels
-    of that one are in its image.
-
-    Raises:
-        InvalidInputError: it sees nearly to its sides.
-    """
-    max_tangent = 4.0  # Tangent of the largest angle to the optical axis: 76 degrees.
-    flat = FieldOfView(intrinsics).directions[..., :2]
-    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
-    if max(np.abs(low).max(), np.abs(high).max()) > max_tangent:
-        raise InvalidInputError(
-            f"the lens sees more than {np.degrees(np.arctan(max_tangent)):.0f} degrees from its"
-            " axis; colour images of this camera cannot be rendered"
-        )
-    start = np.floor(low * intrinsics.focal) - 1.0
-    width, height = (np.ceil(high * intrinsics.focal) + 1.0 - start).astype(int).tolist()
-    wide = replace(
-        intrinsics,
-        width=width + 1,
-        height=height + 1,
-        center=(-start[0], -start[1]),
-        distortion=(),
-    )
-    return wide, (flat * intrinsics.focal - start).astype(np.float32)
-
 
 ImageKind = Literal["color", "depth", "labels", "normals"]
 
@@ -161,7 +131,7 @@ class SceneRenderer:
         Raises:
             InvalidInputError: an image of another kind, or colours of a renderer without them.
         """
-        known_kinds = ("color", "depth", "labels", "normals")  # Kinds of images.
+        known_kinds = get_args(ImageKind)
         kinds = tuple(kinds)
         for kind in kinds:
             if kind not in known_kinds:
@@ -214,7 +184,7 @@ class SceneRenderer:
                 "this scene was built without colours, so colour images cannot be rendered"
             )
         if not intrinsics.is_pinhole:
-            wide, places = covering_pinhole(intrinsics)
+            wide, places = camera_rays(intrinsics).covering_pinhole
             image = self._color_image(wide, X_WC, depth_range)
             return np.asarray(cv2.remap(image, places, None, cv2.INTER_LINEAR), np.uint8)
         near, far = depth_range
@@ -255,13 +225,7 @@ class SceneRenderer:
             )
         if view.posture is None or view.posture == self._posture:
             return
-        if len(view.posture) != len(joints):
-            raise InvalidInputError(
-                f"the view has joint positions of {len(view.posture)} joints; the arm has"
-                f" {len(joints)}"
-            )
-        for joint, position in zip(joints, view.posture, strict=True):
-            joint.set_angle(self._plant_context, position)
+        set_posture(joints, self._plant_context, view.posture)
         self._posture, self._rays = view.posture, None
 
     @cached_property

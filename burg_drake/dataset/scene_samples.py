@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +24,7 @@ from burg_drake.dataset.view_sampler import ViewSampler
 from burg_drake.dataset.views import View
 from burg_drake.dataset.writer import write_scene
 from burg_drake.evaluation import Bundle, load_bundle, require_same_content
-from burg_drake.generation import SceneSampler
+from burg_drake.generation import SceneSampler, convert_drake_errors, kept_sampler
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.scene import Scene, SceneDocument, SceneRecipe, load_scene
 from burg_drake.station import Station, load_station
@@ -170,35 +169,24 @@ def appearance_of(sample: Sample) -> Appearance | None:
 
 
 @dataclass(frozen=True)
-class DatasetInputs:
-    """What all scenes of a data set are made with.
+class SceneWork:
+    """A scene to make samples of.
 
     Attributes:
+        number: of the scene.
+        path: of its document; None if it is sampled.
         recipe: of the data set.
         folder: of the data set.
         station: its file.
         library: folder of the objects of sampled scenes; None for given ones.
     """
 
+    number: int
+    path: Path | None
     recipe: DatasetRecipe
     folder: Path
     station: Path
     library: Path | None
-
-
-@dataclass(frozen=True)
-class SceneWork:
-    """A scene to make samples of.
-
-    Attributes:
-        inputs: of the data set.
-        number: of the scene.
-        path: of its document; None if it is sampled.
-    """
-
-    inputs: DatasetInputs
-    number: int
-    path: Path | None
 
 
 def make_scene(work: SceneWork) -> ShardEntry:
@@ -208,15 +196,17 @@ def make_scene(work: SceneWork) -> ShardEntry:
         SimulationError: no scene was accepted, or Drake ended by a failed condition.
         Exception: what cannot be rendered is one failure.
     """
-    inputs = work.inputs
+    recipe = work.recipe
     with convert_drake_errors():
-        station = _load_station(inputs.station)
+        station = _load_station(work.station)
         if work.path is not None:
             scene = given_scene(work)
         else:
-            scene = accepted_scene(_scene_sampler(inputs), work.number, inputs.folder)
-        samples = SceneSamples(scene, work.number, station, inputs.recipe, inputs.folder)
-        return write_scene(inputs.folder, work.number, scene, samples)
+            assert recipe.sampled is not None and work.library is not None
+            sampler = kept_sampler(recipe.sampled, work.library, work.station)
+            scene = accepted_scene(sampler, work.number, work.folder)
+        samples = SceneSamples(scene, work.number, station, recipe, work.folder)
+        return write_scene(work.folder, work.number, scene, samples)
 
 
 def given_scene(
@@ -234,7 +224,7 @@ def given_scene(
     """
     assert work.path is not None
     scene = load_scene(work.path, library=library)
-    if scene.content != work.inputs.recipe.given[work.number]:
+    if scene.content != work.recipe.given[work.number]:
         raise InvalidInputError(
             f"{work.path} was changed while the data set was made; run the command again"
         )
@@ -257,27 +247,6 @@ def accepted_scene(sampler: SceneSampler, number: int, folder: Path) -> Scene:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in sampled.refused.items())
         raise SimulationError(f"no scene was accepted in {sampled.attempts} attempts ({reasons})")
     return sampled.scene
-
-
-@contextmanager
-def convert_drake_errors() -> Iterator[None]:
-    """Around what Drake does: a failed condition of its own ends this alone.
-
-    Raises:
-        SimulationError: in the place of `SystemExit`.
-    """
-    try:
-        yield
-    except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake failed: {error}") from error
-
-
-@lru_cache(maxsize=1)
-def _scene_sampler(inputs: DatasetInputs) -> SceneSampler:
-    assert inputs.recipe.sampled is not None and inputs.library is not None
-    return SceneSampler(
-        inputs.recipe.sampled, load_library(inputs.library), _load_station(inputs.station)
-    )
 
 
 @lru_cache(maxsize=1)

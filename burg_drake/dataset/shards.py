@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import re
 import secrets
 import tarfile
 from collections.abc import Iterable, Iterator
@@ -19,9 +20,10 @@ from burg_drake.core import (
     InvalidInputError,
     copy_permissions,
     open_regular,
+    quote_value,
     shorten_text,
 )
-from burg_drake.dataset.sample import Images, Sample
+from burg_drake.dataset.sample import Sample
 from burg_drake.dataset.sample_encoding import decode_grasps, decode_image_of, require_fitting
 from burg_drake.dataset.sample_files import (
     FILE_SUFFIXES,
@@ -116,6 +118,8 @@ def _parse_header(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]
 
 
 SHARD_FOLDER = "shards"  # Folder of the shards in a data set.
+SHARD_URL = re.compile(SHARD_FOLDER + r"/(\d{6,12})\.tar", re.ASCII)
+"""Pattern of the paths of shards in a data set."""
 
 
 @dataclass(frozen=True)
@@ -127,12 +131,27 @@ class ShardEntry:
         nsamples: in it.
         filesize: bytes.
         md5sum: of the file, as 32 hexadecimal digits.
+
+    Raises:
+        InvalidInputError: a value is none of a shard's.
     """
 
     url: str
     nsamples: int
     filesize: int
     md5sum: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.url, str) or not SHARD_URL.fullmatch(self.url):
+            raise InvalidInputError(
+                f"url is {quote_value(self.url)}; expected a value such as shards/000012.tar"
+            )
+        for name in ("nsamples", "filesize"):
+            value = getattr(self, name)
+            if type(value) is not int or value < 0:
+                raise InvalidInputError(
+                    f"{name} is {quote_value(value)}; expected a whole number from 0"
+                )
 
 
 def shard_name(scene: int) -> str:
@@ -159,15 +178,12 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
     path = Path(path)
     digest = hashlib.md5(usedforsecurity=False)
     seen: set[str] = set()
-    size = 0
     with _write_atomically(path) as stream:
 
         def write(data: bytes) -> None:
-            nonlocal size
             with _report_write_errors(path):
                 stream.write(data)
             digest.update(data)
-            size += len(data)
 
         for sample in samples:
             if f"{sample.scene:06d}" != path.stem or sample.key in seen:
@@ -179,6 +195,7 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
             for name, data in encode_sample(sample):
                 write(tar_member(name, data))
         write(TAR_END)
+        size = stream.tell()
     return ShardEntry(f"{SHARD_FOLDER}/{path.name}", len(seen), size, digest.hexdigest())
 
 
@@ -209,15 +226,12 @@ def size_and_md5(path: Path) -> tuple[int, str]:
     Raises:
         InvalidInputError: it cannot be read.
     """
-    digest, size = hashlib.md5(usedforsecurity=False), 0
     with open_regular(path) as stream:
         try:
-            while data := stream.read(1 << 20):
-                digest.update(data)
-                size += len(data)
+            digest = hashlib.file_digest(stream, lambda: hashlib.md5(usedforsecurity=False))
         except OSError as error:
             raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    return size, digest.hexdigest()
+        return stream.tell(), digest.hexdigest()
 
 
 class SampleShard:
@@ -270,7 +284,7 @@ class SampleShard:
             InvalidInputError: a file is missing, damaged, or does not fit the record.
         """
         max_size = 256 << 20  # Bytes of a file other than the record.
-        sample, images = record.sample, {}
+        sample = record.sample
         for name in parts:
             if name not in record.files:
                 continue
@@ -280,10 +294,13 @@ class SampleShard:
                 grasps = decode_grasps(data, place)
                 require_fitting(grasps, len(sample.instances), place)
                 sample = replace(sample, grasps=grasps)
+                continue
+            image = decode_image_of(name, data, record.size, record.depth_unit, place)
+            if name == "sensor_depth":
+                sample = replace(sample, sensor_depth=image)
             else:
-                images[name] = decode_image_of(name, data, record.size, record.depth_unit, place)
-        sensor_depth = images.pop("sensor_depth", None)
-        return replace(sample, images=Images(**images), sensor_depth=sensor_depth)
+                sample = replace(sample, images=replace(sample.images, **{name: image}))
+        return sample
 
     def _read_file(self, key: str, kind: str, max_size: int) -> bytes:
         places, name = self.samples[key], f"{key}.{FILE_SUFFIXES[kind]}"

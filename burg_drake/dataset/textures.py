@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import colorsys
 
-import cv2
 import numpy as np
 
 from burg_drake.core import Array, Bytes, Indices, InvalidInputError, rng_from
 from burg_drake.dataset.appearance import Appearance, TableSurface
+from burg_drake.dataset.sample_encoding import encode_png
 
 
 def smooth_noise(rng: np.random.Generator, size: int, rows: int, columns: int) -> Array:
@@ -76,9 +76,7 @@ def table_texture(appearance: Appearance) -> bytes:
     """
     if appearance.table is None:
         raise InvalidInputError("the appearance has no pattern of the table, so it has no texture")
-    image = _texture_image(appearance.table)
-    _, png = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
-    return bytes(png)
+    return encode_png(_texture_image(appearance.table))
 
 
 def _texture_image(surface: TableSurface) -> Bytes:

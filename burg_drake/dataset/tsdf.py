@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,8 +23,10 @@ from burg_drake.core import (
     inverse,
     transform_points,
 )
-from burg_drake.dataset.point_clouds import checked_depth, field_of_view
+from burg_drake.dataset.camera_rays import camera_rays
+from burg_drake.dataset.point_clouds import checked_depth
 from burg_drake.dataset.sample import instance_numbers
+from burg_drake.geometry import RayCaster, triangle_distances
 from burg_drake.scene import SceneLike, as_scene
 from burg_drake.station import Station, StationLike, as_station
 
@@ -163,7 +165,7 @@ def _distances_before_surface(
     if camera.is_pinhole:
         seen = np.flatnonzero(p_CQ[:, 2] >= NEAR_DISTANCE)
     else:  # far outside, a lens model leads back into the image
-        seen = np.flatnonzero(field_of_view(camera).sees(p_CQ))
+        seen = np.flatnonzero(camera_rays(camera).sees(p_CQ))
     column, row = np.rint(camera.project(p_CQ[seen])).T
     inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
     seen = seen[inside]
@@ -254,14 +256,13 @@ def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
     near = np.flatnonzero(((points > lower - reach) & (points < upper + reach)).all(axis=1))
     if not len(near):
         return distance
-    distance[near] = np.minimum(_FaceIndex.of(mesh).distance(points[near], reach), reach)
+    distance[near] = np.minimum(_FaceIndex(mesh).distance(points[near], reach), reach)
     within = near[((points[near] > lower) & (points[near] < upper)).all(axis=1)]
     if len(within):
         distance[within[_are_inside(mesh, points[within])]] *= -1.0
     return distance
 
 
-@dataclass(frozen=True, eq=False)
 class _FaceIndex:
     """The faces of a surface, cut into small ones.
 
@@ -273,27 +274,19 @@ class _FaceIndex:
         tree: of the middles.
     """
 
-    triangles: Array
-    middle: Array
-    radius: Array
-    normal: Array
-    tree: Any
-
-    @classmethod
-    def of(cls, mesh: trimesh.Trimesh) -> _FaceIndex:
-        """Cuts the faces of a mesh."""
+    def __init__(self, mesh: trimesh.Trimesh) -> None:
         from scipy.spatial import cKDTree
         from trimesh.remesh import subdivide_to_size
 
         # Shorter edges leave fewer candidates for the nearest face; large objects are cut coarsely.
         edge = max(0.01, float(np.linalg.norm(mesh.extents)) / 100)
         vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, edge, max_iter=20)
-        triangles = np.asarray(vertices)[np.asarray(faces)]
-        middle = triangles.mean(axis=1)
-        radius = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
+        triangles = self.triangles = np.asarray(vertices)[np.asarray(faces)]
+        middle = self.middle = triangles.mean(axis=1)
+        self.radius = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        return cls(triangles, middle, radius, normal, cKDTree(middle))
+        self.normal, self.tree = normal, cKDTree(middle)
 
     def distance(self, points: Array, reach: float) -> Array:
         """(N,) distances of points (N, 3) to the nearest face [m]; above `reach` something above
@@ -330,37 +323,13 @@ class _FaceIndex:
 
     def _measure(self, distance: Array, points: Array, point: Indices, face: Indices) -> None:
         """Lowers distances of points (N,) to those of some points to one face each."""
-        np.minimum.at(distance, point, _distances_to_triangles(points[point], self.triangles[face]))
-
-
-def _distances_to_triangles(points: Array, triangles: Array) -> Array:
-    """(M,) distances of points (M, 3) to one triangle (M, 3, 3) each [m].
-
-    It is that to the plane where the point is above the triangle, else that to the nearest edge.
-    (`trimesh.triangles.closest_point` is off by up to 0.1 mm at small triangles.)
-    """
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    above = length > 0.0
-    nearest = np.full(len(points), np.inf)
-    for k in range(3):
-        edge, offset = triangles[:, k - 2] - triangles[:, k], points - triangles[:, k]
-        above &= np.einsum("ij,ij->i", np.cross(edge, offset), normal) >= 0.0
-        square = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
-        share = np.clip(np.einsum("ij,ij->i", offset, edge) / square, 0.0, 1.0)
-        apart = offset - share[:, None] * edge
-        nearest = np.minimum(nearest, np.einsum("ij,ij->i", apart, apart))
-    offset = points - triangles[:, 0]
-    height = np.abs(np.einsum("ij,ij->i", offset, normal)) / np.maximum(length, 1e-300)
-    return np.asarray(np.where(above, height, np.sqrt(nearest)))
+        np.minimum.at(distance, point, triangle_distances(points[point], self.triangles[face]))
 
 
 def _are_inside(mesh: trimesh.Trimesh, points: Array) -> Booleans:
     """(N,) whether most rays meet a face from behind first."""
     # Along no face of usual objects; the majority of the rays decides.
     ray_directions = ((0.36, 0.48, 0.80), (-0.64, 0.60, 0.48), (0.48, -0.80, -0.36))
-    from burg_drake.geometry import RayCaster
-
     faces = np.asarray(mesh.faces, np.int64)
     corners = np.asarray(mesh.vertices)[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -20,7 +20,7 @@ from burg_drake.core import (
     suggest_names,
     transform_points,
 )
-from burg_drake.dataset.point_clouds import field_of_view
+from burg_drake.dataset.camera_rays import camera_rays
 from burg_drake.dataset.views import (
     DEFAULT_DEPTH_RANGE,
     SPHERE_CAMERA,
@@ -40,7 +40,6 @@ from burg_drake.motion import (
 from burg_drake.objects import ObjectEntry
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import (
-    Hand,
     Station,
     StationLike,
     as_station,
@@ -85,54 +84,12 @@ class PlacedBox:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ViewedScene:
-    """A scene on a station, as far as views have to do with it.
-
-    Attributes:
-        scene, station: the two.
-    """
-
-    scene: Scene
-    station: Station
-
-    @cached_property
-    def solids(self) -> tuple[PlacedBox, ...]:
-        """Table and obstacles."""
-        X_SW = inverse(self.station.document.X_WS.matrix())
-        boxes = {"table": table_box(self.station), **obstacle_boxes(self.station)}
-        return tuple(
-            PlacedBox(name, X_SW @ box.X_WB, np.array(box.size) / 2) for name, box in boxes.items()
-        )
-
-    @cached_property
-    def objects(self) -> tuple[PlacedBox, ...]:
-        """The boxes around all instances, along the axes of each: free ones, then background."""
-        return tuple(
-            box_around(name, self.scene.entry(name), self.scene.X_SO(name))
-            for name in (*self.scene.instances, *self.scene.background)
-        )
-
-    @cached_property
-    def p_SO(self) -> Array:
-        """(N, 3) centres of what there is to see [m]: free instances, or the background if there
-        are none."""
-        seen = self.objects[: len(self.scene.instances)] or self.objects
-        return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
-
-
 def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
     """The box around an object of a library at a pose (4, 4), along its axes."""
     lower, upper = np.array(entry.lower), np.array(entry.upper)
     X_SB = X_SO.copy()
     X_SB[:3, 3] = transform_points(X_SO, 0.5 * (lower + upper)[None])[0]
     return PlacedBox(name, X_SB, 0.5 * (upper - lower))
-
-
-def default_X_HC(hand: Hand) -> Array:
-    """(4, 4) a camera beside a hand that looks along its fingers."""
-    # beside the hand, with the fingertips at the image's lower edge
-    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=(0.0, -0.07, -0.09)))
 
 
 class WristCamera:
@@ -166,7 +123,9 @@ class WristCamera:
         self._solutions = arm_solutions(self._kinematics, redundant=(16,), limit_margin=0.01)
         self._home = np.array(arm.home)
         self._X_AS = inverse(arm.X_WA.matrix()) @ station.document.X_WS.matrix()
-        self.X_HC = default_X_HC(station.hand) if X_HC is None else X_HC
+        if X_HC is None:  # beside the hand, with the fingertips at the image's lower edge
+            X_HC = np.asarray(station.hand.X_HG.matrix() @ make_pose(p_AB=(0.0, -0.07, -0.09)))
+        self.X_HC = X_HC
 
     def posture(self, X_SC: Array) -> Array | str:
         """Joint positions (n,) that bring the camera to a pose (4, 4) while nothing collides, as
@@ -229,7 +188,6 @@ class ViewSampler:
         """
         self.settings = settings or ViewpointSettings()
         self._scene, self._station = as_scene(scene), as_station(station)
-        self._seen = ViewedScene(self._scene, self._station)
         self._given, self._depth_range = intrinsics, depth_range
         self._besides = tuple(besides)
         require_cameras(self.settings, self._station)
@@ -239,7 +197,7 @@ class ViewSampler:
                 f"station {self._station.name!r} ({self._station.path}) has no camera whose"
                 " intrinsics the views could use; give intrinsics"
             )
-        if not len(self._seen.objects):
+        if not len(self._objects):
             raise InvalidInputError(f"scene {self._scene.name!r} ({self._scene.path}) is empty")
         if WRIST_CAMERA in self.settings.cameras:
             _ = self._wrist
@@ -283,12 +241,12 @@ class ViewSampler:
         """A view, or which rule it breaks."""
         known = self._station.document.cameras
         intrinsics, depth_range = self._optics(camera)
-        solids = self._seen.solids if camera in known else (*self._seen.solids, *self._besides)
+        solids = self._solids if camera in known else (*self._solids, *self._besides)
         if camera in known:
             X_SW = inverse(self._station.document.X_WS.matrix())
             X_SC = jitter_camera(X_SW @ known[camera].X_WC.matrix(), self.settings, rng)
         else:
-            X_SC = draw_camera_on_sphere(self.settings, self._seen.p_SO.mean(axis=0), rng)
+            X_SC = draw_camera_on_sphere(self.settings, self._p_SO.mean(axis=0), rng)
         view = View(camera=camera, intrinsics=intrinsics, X_SC=X_SC, depth_range=depth_range)
         broken = self._broken_rule(view, solids)
         if broken:
@@ -311,22 +269,22 @@ class ViewSampler:
     def _broken_rule(self, view: View, solids: Sequence[PlacedBox]) -> str:
         """Which rule of what is seen a camera breaks, in words; empty if none."""
         p_SC = view.X_SC[:3, 3]
-        for box in (*solids, *self._seen.objects):
+        for box in (*solids, *self._objects):
             if box.contains(p_SC):
                 return f"have the camera in {box.name!r}"
-        wanted = max(1, int(np.ceil(self.settings.in_view * len(self._seen.p_SO) - 1e-9)))
+        wanted = max(1, int(np.ceil(self.settings.in_view * len(self._p_SO) - 1e-9)))
         if self._count_visible(view, solids) < wanted:
-            return f"show fewer than {wanted} of {len(self._seen.p_SO)} objects"
+            return f"show fewer than {wanted} of {len(self._p_SO)} objects"
         return ""
 
     def _count_visible(self, view: View, solids: Sequence[PlacedBox]) -> int:
         """How many objects have their centres in the image and the range of depths, with none of
         the solids before them."""
-        p_SO, intrinsics = self._seen.p_SO, view.intrinsics
+        p_SO, intrinsics = self._p_SO, view.intrinsics
         p_CO = transform_points(inverse(view.X_SC), p_SO)
         near, far = view.depth_range
         seen = (p_CO[:, 2] >= near) & (p_CO[:, 2] <= far)
-        seen &= field_of_view(intrinsics).sees(p_CO)
+        seen &= camera_rays(intrinsics).sees(p_CO)
         pixel = np.full((len(p_CO), 2), -1.0)
         pixel[seen] = intrinsics.project(p_CO[seen])
         size = np.array((intrinsics.width, intrinsics.height))
@@ -334,6 +292,30 @@ class ViewSampler:
         for box in solids:
             seen &= ~box.hides(view.X_SC[:3, 3], p_SO)
         return int(seen.sum())
+
+    @cached_property
+    def _solids(self) -> tuple[PlacedBox, ...]:
+        """Table and obstacles."""
+        X_SW = inverse(self._station.document.X_WS.matrix())
+        boxes = {"table": table_box(self._station), **obstacle_boxes(self._station)}
+        return tuple(
+            PlacedBox(name, X_SW @ box.X_WB, np.array(box.size) / 2) for name, box in boxes.items()
+        )
+
+    @cached_property
+    def _objects(self) -> tuple[PlacedBox, ...]:
+        """The boxes around all instances, along the axes of each: free ones, then background."""
+        return tuple(
+            box_around(name, self._scene.entry(name), self._scene.X_SO(name))
+            for name in (*self._scene.instances, *self._scene.background)
+        )
+
+    @cached_property
+    def _p_SO(self) -> Array:
+        """(N, 3) centres of what there is to see [m]: free instances, or the background if there
+        are none."""
+        seen = self._objects[: len(self._scene.instances)] or self._objects
+        return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
 
     @cached_property
     def _wrist(self) -> WristCamera:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -63,6 +64,25 @@ class View:
                 f"depth range of a view is {near:g} to {far:g} m; it must start above 0 and end"
                 " above its start"
             )
+
+
+def set_posture(joints: Sequence[Any], context: Any, posture: Sequence[float]) -> None:
+    """Moves an arm to the posture of a view.
+
+    Args:
+        joints: Drake's revolute joints of the arm.
+        context: of the plant.
+        posture: (n,) joint positions [rad].
+
+    Raises:
+        InvalidInputError: they are of another arm.
+    """
+    if len(posture) != len(joints):
+        raise InvalidInputError(
+            f"the view has joint positions of {len(posture)} joints; the arm has {len(joints)}"
+        )
+    for joint, position in zip(joints, posture, strict=True):
+        joint.set_angle(context, position)
 
 
 SPHERE_CAMERA = "sphere"  # Name of the camera on a sphere around the scene, which no station has.
@@ -134,9 +154,7 @@ class ViewpointSettings:
                 "cameras",
             )
         require_ranges(self)
-        for name in self.RANGES:
-            if isinstance(pair := getattr(self, name), tuple):
-                require_ascending(pair, name)
+        require_ascending(self)
 
 
 def camera_looking_at(

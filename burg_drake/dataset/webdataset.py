@@ -115,17 +115,9 @@ def _sample_values(objects: tuple[str, ...], sample: Sample, depth_unit: float) 
 def _instance_values(
     objects: tuple[str, ...], sample: Sample, label: InstanceLabel
 ) -> dict[str, Any]:
-    return {
-        "name": label.name,
-        "object": label.object,
+    return vars(label) | {
         "object_id": object_index(objects, sample, label) + 1,
-        "number": label.number,
         "X_CO": label.X_CO.tolist(),
-        "visible_pixels": label.visible_pixels,
-        "silhouette_pixels": label.silhouette_pixels,
-        "visibility": label.visibility,
-        "visible_box": label.visible_box,
-        "amodal_box": label.amodal_box,
         "amodal": {"size": list(label.amodal.shape), "counts": encode_mask(label.amodal)},
     }
 

@@ -37,8 +37,8 @@ from .cluster.document import (
     read_cluster as read_cluster,
     require_safe_address as require_safe_address,
 )
+from .cluster.jobs import ChunkSettings as ChunkSettings
 from .cluster.members import (
-    ChunkSettings as ChunkSettings,
     ClusterWorkers as ClusterWorkers,
     code_hash as code_hash,
     deciding_versions as deciding_versions,
@@ -60,7 +60,7 @@ from .cluster.worker_tasks import (
     ChunkAnswers as ChunkAnswers,
     ClusterCall as ClusterCall,
     Supervisor as Supervisor,
-    make_call as make_call,
+    run_task as run_task,
 )
 from .executor import (
     Executor as Executor,
@@ -78,6 +78,7 @@ from .feasibility import (
     PlanFormat as PlanFormat,
     PlanOutput as PlanOutput,
     ReachJudgeFactory as ReachJudgeFactory,
+    plan_into_folder as plan_into_folder,
     plans_document as plans_document,
     reach as reach,
     reach_columns as reach_columns,
@@ -143,6 +144,7 @@ from .grasp_sets.sampling import (
 from .journal import (
     JOURNAL_FILE as JOURNAL_FILE,
     Journal as Journal,
+    JournalIndex as JournalIndex,
     WriterLock as WriterLock,
     decode_verdict as decode_verdict,
     encode_verdict as encode_verdict,
@@ -181,7 +183,6 @@ from .outcome_counts import (
 from .part_store import (
     PARTS_FOLDER as PARTS_FOLDER,
     PartWriter as PartWriter,
-    StoredRun as StoredRun,
     read_journal_tails as read_journal_tails,
 )
 from .replay import (
@@ -194,13 +195,6 @@ from .replay import (
     find_inputs as find_inputs,
     motion_figures as motion_figures,
     rerun as rerun,
-)
-from .report.charts import (
-    HistogramSeries as HistogramSeries,
-    Limit as Limit,
-    interval_mark as interval_mark,
-    mirrored_histogram as mirrored_histogram,
-    nice_step as nice_step,
 )
 from .report.failure_sections import (
     find_causes as find_causes,
@@ -218,6 +212,9 @@ from .report.page_elements import (
     folded_section as folded_section,
     header as header,
     html_page as html_page,
+    interval_mark as interval_mark,
+    nice_step as nice_step,
+    number_cells as number_cells,
     section as section,
     style_sheet as style_sheet,
     table as table,
@@ -225,7 +222,6 @@ from .report.page_elements import (
 )
 from .report.pages import (
     campaign_page as campaign_page,
-    ranked_chart as ranked_chart,
     report_page as report_page,
     write_campaign_report as write_campaign_report,
     write_report as write_report,
@@ -239,12 +235,15 @@ from .report.reproduction import (
     repeat_section as repeat_section,
     reproduce_command as reproduce_command,
 )
+from .result_rows import ResultRows as ResultRows
 from .results_table import (
     RANKING_CLEARANCE_STEP as RANKING_CLEARANCE_STEP,
     TEXT_COLUMNS as TEXT_COLUMNS,
     Columns as Columns,
     RecordedTrial as RecordedTrial,
+    TextValues as TextValues,
     best_rows as best_rows,
+    code_texts as code_texts,
     make_columns as make_columns,
     read_trial as read_trial,
     rows_of as rows_of,
@@ -281,6 +280,7 @@ from .run_folder import (
     REPORT_FILE as REPORT_FILE,
     RUN_FILE as RUN_FILE,
     Run as Run,
+    StoredRun as StoredRun,
     create_run as create_run,
     load_run as load_run,
     require_run_folder as require_run_folder,

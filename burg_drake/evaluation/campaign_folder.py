@@ -10,8 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
-
 from burg_drake.core import (
     InvalidInputError,
     UnknownNameError,
@@ -21,18 +19,19 @@ from burg_drake.core import (
     save_document,
     suggest_names,
 )
-from burg_drake.evaluation.part_store import PARTS_FOLDER, StoredRun, read_rows
+from burg_drake.evaluation.part_store import PARTS_FOLDER, read_rows
 from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
 from burg_drake.evaluation.run_document import CampaignDocument
 from burg_drake.evaluation.run_folder import (
     REPORT_FILE,
     RUN_FILE,
     Run,
+    StoredRun,
     load_run,
     refuse_other_files,
 )
 from burg_drake.evaluation.settings import select_share
-from burg_drake.evaluation.table_parts import StoredRows, frame_of_rows
+from burg_drake.evaluation.table_parts import StoredRows, results_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -98,6 +97,11 @@ class Campaign:
         """Where the runs of the scenes are, begun or not."""
         return [StoredRun(name, self.folder(name)) for name in self.names]
 
+    @property
+    def instances(self) -> list[str]:
+        """Names of the free objects of all scenes."""
+        return self.document.instances
+
     def rows(self, names: Sequence[str] | None = None) -> StoredRows:
         """Columns of all judged grasps, as they lie in the store; `StoredRows.run` is the place of
         each row's scene in `names`.
@@ -105,7 +109,7 @@ class Campaign:
         Raises:
             MissingDependencyError: pyarrow is not installed.
         """
-        return read_rows(self.path, self.places, names, self.document.instances)
+        return read_rows(self, names)
 
     def columns(self, names: Sequence[str] | None = None) -> Columns:
         """Columns of all judged grasps, scene by scene; see `evaluation.results_table`.
@@ -131,7 +135,8 @@ class Campaign:
         Raises:
             MissingDependencyError: pandas or pyarrow is not installed.
         """
-        return frame_of_rows(self.rows(names), self.names)
+        rows = self.rows(names)
+        return results_frame(rows, rows.table.column_names, TEXT_COLUMNS, self.names)
 
     @property
     def failed(self) -> dict[str, str]:
@@ -269,15 +274,10 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
         MissingDependencyError: a run over many scenes without pyarrow.
     """
     found = open_results(path)
-    if isinstance(found, Campaign):
-        return found.columns(names)
-    if (found.path / PARTS_FOLDER).is_dir():
-        rows = read_rows(found.path, [StoredRun("", found.path)], names)
+    if isinstance(found, Run) and (found.path / PARTS_FOLDER).is_dir():
+        rows = read_rows(found, names)
         return rows.columns(rows.table.column_names)
-    table = found.results
-    count = len(table["id"])
-    missing = {name: np.full(count, "" if name in TEXT_COLUMNS else np.nan) for name in names or ()}
-    return table if names is None else {name: {**missing, **table}[name] for name in names}
+    return found.columns(names)
 
 
 LedgerState = Literal["open", "done", "failed", "empty"]

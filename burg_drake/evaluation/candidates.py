@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,12 @@ from burg_drake.core import (
     InvalidInputError,
     UnknownNameError,
     content_hash,
+    distinct_texts,
     list_names,
     quote_value,
     suggest_names,
 )
+from burg_drake.evaluation.settings import select_share
 from burg_drake.scene import Scene
 
 INSTANCE_COLUMN = "instance"
@@ -51,6 +54,43 @@ class Candidate:
     lift: float | None = None
 
 
+class GraspIds(Sequence[str]):
+    """Identifiers of grasps, instance and grasp joined by a hyphen, made when they are asked for.
+
+    Args:
+        instance: (N,) names of the placed objects.
+        grasp: (N,) identifiers of the grasps.
+    """
+
+    def __init__(self, instance: NDArray[np.str_], grasp: NDArray[np.str_]) -> None:
+        self._instance, self._grasp = instance, grasp
+
+    def __len__(self) -> int:
+        return len(self._grasp)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> GraspIds: ...
+
+    def __getitem__(self, index: int | slice) -> str | GraspIds:
+        instance, grasp = self._instance[index], self._grasp[index]
+        return GraspIds(instance, grasp) if isinstance(index, slice) else f"{instance}-{grasp}"
+
+    def __iter__(self) -> Iterator[str]:
+        step = 4096  # Identifiers made at a time.
+        for begin in range(0, len(self), step):
+            part = slice(begin, begin + step)
+            pairs = zip(self._instance[part].tolist(), self._grasp[part].tolist(), strict=True)
+            yield from (f"{instance}-{grasp}" for instance, grasp in pairs)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
 @dataclass(frozen=True, eq=False)
 class Candidates:
     """N grasps on instances of a scene, grouped by instance.
@@ -67,14 +107,42 @@ class Candidates:
         return len(self.grasps)
 
     def __iter__(self) -> Iterator[Candidate]:
-        grasps = zip(self.id, self.instance, self.grasps.X_OG, self.grasps.width, strict=True)
-        for id, instance, X_OG, width in grasps:
-            yield Candidate(id, str(instance), X_OG, width=float(width))
+        return iter(self.at(range(len(self))))
+
+    def __getitem__(self, row: int) -> Candidate:
+        instance, width = str(self.instance[row]), float(self.grasps.width[row])
+        return Candidate(self.id[row], instance, self.grasps.X_OG[row], width=width)
+
+    @property
+    def id(self) -> Sequence[str]:
+        """Identifiers in order: instance and grasp, joined by a hyphen."""
+        return GraspIds(self.instance, self.grasps.id)
+
+    def at(self, rows: Sequence[int] | NDArray[np.int64]) -> Sequence[Candidate]:
+        """The grasps in some rows (M,), each made when it is asked for."""
+        return _ChosenCandidates(self, rows)
+
+    def rows(self, ids: Sequence[str]) -> NDArray[np.int64]:
+        """Rows (M,) of grasps by identifier; -1 for those that are not among them."""
+        hashes, order = self._sorted_hashes
+        wanted = np.fromiter(map(hash, ids), np.int64, len(ids))
+        found = np.full(len(ids), -1, dtype=np.int64)
+        known = self.id
+        for k, place in enumerate(np.searchsorted(hashes, wanted).tolist()):
+            while place < len(order) and hashes[place] == wanted[k]:
+                if known[order[place]] == ids[k]:
+                    found[k] = order[place]
+                    break
+                place += 1
+        return found
 
     @cached_property
-    def id(self) -> list[str]:
-        """Identifiers in order: instance and grasp, joined by a hyphen."""
-        return [f"{i}-{g}" for i, g in zip(self.instance, self.grasps.id, strict=True)]
+    def _sorted_hashes(self) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+        """Hashes of the identifiers in ascending order, and the rows that they are of: 12 bytes a
+        grasp, a tenth of what a dictionary takes."""
+        hashes = np.fromiter(map(hash, self.id), np.int64, len(self))
+        order = np.argsort(hashes, kind="stable").astype(np.uint32)
+        return hashes[order], order
 
     @cached_property
     def content(self) -> str:
@@ -100,6 +168,32 @@ class Candidates:
         return cls(dataclasses.replace(grasps, columns=columns), instance)
 
 
+class _ChosenCandidates(Sequence[Candidate]):
+    """Some of the candidates, see `Candidates.at`."""
+
+    def __init__(self, candidates: Candidates, rows: Sequence[int] | NDArray[np.int64]) -> None:
+        self._candidates, self._rows = candidates, rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> Candidate: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Candidate]: ...
+
+    def __getitem__(self, index: int | slice) -> Candidate | Sequence[Candidate]:
+        if isinstance(index, slice):
+            return _ChosenCandidates(self._candidates, self._rows[index])
+        return self._candidates[int(self._rows[index])]
+
+
+def share_rows(count: int, shard: str) -> NDArray[np.int64]:
+    """Which of so many candidates are in a shard; all of them without one."""
+    return np.array(select_share(range(count), shard), dtype=np.int64)
+
+
 def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates:
     """Candidates from the user's own grasps.
 
@@ -115,7 +209,7 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
     require_instances(scene, grasps)
     for name, grasp_set in grasps.items():
         expected = scene.instance(name).object
-        others = set(grasp_set.object.tolist()) - {expected, ""}
+        others = distinct_texts(grasp_set.object) - {expected, ""}
         if others:
             raise InvalidInputError(
                 f"the grasps given for {name!r} are of object {min(others)!r}, but "
@@ -150,18 +244,17 @@ def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
     """Candidates from grasps by the name of their instance; provenances are kept by instance."""
     if not by_instance:
         return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
-    names = [name for name, grasps in by_instance.items() for _ in range(len(grasps))]
+    counts = {name: len(grasps) for name, grasps in by_instance.items() if len(grasps)}
+    names = np.repeat(np.array([*counts], dtype=str), [*counts.values()])
     grasps = GraspSet.concatenate(by_instance.values())
     parts = dict(zip(by_instance, grasps.provenance["parts"], strict=True))
-    return Candidates(
-        dataclasses.replace(grasps, provenance={"parts": parts}), np.array(names, dtype=str)
-    )
+    return Candidates(dataclasses.replace(grasps, provenance={"parts": parts}), names)
 
 
 def drop_equal_grasps(grasps: GraspSet) -> GraspSet:
     """The first one of equal grasps, in the order that there is."""
     _, first = np.unique(grasps.id, return_index=True)
-    return grasps.select(np.sort(first))
+    return grasps if len(first) == len(grasps) else grasps.select(np.sort(first))
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,14 @@ folder continues where an earlier one stopped.
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core import (
     STARTING_PHASE,
@@ -26,7 +28,6 @@ from burg_drake.core import (
     remove_unfinished,
 )
 from burg_drake.evaluation.campaign_folder import Campaign
-from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
@@ -41,7 +42,7 @@ from burg_drake.evaluation.run_preparation import (
     extend_run,
     finish_run,
     next_round,
-    open_grasps,
+    open_rows,
     open_run,
     require_judged,
     require_sound,
@@ -175,12 +176,10 @@ def _evaluate_one(
     scene = as_scene(scene)
     station, mode = request.station, request.mode
     request.describe_grasps(scene)
-    given = request.given_grasps(scene)
+    given = request.given_candidates(scene)  # refuses what does not fit before the folder is made
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         require_sound(scene, station, mode, request.engine)
-    if given is not None:
-        given_candidates(scene, given)  # refuses what does not fit before the folder is made
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
@@ -188,14 +187,13 @@ def _evaluate_one(
         remove_unfinished(folder)
         retry_failed = request.retry_failed
         while True:
-            left = open_grasps(run, retry_failed=retry_failed)
-            if left:
-                run = _judge_open_grasps(
-                    run, Job(scene.name, make_judge, left), journal, executor, reporter
-                )
+            left = open_rows(run, retry_failed=retry_failed)
+            if len(left):
+                job = Job(scene.name, make_judge, run.candidates.at(left))
+                run = _judge_open_grasps(run, left, job, journal, executor, reporter)
                 require_judged(run)
                 hints = given_hints(run)
-                run = save_run(replace(run, document=replace(run.document, hints=hints)))
+                run = save_run(run.with_document(replace(run.document, hints=hints)))
             more = next_round(run)
             if more is None:
                 break
@@ -207,18 +205,23 @@ def _evaluate_one(
 
 
 def _judge_open_grasps(
-    run: Run, job: Job, journal: Journal, executor: Executor, reporter: Reporter
+    run: Run,
+    left: NDArray[np.int64],
+    job: Job,
+    journal: Journal,
+    executor: Executor,
+    reporter: Reporter,
 ) -> Run:
     """Judges what is left and keeps each verdict at once; returns the run as it is then."""
     total = len(run.mine)
-    done = total - len(job.candidates)
-    again = {grasp.id for grasp in job.candidates}
-    outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
+    done = total - len(left)
+    outcomes = run.index.count_outcomes(left)
     pace = ProgressMeter(
         reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
     )
-    session = begin_session(executor.workers, len(run.verdicts))
-    save_run(Run(run.path, add_session(run.document, session)))
+    session = begin_session(executor.workers, int(run.index.judged.sum()))
+    document = run.document
+    save_run(run.with_document(add_session(document, session)))
     begun = time.monotonic()
     judged = 0
     try:
@@ -228,5 +231,7 @@ def _judge_open_grasps(
                 judged += 1
                 pace.step(outcome=verdict.outcome)
     finally:
-        run = save_run(Run(run.path, add_session(run.document, session.finish(judged, begun))))
+        session = session.finish(judged, begun)
+        document = add_session(document, session)
+        run = save_run(Run(run.path, document).with_candidates(run.candidates))
     return run

@@ -124,6 +124,33 @@ GRASPS_PER_TASK = 4
 """Grasps handed out at a time: few, so that workers finish together."""
 
 
+class GraspQueue:
+    """Grasps that wait, first those that nobody has been asked about.
+
+    Args:
+        fresh: those; a grasp with answers takes memory, so each is made when it is taken.
+    """
+
+    def __init__(self, fresh: Sequence[Candidate] = ()) -> None:
+        self._fresh, self._taken = fresh, 0
+        self._others: deque[Grasp] = deque()
+
+    def __len__(self) -> int:
+        return len(self._fresh) - self._taken + len(self._others)
+
+    def append(self, grasp: Grasp) -> None:
+        """Adds a grasp at the end."""
+        self._others.append(grasp)
+
+    def take(self, n: int) -> tuple[Grasp, ...]:
+        """Takes the first n grasps off, or as many as there are."""
+        begin, end = self._taken, min(self._taken + n, len(self._fresh))
+        self._taken = end
+        fresh = [(self._fresh[k], ScreenAnswers()) for k in range(begin, end)]
+        rest = min(n - len(fresh), len(self._others))
+        return (*fresh, *(self._others.popleft() for _ in range(rest)))
+
+
 class OpenJob:
     """The work that a job has left.
 
@@ -145,11 +172,9 @@ class OpenJob:
             TimeLimit(limits.build, limits.wall),
             limits.false_starts,
         )
-        self.open: deque[Grasp] = deque(
-            (candidate, ScreenAnswers()) for candidate in job.candidates
-        )
+        self.open = GraspQueue(job.candidates)
         self.batches: tuple[int, ...] = ()
-        self.unscreened: list[deque[Grasp]] = []
+        self.unscreened: list[GraspQueue] = []
         self.crashes_in_a_row = 0
         self.failed = False
 
@@ -162,8 +187,8 @@ class OpenJob:
         """Learns of the screens, from the first worker that is ready; all grasps are open then."""
         if not self.unscreened and batches:
             self.batches = batches
-            self.unscreened = [self.open, *(deque() for _ in batches[1:])]
-            self.open = deque()
+            self.unscreened = [self.open, *(GraspQueue() for _ in batches[1:])]
+            self.open = GraspQueue()
 
     def next_work(self) -> tuple[tuple[Grasp, ...], bool]:
         """Grasps to work on, and whether they are screened: all have been through the same screens.
@@ -176,8 +201,8 @@ class OpenJob:
             for k in reversed(range(len(self.batches))):
                 waiting = self.unscreened[k]
                 if len(waiting) >= self.batches[k] or (waiting and not any(self.unscreened[:k])):
-                    return _take_first(waiting, self.batches[k]), True
-        return _take_first(self.open, GRASPS_PER_TASK), False
+                    return waiting.take(self.batches[k]), True
+        return self.open.take(GRASPS_PER_TASK), False
 
     def take_screen_answers(
         self, grasps: Sequence[Grasp], answers: Sequence[ScreenAnswers]
@@ -196,13 +221,8 @@ class OpenJob:
     def give_up(self) -> None:
         """Forgets what is left."""
         self.failed = True
-        self.open.clear()
+        self.open = GraspQueue()
         self.unscreened = []
-
-
-def _take_first(queue: deque[Grasp], n: int) -> tuple[Grasp, ...]:
-    """Takes the first n items off, or as many as there are."""
-    return tuple(queue.popleft() for _ in range(min(n, len(queue))))
 
 
 @dataclass(eq=False)
@@ -302,7 +322,7 @@ class JudgePool:
     def open(self) -> None:
         """Makes the workers' pool if there is none; a process is started when there is work."""
         if self._workers is None:
-            self._workers = WorkerPool(self.count, kept_sessions=2)  # more would take memory
+            self._workers = WorkerPool(self.count)
             self._done = SimpleQueue()
             self.slots = [WorkerSlot(k) for k in range(self.count)]
 
@@ -391,7 +411,8 @@ class JudgePool:
                 job.set_screens(future.result())
         elif given.screening:
             if error is not None:  # each goes through the rest, so that the one to blame is found
-                job.open.extend(given.grasps)
+                for grasp in given.grasps:
+                    job.open.append(grasp)
                 return
             for candidate, verdict in job.take_screen_answers(given.grasps, future.result()):
                 yield job.job, candidate, verdict

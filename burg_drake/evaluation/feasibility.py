@@ -61,7 +61,7 @@ from burg_drake.evaluation.run_identity import (
     setting_differences,
 )
 from burg_drake.evaluation.trial_origin import motion_text, read_motion, without_motion
-from burg_drake.motion import Plan, ReachSettings, Witness
+from burg_drake.motion import ArmPath, Plan, ReachSettings
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import GraspMotion, Station, StationLike, as_station
 
@@ -330,12 +330,44 @@ def reach(
             )
             folder = PlanFolder(Path(output.folder), document)
             factory = ReachJudgeFactory(scene, station, motion, exact, folder)
-            with folder.opened() as journal:
-                known = folder.finished(retry_failed=output.retry_failed)
-                _judge_grasps(candidates, factory, workers, reporter, known, journal)
-                verdicts = folder.verdicts()  # with the digits that a later call will find
+            again = output.retry_failed
+            verdicts = plan_into_folder(
+                folder, candidates, factory, workers, reporter, retry_failed=again
+            )
     rows = [verdicts[id] for id in candidates.id]
     return _add_columns(candidates, rows, scene, station, settings)
+
+
+def plan_into_folder(
+    folder: PlanFolder,
+    candidates: Candidates,
+    factory: ReachJudgeFactory,
+    workers: int | None,
+    reporter: Reporter,
+    *,
+    retry_failed: bool = False,
+) -> dict[str, Verdict]:
+    """Plans what a folder lacks.
+
+    Args:
+        folder: of the plans.
+        candidates: the grasps of the folder.
+        factory: builds the judge that writes into it.
+        workers: number of processes; as many as there are processors if None.
+        reporter: shows the progress.
+        retry_failed: also what an earlier call could not judge.
+
+    Returns:
+        Verdicts by grasp id, with the digits that a later call will find.
+
+    Raises:
+        InvalidInputError: the folder cannot be written, or has plans of something else.
+        SimulationError: the worker processes die.
+    """
+    with folder.opened() as journal:
+        known = folder.finished(retry_failed=retry_failed)
+        _judge_grasps(candidates, factory, workers, reporter, known, journal)
+        return folder.verdicts()
 
 
 def _judge_grasps(
@@ -383,10 +415,10 @@ class ReachJudge:
         self._plans = factory.plans
         self._planner = Planner(arm) if wanted else None
 
-    def _plan(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+    def _plan(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         if self._planner is None or self._plans is None:
             return Decision(Outcome.REACHABLE)
-        assert isinstance(motion, Witness)
+        assert isinstance(motion, ArmPath)
         try:
             plan = self._planner.time(grasp.instance, motion, grasp.width)
             require_name(grasp.id)

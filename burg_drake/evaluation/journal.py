@@ -11,13 +11,20 @@ import json
 import os
 import stat
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from burg_drake.core import (
     InvalidInputError,
+    Outcome,
     RecordedFields,
     Verdict,
     missing_locks_error,
@@ -220,6 +227,105 @@ def journal_lines(
             except (ValueError, KeyError, TypeError, AttributeError):
                 continue
             yield here, id, verdict
+
+
+JUDGED = 3  # Highest value of `JournalIndex.rank`.
+
+
+@dataclass(frozen=True, eq=False)
+class JournalIndex:
+    """Where a journal has the last verdict about each of N grasps, in 11 bytes a grasp.
+
+    Attributes:
+        place: (N,) byte at which its line begins; -1 of grasps without a verdict.
+        outcome: (N,) place in `Outcome`; -1 likewise.
+        interrupted, judged_again: (N,) see `Verdict`.
+    """
+
+    place: NDArray[np.int64]
+    outcome: NDArray[np.int8]
+    interrupted: NDArray[np.bool_]
+    judged_again: NDArray[np.bool_]
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """(N,) which grasps have a verdict."""
+        return self.outcome >= 0
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """(N,) which grasps could not be simulated."""
+        failed: NDArray[np.bool_] = self.outcome == list(Outcome).index(Outcome.SIMULATION_FAILED)
+        return failed
+
+    @property
+    def rank(self) -> NDArray[np.int8]:
+        """(N,) the higher the more a verdict says: `JUDGED` if the trial came to an end, less if it
+        failed, less if its worker was ended from outside, 0 if there is none."""
+        return np.where(
+            self.judged, JUDGED - self.failed - (self.failed & self.interrupted), 0
+        ).astype(np.int8)
+
+    def select(self, rows: NDArray[np.int64]) -> JournalIndex:
+        """The same of some grasps."""
+        return JournalIndex(*(values[rows] for values in vars(self).values()))
+
+    def replace_rows(self, chosen: NDArray[np.bool_], other: JournalIndex) -> None:
+        """Takes some grasps (N,) from another index of the same."""
+        for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine[chosen] = theirs[chosen]
+
+    def count_outcomes(self, without: NDArray[np.int64]) -> Counter[Outcome]:
+        """Numbers of grasps by outcome, but for some rows."""
+        outcome = self.outcome.copy()
+        outcome[without] = -1
+        counts = np.bincount(outcome[outcome >= 0], minlength=len(Outcome)).tolist()
+        return +Counter(dict(zip(Outcome, counts, strict=True)))
+
+    def open(self, *, retry_failed: bool) -> NDArray[np.bool_]:
+        """(N,) grasps without a verdict, and those to be tried again; see `Verdict.is_open`."""
+        again = self.interrupted | self.failed if retry_failed else self.interrupted
+        return ~self.judged | again
+
+
+def index_journal(
+    path: Path, count: int, rows_of: Callable[[Sequence[str]], NDArray[np.int64]]
+) -> JournalIndex:
+    """Reads where the verdicts about grasps are.
+
+    Args:
+        path: of the journal; see `read_journal`.
+        count: N, number of grasps.
+        rows_of: tells the places of grasps by their ids; negative ones are left out.
+    """
+    index = JournalIndex(
+        np.full(count, -1, dtype=np.int64),
+        np.full(count, -1, dtype=np.int8),
+        np.zeros(count, dtype=bool),
+        np.zeros(count, dtype=bool),
+    )
+    outcomes = {outcome: place for place, outcome in enumerate(Outcome)}
+    lines = journal_lines(path)
+    while batch := list(islice(lines, 4096)):
+        rows = rows_of([id for _, id, _ in batch]).tolist()
+        for row, (place, _, verdict) in zip(rows, batch, strict=True):
+            if row >= 0:
+                index.place[row], index.outcome[row] = place, outcomes[verdict.outcome]
+                index.interrupted[row] = verdict.interrupted
+                index.judged_again[row] = bool(verdict.judged_again)
+    return index
+
+
+def read_verdicts(path: Path, places: Sequence[int]) -> list[Verdict]:
+    """The verdicts of the lines of a journal that begin at some bytes."""
+    verdicts: list[Verdict] = []
+    if not places:
+        return verdicts
+    with open_regular(path) as stream:
+        for place in places:
+            stream.seek(place)
+            verdicts.append(decode_verdict(stream.readline(MAX_JOURNAL_LINE))[1])
+    return verdicts
 
 
 def encode_verdict(id: str, verdict: Verdict) -> bytes:

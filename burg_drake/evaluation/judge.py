@@ -31,7 +31,7 @@ from burg_drake.core import (
     report_progress,
 )
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.motion import Plan, Witness
+from burg_drake.motion import ArmPath, Plan
 from burg_drake.scene import Scene
 from burg_drake.station import DRAKE_ENGINES, Engine, GraspMotion, Station
 
@@ -106,7 +106,7 @@ class Decision(Findings):
     """
 
     outcome: Outcome | None = None
-    motion: Witness | Plan | None = field(default=None, compare=False, repr=False, kw_only=True)
+    motion: ArmPath | Plan | None = field(default=None, compare=False, repr=False, kw_only=True)
 
 
 class Screen(NamedTuple):
@@ -123,7 +123,7 @@ class Screen(NamedTuple):
     batch: int
 
 
-Decide = Callable[[Candidate, "Witness | Plan | None"], Decision]
+Decide = Callable[[Candidate, "ArmPath | Plan | None"], Decision]
 """A stage that is asked about one grasp, with the motion that an earlier stage has found for it."""
 
 
@@ -376,7 +376,7 @@ def _reach_decision(answer: Reach, motions: bool) -> Decision:
         margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
         q_grasp=() if answer.q_grasp is None else tuple(answer.q_grasp.tolist()),
         q_pregrasp=() if answer.q_pregrasp is None else tuple(answer.q_pregrasp.tolist()),
-        motion=answer.witness if motions else None,
+        motion=answer.path if motions else None,
     )
 
 
@@ -451,7 +451,7 @@ class HandJudge(StationJudge):
             screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
         super().__init__(screens, [(Stage.EXECUTED, self._execute)])
 
-    def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+    def _execute(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         lift = self._trial.motion.lift_height if grasp.lift is None else grasp.lift
         result = self._trial.run(
             grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
@@ -479,12 +479,12 @@ class ArmJudge(StationJudge):
             [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute)],
         )
 
-    def _time(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
-        assert isinstance(motion, Witness)
+    def _time(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
+        assert isinstance(motion, ArmPath)
         plan = self._planner.time(grasp.instance, motion, grasp.width)
         return Decision(margins={"duration": plan.duration}, motion=plan)
 
-    def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+    def _execute(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         assert isinstance(motion, Plan)
         self.plan = motion
         result = self._trial.run(

@@ -323,13 +323,8 @@ class _CampaignCall:
     def run(self) -> Campaign:
         """Judges what is left."""
         left = [name for name in self.campaign.names if not self._is_done(name)]
-        outputs = SceneOutputs(
-            self.folder,
-            tuple(self.campaign.places),
-            self.campaign.document.instances,
-            self.request.settings.table,
-            self.reports,
-        )
+        campaign = Campaign(self.folder, self.campaign.document)
+        outputs = SceneOutputs(campaign, self.request.settings.table, self.reports)
         with SceneProcesses(Preparer(self.each), outputs, self.executor.workers) as processes:
             if left:
                 self._judge(left, processes)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from burg_drake.core import (
     PACKAGE_URI,
     BurgError,
     InvalidInputError,
-    Outcome,
     Verdict,
     load_document,
     open_regular,
@@ -26,11 +24,15 @@ from burg_drake.core import (
     save_document,
 )
 from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.candidates import Candidates, share_rows
 from burg_drake.evaluation.journal import (
     JOURNAL_FILE,
+    JUDGED,
     MAX_JOURNAL_LINE,
+    JournalIndex,
     encode_verdict,
-    journal_lines,
+    index_journal,
+    read_verdicts,
 )
 from burg_drake.evaluation.run_document import OneRunDocument
 from burg_drake.evaluation.run_folder import (
@@ -42,117 +44,97 @@ from burg_drake.evaluation.run_folder import (
     save_run,
 )
 from burg_drake.evaluation.run_identity import grasp_differences, run_differences
-from burg_drake.evaluation.settings import Shard, select_share
+from burg_drake.evaluation.settings import Shard
 from burg_drake.scene import SceneDocument, save_scene
 from burg_drake.station import StationDocument
 
 
-class VerdictRank:
-    """Ranks of verdicts, of which the highest is taken; 0 stands for none."""
-
-    interrupted = 1  # The worker was ended from outside.
-    failed = 2  # The trial failed.
-    judged = 3  # The trial came to an end.
-
-
 @dataclass(frozen=True, eq=False)
 class JournalChoice:
-    """Which line of which journal is taken for each of N grasps.
+    """Which journal has the verdict that is taken for each of N grasps.
 
     Attributes:
-        worth: (N,) of its verdict; 0 where there is none.
-        source: (N,) which journal.
-        place: (N,) where its line begins there.
+        index: of the verdicts that are taken.
+        source: (N,) which journal each is in.
     """
 
-    worth: NDArray[np.int8]
+    index: JournalIndex
     source: NDArray[np.int32]
-    place: NDArray[np.int64]
-
-    @property
-    def missing(self) -> int:
-        """Grasps without a verdict."""
-        return int((self.worth == 0).sum())
-
-    @property
-    def failed(self) -> int:
-        """Grasps that could not be simulated."""
-        return int(np.isin(self.worth, (VerdictRank.failed, VerdictRank.interrupted)).sum())
-
-    @property
-    def interrupted(self) -> int:
-        """Those of them whose worker was ended from outside."""
-        return int((self.worth == VerdictRank.interrupted).sum())
 
 
-def choose_verdicts(journals: Sequence[Path], ids: Sequence[str]) -> JournalChoice:
-    """Chooses a verdict for each grasp: of equal ones the first.
+def choose_verdicts(
+    journals: Sequence[Path], candidates: Candidates, chosen: NDArray[np.int64]
+) -> JournalChoice:
+    """Chooses a verdict for each grasp: one of a trial goes before one that failed, and that before
+    one whose worker was ended from outside; of equal ones the first is taken.
 
     Args:
         journals: of the runs; in each the last verdict about a grasp counts.
-        ids: (N,) of the grasps.
+        candidates: their grasps.
+        chosen: (N,) rows of those that are merged.
 
     Raises:
         InvalidInputError: two runs have judged a grasp and disagree, other than in time.
     """
-    places = {id: place for place, id in enumerate(ids)}
-    chosen = JournalChoice(
-        np.zeros(len(ids), np.int8), np.zeros(len(ids), np.int32), np.zeros(len(ids), np.int64)
-    )
-    digest = np.zeros(len(ids), np.uint64)
-    for source, journal in enumerate(journals):
-        own = JournalChoice(np.zeros_like(chosen.worth), chosen.source, np.zeros_like(chosen.place))
-        seen = np.zeros_like(digest)
-        for line, id, verdict in journal_lines(journal):
-            if (k := places.get(id)) is not None:
-                own.worth[k], own.place[k] = _verdict_rank(verdict), line
-                seen[k] = _verdict_digest(verdict)
-        both = np.minimum(own.worth, chosen.worth) == VerdictRank.judged
-        for k in np.flatnonzero(both & (seen != digest))[:1].tolist():
-            first = (journals[chosen.source[k]], int(chosen.place[k]))
-            raise _conflict_error(ids[k], first, (journal, int(own.place[k])))
-        better = own.worth > chosen.worth
-        chosen.worth[better] = own.worth[better]
-        chosen.place[better] = own.place[better]
-        chosen.source[better] = source
-        digest[better] = seen[better]
-    return chosen
+    taken: JournalIndex | None = None
+    source = np.zeros(len(chosen), np.int32)
+    for number, journal in enumerate(journals):
+        own = index_journal(journal, len(candidates), candidates.rows).select(chosen)
+        if taken is None:
+            taken = own
+            continue
+        both = (own.rank == JUDGED) & (taken.rank == JUDGED)
+        for known in np.unique(source[both]).tolist():
+            rows = np.flatnonzero(both & (source == known))
+            ids = [candidates.id[row] for row in chosen[rows].tolist()]
+            there = (journals[known], taken.place[rows].tolist())
+            _require_same_verdicts(ids, there, (journal, own.place[rows].tolist()))
+        better = own.rank > taken.rank
+        source[better] = number
+        taken.replace_rows(better, own)
+    assert taken is not None
+    return JournalChoice(taken, source)
 
 
 def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[bytes]:
     """The lines that were chosen, in the order of the grasps."""
-    streams = [open_regular(journal) if journal.exists() else None for journal in journals]
-    try:
-        for k in np.flatnonzero(choice.worth).tolist():
+    with ExitStack() as stack:
+        streams = [stack.enter_context(open_regular(j)) if j.exists() else None for j in journals]
+        for k in np.flatnonzero(choice.index.judged).tolist():
             stream = streams[choice.source[k]]
             assert stream is not None
-            stream.seek(int(choice.place[k]))
+            stream.seek(int(choice.index.place[k]))
             yield stream.readline(MAX_JOURNAL_LINE)
-    finally:
-        for stream in streams:
-            if stream is not None:
-                stream.close()
 
 
-def _verdict_rank(verdict: Verdict) -> int:
-    if verdict.outcome is not Outcome.SIMULATION_FAILED:
-        return VerdictRank.judged
-    return VerdictRank.interrupted if verdict.interrupted else VerdictRank.failed
+def _require_same_verdicts(
+    ids: Sequence[str], first: tuple[Path, list[int]], second: tuple[Path, list[int]]
+) -> None:
+    """Refuses lines of two journals that say other things about a grasp, but for the time.
 
+    Args:
+        ids: (N,) of the grasps.
+        first, second: journals, and where the N lines begin in each.
 
-def _verdict_digest(verdict: Verdict) -> int:
-    """Of all but the time."""
-    data = encode_verdict("", replace(verdict, cpu={}))
-    return int.from_bytes(hashlib.blake2b(data, digest_size=8).digest(), "little")
+    Raises:
+        InvalidInputError: names the first such grasp, and how it ended.
+    """
+    step = 4096  # Lines that are read at a time.
+    for begin in range(0, len(ids), step):
+        part = slice(begin, begin + step)
+        pairs = zip(*(read_verdicts(path, at[part]) for path, at in (first, second)), strict=True)
+        for id, (a, b) in zip(ids[part], pairs, strict=True):
+            a, b = replace(a, cpu={}), replace(b, cpu={})
+            if encode_verdict(id, a) != encode_verdict(id, b):
+                raise _conflict_error(id, (first[0], a), (second[0], b))
 
 
 def _conflict_error(
-    id: str, first: tuple[Path, int], second: tuple[Path, int]
+    id: str, first: tuple[Path, Verdict], second: tuple[Path, Verdict]
 ) -> InvalidInputError:
-    a, b = (next(journal_lines(journal, place))[2] for journal, place in (first, second))
-    there, here = (vars(replace(verdict, cpu={})) for verdict in (a, b))
-    names = [name for name in there if str(there[name]) != str(here[name])]
-    how = f"{a.outcome.value} in {first[0].parent} and {b.outcome.value} in {second[0].parent}"
+    (there, a), (here, b) = first, second
+    names = [name for name in vars(a) if str(vars(a)[name]) != str(vars(b)[name])]
+    how = f"{a.outcome.value} in {there.parent} and {b.outcome.value} in {here.parent}"
     if "outcome" not in names:
         how += f", with other values of {', '.join(names)}"
     return InvalidInputError(
@@ -186,9 +168,9 @@ def write_merged(
             differences = differences or grasp_differences(there.grasps, here.grasps)
             require_mergeable(first, run, differences)
     shard = common_shard(runs) if shard is None else shard
-    ids = select_share(first.candidates.id, shard)
+    candidates = first.candidates
     journals = [run.path / JOURNAL_FILE for run in runs]
-    choice = choose_verdicts(journals, ids)
+    choice = choose_verdicts(journals, candidates, share_rows(len(candidates), shard))
     shutil.copyfile(first.path / GRASPS_FILE, staging / GRASPS_FILE)
     with (staging / JOURNAL_FILE).open("wb") as stream:
         stream.writelines(chosen_lines(journals, choice))

@@ -21,11 +21,11 @@ from burg_drake.core import (
     list_names,
     wilson_interval,
 )
-from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.results_table import Columns, TextValues
 
 
-def member_codes(values: NDArray[np.str_], members: Sequence[str]) -> NDArray[np.int8]:
-    """Place of each value (N,) among the members, by one comparison of all rows a member.
+def member_codes(values: TextValues, members: Sequence[str]) -> NDArray[np.int8]:
+    """Place of each value (N,) among the members.
 
     Args:
         values: (N,) texts.
@@ -34,48 +34,11 @@ def member_codes(values: NDArray[np.str_], members: Sequence[str]) -> NDArray[np
     Raises:
         InvalidInputError: a value is none of them.
     """
-    codes = np.full(len(values), -1, dtype=np.int8)
-    left = len(values)
-    for place, member in enumerate(members):
-        if not left:
-            break
-        mine = values == str(member)
-        codes[mine] = place
-        left -= int(np.count_nonzero(mine))
-    if left:
-        strange = sorted({str(value) for value in values[codes < 0]})
-        raise InvalidInputError(
-            f"{list_names(strange)}: expected one of {list_names(list(map(str, members)))}"
-        )
-    return codes
-
-
-@dataclass(frozen=True, eq=False)
-class TextValues:
-    """A column of texts, each different one once.
-
-    Attributes:
-        codes: (N,) which text each row has.
-        names: the texts.
-    """
-
-    codes: NDArray[np.integer]
-    names: Sequence[str]
-
-    def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
-        """The most frequent texts of some rows, with how often; empty ones do not count."""
-        counts = np.bincount(self.codes[rows], minlength=len(self.names))
-        ranked = np.argsort(-counts, kind="stable").tolist()
-        found = [(self.names[k], int(counts[k])) for k in ranked if counts[k] and self.names[k]]
-        return tuple(found[:most])
-
-
-def code_texts(values: NDArray[np.str_]) -> TextValues:
-    """A column (N,) of few different texts."""
-    texts = values.tolist()
-    places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
-    codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
-    return TextValues(codes, tuple(places))
+    places = {str(member): place for place, member in enumerate(members)}
+    if strange := sorted({*values.names} - {*places}):
+        raise InvalidInputError(f"{list_names(strange)}: expected one of {list_names([*places])}")
+    codes: NDArray[np.int8] = np.array([places[n] for n in values.names], dtype=np.int8)
+    return codes.take(values.codes)
 
 
 @dataclass(frozen=True)

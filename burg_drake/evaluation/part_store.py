@@ -9,13 +9,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from burg_drake.core import INSTANCE_PREFIXES, Outcome, open_regular, remove_unfinished
 from burg_drake.evaluation.journal import JOURNAL_FILE, read_journal
-from burg_drake.evaluation.run_folder import Run, load_run
+from burg_drake.evaluation.result_rows import CHUNK_ROWS
+from burg_drake.evaluation.results_table import make_columns
+from burg_drake.evaluation.run_folder import Run, StoredRun, load_run
 from burg_drake.evaluation.table_parts import (
     CANDIDATE_COLUMN,
     JournalSegment,
@@ -38,22 +40,23 @@ from burg_drake.evaluation.table_parts import (
 PARTS_FOLDER = "parts"
 
 
-@dataclass(frozen=True)
-class StoredRun:
-    """A run whose rows are wanted.
+class StoredResults(Protocol):
+    """A run of one scene or of many, whose rows are kept in parts.
 
     Attributes:
-        scene: name by which parts know it; empty where the run is alone.
-        folder: of the run.
+        path: its folder, which has the parts.
+        places: the runs of its scenes, in the order of their rows.
+        instances: names of the free objects of all of them, for which all parts have columns.
     """
 
-    scene: str
-    folder: Path
+    @property
+    def path(self) -> Path: ...
 
     @property
-    def journal(self) -> Path:
-        """Its journal."""
-        return self.folder / JOURNAL_FILE
+    def places(self) -> Sequence[StoredRun]: ...
+
+    @property
+    def instances(self) -> Sequence[str]: ...
 
 
 @dataclass(eq=False)
@@ -97,27 +100,20 @@ class PartIndex:
         return found
 
 
-def read_rows(
-    folder: Path,
-    places: Sequence[StoredRun],
-    names: Sequence[str] | None,
-    instances: Sequence[str] = (),
-) -> StoredRows:
-    """Columns of the judged grasps of runs.
+def read_rows(run: StoredResults, names: Sequence[str] | None) -> StoredRows:
+    """Columns of the judged grasps of a run.
 
     Args:
-        folder: that has the parts.
-        places: the runs, in the order of their rows.
-        names: of the columns; all if None. What a run does not have is null.
-        instances: names of the free objects of all runs, for which all have columns.
+        run: the run.
+        names: of the columns; all if None. What a scene does not have is null.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
         BurgError: a run cannot be read.
     """
-    index = PartIndex.of(folder)
+    index = PartIndex.of(run.path)
     while True:
-        found = _read_tables(index, places, names, instances)
+        found = _read_tables(index, run, names)
         if isinstance(found, StoredRows):
             return found
         index.drop(found)
@@ -126,10 +122,17 @@ def read_rows(
 def segment_table(run: Run, begin: int, end: int) -> Any:
     """The rows of a stretch of a run's journal, in the order of the candidates."""
     verdicts = read_journal(run.path / JOURNAL_FILE, begin, end)
-    ids = run.candidates.id
-    places = [place for place, id in enumerate(ids) if id in verdicts]
-    part = run.with_verdicts({ids[place]: verdicts[ids[place]] for place in places})
-    return arrow_table({**part.results, CANDIDATE_COLUMN: np.array(places, dtype=np.int64)})
+    rows = run.candidates.rows(list(verdicts))
+    order = np.argsort(rows)
+    order = order[rows[order] >= 0]
+    found = list(verdicts.values())
+    tables = []
+    for begin in range(0, max(1, len(order)), CHUNK_ROWS):
+        chosen = order[begin : begin + CHUNK_ROWS]
+        judged = [found[k] for k in chosen.tolist()]
+        columns = make_columns(run.candidates, rows[chosen], judged, **run.table_settings)
+        tables.append(arrow_table({**columns, CANDIDATE_COLUMN: rows[chosen]}))
+    return require_arrow("a columnar table").concat_tables(tables)
 
 
 def merge_tables(tables: Sequence[Any]) -> Any:
@@ -143,23 +146,20 @@ def merge_tables(tables: Sequence[Any]) -> Any:
 
 
 def _read_tables(
-    index: PartIndex,
-    places: Sequence[StoredRun],
-    names: Sequence[str] | None,
-    instances: Sequence[str],
+    index: PartIndex, run: StoredResults, names: Sequence[str] | None
 ) -> StoredRows | TablePart:
     """The rows, or a part that is damaged."""
     arrow = require_arrow("reading the results of many grasps")
     segments = index.segments()
     pieces: list[list[tuple[TablePart, int, int]]] = []
     tails: list[Any | None] = []
-    for place in places:
+    for place in run.places:
         mine = segments.get(place.scene, [])
         found = valid_segments([segment for segment, _, _ in mine], place.journal)
         where = {segment: (part, row, segment.rows) for segment, part, row in mine}
         pieces.append([where[segment] for segment in found])
         tail = _read_tail(place, found[-1].end if found else 0)
-        tails.append(None if tail is None else with_instances(tail, instances))
+        tails.append(None if tail is None else with_instances(tail, run.instances))
     used = {part.path: part for piece in pieces for part, _, _ in piece}
     if names is None:
         names = _all_names(list(used.values()), tails)
@@ -244,29 +244,22 @@ def with_instances(table: Any, instances: Sequence[str]) -> Any:
 
 PART_ROWS = 50_000
 """Rows of a part: few enough to be made in a second or two, enough that parts are few."""
-BATCH_BYTES = 32 << 20
+BATCH_BYTES = 8 << 20
 """Bytes of a journal whose rows are made at a time; a row has some hundred."""
 
 
 class PartWriter:
     """Writes parts; one process at a time, the one that has the run."""
 
-    def __init__(self, folder: Path, places: Sequence[StoredRun], instances: Sequence[str]) -> None:
-        """Looks at what is there, and removes what is damaged or does not hold any more.
-
-        Args:
-            folder: of the run.
-            places: all runs whose rows are kept here.
-            instances: names of the free objects of all of them, so that all parts have the same
-                columns.
-        """
-        self._folder = folder / PARTS_FOLDER
-        self._instances = list(instances)
+    def __init__(self, run: StoredResults) -> None:
+        """Looks at what is there, and removes what is damaged or does not hold any more."""
+        self._folder = run.path / PARTS_FOLDER
+        self._instances = list(run.instances)
         self._pending: list[tuple[Any, JournalSegment]] = []
-        self._places = {place.scene: place for place in places}
+        self._places = {place.scene: place for place in run.places}
         self._folder.mkdir(parents=True, exist_ok=True)
         remove_unfinished(self._folder)
-        self._index = PartIndex.of(folder)
+        self._index = PartIndex.of(run.path)
         for path in self._index.damaged:
             path.unlink(missing_ok=True)
         self._ends: dict[str, int] = {}
@@ -382,12 +375,12 @@ def keep_parts(run: Run) -> None:
     installed."""
     if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
         return
-    update_parts(run.path, [StoredRun("", run.path)], ())
+    update_parts(run)
 
 
-def update_parts(folder: Path, places: Sequence[StoredRun], instances: Sequence[str]) -> None:
-    """Writes what the journals of runs have beyond the parts; see `PartWriter`."""
-    writer = PartWriter(folder, places, instances)
+def update_parts(run: StoredResults) -> None:
+    """Writes what the journals of a run have beyond the parts; see `PartWriter`."""
+    writer = PartWriter(run)
     writer.catch_up()
     writer.close()
 
@@ -460,21 +453,16 @@ class JournalTail:
                 self.failed.add(id)
 
 
-def read_journal_tails(folder: Path, places: Sequence[StoredRun]) -> dict[str, JournalTail]:
-    """What the parts of a run know of its journals, by scene.
-
-    Args:
-        folder: that has the parts.
-        places: the runs.
-    """
-    tails = {place.scene: JournalTail(place.journal) for place in places}
-    if not (folder / PARTS_FOLDER).is_dir() or find_spec("pyarrow") is None:
+def read_journal_tails(run: StoredResults) -> dict[str, JournalTail]:
+    """What the parts of a run know of its journals, by scene."""
+    tails = {place.scene: JournalTail(place.journal) for place in run.places}
+    if not (run.path / PARTS_FOLDER).is_dir() or find_spec("pyarrow") is None:
         return tails
-    index = PartIndex.of(folder)
+    index = PartIndex.of(run.path)
     names = ["id", "outcome", CANDIDATE_COLUMN]
     tables: dict[Path, Any] = {part.path: read_part(part, names) for part in index.parts}
     segments = index.segments()
-    for place in places:
+    for place in run.places:
         where = {s: (part, row) for s, part, row in segments.get(place.scene, [])}
         found = valid_segments(list(where), place.journal)
         whole = [segment for segment in found if tables[where[segment][0].path] is not None]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +164,9 @@ def _read_number(row: Mapping[str, Any], name: str, where: str) -> float:
         raise InvalidInputError(f"{where}: {name} is {quote_value(value)}, not a number") from error
 
 
-Columns = dict[str, NDArray[Any]]
+T = TypeVar("T")
+ColumnValues = NDArray[Any]
+Columns = dict[str, ColumnValues]
 
 TEXT_COLUMNS = (
     *("id", "instance", "object"),
@@ -175,43 +178,93 @@ TEXT_COLUMNS = (
 """Columns of texts."""
 
 
+class TextValues(NamedTuple):
+    """A column of texts, each different one once.
+
+    Attributes:
+        codes: (N,) which text each row has.
+        names: the texts.
+    """
+
+    codes: NDArray[Any]
+    names: Sequence[str]
+
+    def equal(self, text: str) -> NDArray[np.bool_]:
+        """(N,) which rows have a text."""
+        equal: NDArray[np.bool_] = self.codes == self.place(text)
+        return equal
+
+    def place(self, text: str) -> int:
+        """Which of the texts it is; -1 if it is none of them."""
+        return self.names.index(text) if text in self.names else -1
+
+    def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
+        """The most frequent texts of some rows, with how often; empty ones do not count."""
+        counts = np.bincount(self.codes[rows], minlength=len(self.names))
+        ranked = np.argsort(-counts, kind="stable").tolist()
+        found = [(self.names[k], int(counts[k])) for k in ranked if counts[k] and self.names[k]]
+        return tuple(found[:most])
+
+
+def code_texts(values: NDArray[np.str_]) -> TextValues:
+    """A column (N,) of few different texts."""
+    texts = values.tolist()
+    places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
+    codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
+    return TextValues(codes, tuple(places))
+
+
 def make_columns(
     candidates: Candidates,
-    verdicts: Mapping[str, Verdict],
+    rows: NDArray[np.int64],
+    verdicts: Sequence[Verdict],
     origin: TrialOrigin,
     *,
     instances: Sequence[str],
     joints: int = 0,
 ) -> Columns:
-    """The table of all grasps that are judged, in the order of the candidates.
+    """The table of judged grasps.
 
     Args:
-        candidates: the grasps.
-        verdicts: by grasp id; grasps without one are left out.
+        candidates: all grasps of a run.
+        rows: (N,) the judged ones among them.
+        verdicts: what became of each.
         origin: what made them.
         instances: names of the scene's free objects.
         joints: number of the arm's joints, 0 without an arm.
     """
+    grasps = grasp_columns(candidates, rows)
+    return arrange_columns(grasps, verdicts, origin, instances=instances, joints=joints)
+
+
+def grasp_columns(
+    candidates: Candidates, rows: NDArray[np.int64], names: Sequence[str] | None = None
+) -> Columns:
+    """Those columns of `make_columns` that do not depend on verdicts; all, or some by name."""
     grasps = candidates.grasps
-    judged = [i for i, id in enumerate(candidates.id) if id in verdicts]
-    trials = [
-        RecordedTrial(
-            id=candidates.id[i],
-            instance=str(candidates.instance[i]),
-            object=str(grasps.object[i]),
-            X_OG=grasps.X_OG[i],
-            width=float(grasps.width[i]),
-            score=float(grasps.score[i]),
-            verdict=verdicts[candidates.id[i]],
-        )
-        for i in judged
-    ]
-    columns = trial_columns(trials, origin, instances=instances, joints=joints)
-    return columns | {
+    X_OG = grasps.X_OG[rows]
+    poses: Columns = {}
+
+    def pose_column(name: str) -> ColumnValues:
+        poses.update(poses or pose_columns(X_OG))
+        return poses[name]
+
+    def input_column(name: str) -> ColumnValues:
+        values = grasps.columns[name][rows]
         # truth values become 1 and 0, which every reader takes for numbers
-        INPUT_PREFIX + name: v[judged].astype(np.int64) if v.dtype.kind == "b" else v[judged]
-        for name, v in grasps.columns.items()
+        return values.astype(np.int64) if values.dtype.kind == "b" else values
+
+    known: dict[str, Callable[[], ColumnValues]] = {
+        "id": lambda: _text_column([candidates.id[row] for row in rows.tolist()]),
+        "instance": lambda: _text_column(candidates.instance[rows].tolist()),
+        "object": lambda: _text_column(grasps.object[rows].tolist()),
+        "width": lambda: grasps.width[rows],
+        "score": lambda: grasps.score[rows],
+        **{name: partial(pose_column, name) for name in ("x", "y", "z", "qw", "qx", "qy", "qz")},
+        "X_OG": lambda: _text_column([pose_text(X) for X in X_OG]),
+        **{INPUT_PREFIX + name: partial(input_column, name) for name in grasps.columns},
     }
+    return {name: known[name]() for name in names or known}
 
 
 def trial_columns(
@@ -225,33 +278,57 @@ def trial_columns(
     rows = [t.verdict for t in trials if t.verdict is not None]
     if len(rows) != len(trials):
         raise ValueError("a table is made of judged trials only")
+    numbers = ("width", "score", "friction", "mass")
+    grasps: Columns = {
+        **{n: _text_column([getattr(t, n) for t in trials]) for n in ("id", "instance", "object")},
+        **{n: _number_column([getattr(t, n) for t in trials]) for n in numbers},
+        **pose_columns(np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)),
+        "X_OG": _text_column([pose_text(t.X_OG) for t in trials]),
+    }
+    return arrange_columns(grasps, rows, origin, instances=instances, joints=joints)
+
+
+def arrange_columns(
+    grasps: Mapping[str, T],
+    verdicts: Sequence[Verdict],
+    origin: TrialOrigin,
+    *,
+    instances: Sequence[str],
+    joints: int = 0,
+) -> dict[str, T | ColumnValues]:
+    """The columns of a table in their order.
+
+    Args:
+        grasps: what is known of N grasps, by the names of `grasp_columns`, and friction and mass
+            where they are not the library's.
+        verdicts: what became of each.
+        origin, instances, joints: see `make_columns`.
+    """
     approach = bool(origin.trial.get("approach"))
     shape = TableShape(origin.mode, instances, joints, approach)
-    X_OG = np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)
-    columns: Columns = {
-        **{n: _text_column([getattr(t, n) for t in trials]) for n in ("id", "instance", "object")},
-        **columns_of_verdicts(rows, "decided", shape),
-        **{name: _number_column([getattr(t, name) for t in trials]) for name in ("width", "score")},
-        **pose_columns(X_OG),
-        **columns_of_verdicts(rows, "measured", shape),
-        **{
-            name: _number_column([getattr(t, name) for t in trials])
-            for name in ("friction", "mass")
-        },
-        **columns_of_verdicts(rows, "posture", shape),
-    }
-    columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
-    judges = [verdict.judged_again for verdict in rows]
+    count = len(verdicts)
+    judges = [verdict.judged_again for verdict in verdicts]
     origins = {name: origin.judged_by(name) for name in {*judges, ""}}
     labels = {name: engine_label(one.engine) for name, one in origins.items()}
-    columns["engine"] = _judge_column(labels, judges)
-    columns["run"] = _constant_column(origin.run, len(rows))
-    columns |= columns_of_verdicts(rows, "cost", shape)
     cells = {name: one.cells() for name, one in origins.items()}
-    for name in ORIGIN_TEXT:
-        columns[name] = _judge_column({judge: cells[judge][name] for judge in cells}, judges)
-    columns["X_OG"] = _text_column([pose_text(t.X_OG) for t in trials])
-    return columns
+    texts = {name: {judge: cells[judge][name] for judge in cells} for name in ORIGIN_TEXT}
+    own = ("friction", "mass")
+    named = ("id", "instance", "object", "X_OG", *own)
+    return {
+        **{name: grasps[name] for name in named[:3]},
+        **columns_of_verdicts(verdicts, "decided", shape),
+        **{n: v for n, v in grasps.items() if n not in named and not n.startswith(INPUT_PREFIX)},
+        **columns_of_verdicts(verdicts, "measured", shape),
+        **{name: grasps.get(name, np.full(count, np.nan)) for name in own},
+        **columns_of_verdicts(verdicts, "posture", shape),
+        "seed": np.full(count, origin.seed, dtype=np.int64),
+        "engine": _judge_column(labels, judges),
+        "run": _constant_column(origin.run, count),
+        **columns_of_verdicts(verdicts, "cost", shape),
+        **{name: _judge_column(texts[name], judges) for name in ORIGIN_TEXT},
+        "X_OG": grasps["X_OG"],
+        **{name: values for name, values in grasps.items() if name.startswith(INPUT_PREFIX)},
+    }
 
 
 def pose_columns(X_OG: Array) -> Columns:
@@ -304,7 +381,8 @@ def contested_rows(confidence: Array, settled: NDArray[np.bool_]) -> NDArray[np.
         confidence: (N,) NaN where there is none.
         settled: (N,) whether another engine has judged again.
     """
-    return (np.nan_to_num(confidence, nan=1.0) < CONTESTED_CONFIDENCE) & ~settled
+    contested: NDArray[np.bool_] = (confidence < CONTESTED_CONFIDENCE) & ~settled  # not NaN
+    return contested
 
 
 RANKING_CLEARANCE_STEP = 5e-4
@@ -312,7 +390,11 @@ RANKING_CLEARANCE_STEP = 5e-4
 
 
 def best_rows(
-    columns: Columns, count: int = 1, *, each: bool = False, only: Iterable[str] | None = None
+    columns: Mapping[str, ColumnValues],
+    count: int = 1,
+    *,
+    each: bool = False,
+    only: Iterable[str] | None = None,
 ) -> list[int]:
     """Indices of the lifted grasps that can be trusted most, best first; fewer if fewer were
     lifted.
@@ -335,8 +417,11 @@ def best_rows(
     Raises:
         UnknownNameError: the table has no such object or instance.
     """
-    chosen = rows_of_names(only, "the table", columns["object"], columns["instance"])
-    lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & chosen)
+    chosen = columns["outcome"] == Outcome.LIFTED
+    if only:
+        only = list(only)
+        chosen &= rows_of_names(only, "the table", columns["object"], columns["instance"])
+    lifted = np.flatnonzero(chosen)
     lifted = _clearest_rows(columns, lifted, count, each=each)
     room = _clearance_steps(columns, lifted)
     penalty = (
@@ -359,7 +444,7 @@ def best_rows(
     ]
 
 
-def _clearance_steps(columns: Columns, rows: NDArray[np.int64]) -> Array:
+def _clearance_steps(columns: Mapping[str, ColumnValues], rows: NDArray[np.int64]) -> Array:
     """Clearances of some rows in whole steps; those of contested ones are behind all others."""
     max_steps = 1e6  # More steps of clearance than any grasp has.
     clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
@@ -372,7 +457,7 @@ def _clearance_steps(columns: Columns, rows: NDArray[np.int64]) -> Array:
 
 
 def _clearest_rows(
-    columns: Columns, rows: NDArray[np.int64], count: int, *, each: bool
+    columns: Mapping[str, ColumnValues], rows: NDArray[np.int64], count: int, *, each: bool
 ) -> NDArray[np.int64]:
     """Those of some rows that can be among the first `count`, of each object or of all together:
     the others have less room than so many. To rank a million takes seconds."""

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core import (
     InvalidInputError,
-    Outcome,
     UnknownNameError,
     Verdict,
     ensure_writable_folder,
@@ -23,13 +23,21 @@ from burg_drake.core import (
     resolve_reference,
     save_document,
 )
-from burg_drake.evaluation.candidates import Candidate, Candidates
-from burg_drake.evaluation.journal import JOURNAL_FILE as JOURNAL_FILE, read_journal
+from burg_drake.evaluation.candidates import Candidate, Candidates, share_rows
+from burg_drake.evaluation.journal import (
+    JOURNAL_FILE as JOURNAL_FILE,
+    JournalIndex,
+    index_journal,
+    journal_lines,
+    read_journal,
+    read_verdicts,
+)
+from burg_drake.evaluation.result_rows import ResultRows
 from burg_drake.evaluation.results_table import (
     Columns,
     RecordedTrial,
     best_rows,
-    make_columns,
+    contested_rows,
     table_row,
     unknown_grasp_error,
 )
@@ -47,6 +55,24 @@ SCENE_FILE = "scene.yaml"
 STATION_FILE = "station.yaml"
 GRASPS_FILE = "grasps.npz"
 REPORT_FILE = "report.html"
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run whose rows are wanted.
+
+    Attributes:
+        scene: name by which parts know it; empty where the run is alone.
+        folder: of the run.
+    """
+
+    scene: str
+    folder: Path
+
+    @property
+    def journal(self) -> Path:
+        """Its journal."""
+        return self.folder / JOURNAL_FILE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +95,7 @@ class Run:
 
     def __repr__(self) -> str:
         scene, count = self.document.scene.name, self.document.grasps.count
-        judged = len(read_journal(self.path / JOURNAL_FILE))  # `verdicts` would keep them
+        judged = len({id for _, id, _ in journal_lines(self.path / JOURNAL_FILE)})
         return f"Run({str(self.path)!r}, scene {scene!r}, {judged} of {count} grasps judged)"
 
     @cached_property
@@ -79,18 +105,41 @@ class Run:
 
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:
-        """What the journal holds, by grasp id."""
+        """What the journal holds, by grasp id; a verdict takes a kilobyte of memory."""
         return read_journal(self.path / JOURNAL_FILE)
 
+    @cached_property
+    def index(self) -> JournalIndex:
+        """What the journal holds about each of the candidates, in short."""
+        candidates = self.candidates
+        return index_journal(self.path / JOURNAL_FILE, len(candidates), candidates.rows)
+
     @property
-    def mine(self) -> list[str]:
+    def mine(self) -> Sequence[str]:
         """Ids of the grasps that are judged here: all, or those of a shard."""
-        return list(select_share(self.candidates.id, self.document.shard))
+        return select_share(self.candidates.id, self.document.shard)
+
+    @property
+    def is_mine(self) -> NDArray[np.bool_]:
+        """(N,) which candidates are judged here."""
+        mine = np.zeros(len(self.candidates), dtype=bool)
+        mine[share_rows(len(mine), self.document.shard)] = True
+        return mine
+
+    @property
+    def left(self) -> NDArray[np.int64]:
+        """Rows of the candidates that are judged here and have no verdict yet."""
+        return np.flatnonzero(self.is_mine & ~self.index.judged)
 
     @property
     def complete(self) -> bool:
         """Whether every grasp that is judged here is judged."""
-        return all(id in self.verdicts for id in self.mine)
+        return not len(self.left)
+
+    @property
+    def places(self) -> list[StoredRun]:
+        """Where the run of its one scene is; see `Campaign.places`."""
+        return [StoredRun("", self.path)]
 
     @property
     def table_path(self) -> Path:
@@ -102,17 +151,41 @@ class Run:
         """The report."""
         return self.path / REPORT_FILE
 
+    def rows(self, names: Sequence[str] | None = None) -> ResultRows:
+        """Judged grasps in the order of the candidates, in little memory: all columns, whichever
+        are named; see `Campaign.rows`."""
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> ResultRows:
+        journal, index = self.path / JOURNAL_FILE, self.index
+        return ResultRows.of(
+            self.candidates,
+            np.flatnonzero(index.judged),
+            lambda rows: read_verdicts(journal, index.place[rows].tolist()),
+            **self.table_settings,
+        )
+
     @cached_property
     def results(self) -> Columns:
-        """Judged grasps as columns, see `evaluation.results_table`, in the order of the
-        candidates."""
-        return make_columns(
-            self.candidates,
-            self.verdicts,
-            origin_of(self.document),
-            instances=self.instances,
-            joints=self._joints,
-        )
+        """The same as columns, see `evaluation.results_table`."""
+        return dict(self.rows())
+
+    def columns(self, names: Sequence[str] | None = None) -> Columns:
+        """Columns of the judged grasps.
+
+        Args:
+            names: of the columns; all if None. What the run does not have is NaN, or empty texts.
+        """
+        return {
+            name: self.rows().column(name) for name in (self.rows() if names is None else names)
+        }
+
+    @property
+    def table_settings(self) -> dict[str, Any]:
+        """Arguments of `make_columns` that do not depend on the grasps."""
+        origin = origin_of(self.document)
+        return {"origin": origin, "instances": self.instances, "joints": self._joints}
 
     def frame(self, names: Sequence[str] | None = None) -> pandas.DataFrame:
         """Judged grasps as a data frame; see `evaluation.table_parts`.
@@ -122,38 +195,48 @@ class Run:
 
         Raises:
             MissingDependencyError: pandas is not installed.
+            KeyError: the run has no such column.
         """
-        from burg_drake.evaluation.table_parts import frame_of_columns
+        from burg_drake.evaluation.table_parts import results_frame
 
-        return frame_of_columns(self.results, names)
+        rows = self.rows()
+        texts = [name for name in rows if rows.is_text(name)]
+        return results_frame(rows, list(names or rows), texts)
 
-    def with_verdicts(self, verdicts: dict[str, Verdict]) -> Run:
-        """The same run as if only these grasps had been judged."""
-        part = Run(self.path, self.document)
-        part.__dict__.update(
-            candidates=self.candidates,
-            verdicts=verdicts,
-            instances=self.instances,
-            _joints=self._joints,
-        )
-        return part
+    def with_candidates(self, candidates: Candidates) -> Run:
+        """The same run, which need not read its candidates."""
+        run = Run(self.path, self.document)
+        run.__dict__["candidates"] = candidates
+        return run
+
+    def with_document(self, document: RunDocument) -> Run:
+        """The same run with another document about the same grasps; what was read is kept."""
+        run = Run(self.path, document)
+        run.__dict__.update(self.__dict__ | {"document": document})
+        return run
 
     @property
     def failures(self) -> list[str]:
         """Ids of the grasps that could not be simulated."""
-        failed = self.results["outcome"] == Outcome.SIMULATION_FAILED
-        return [str(id) for id in self.results["id"][failed]]
+        return self._ids(self.index.failed)
 
     @property
     def interrupted(self) -> list[str]:
         """Ids of those whose worker process was ended from outside; `evaluate` tries them again."""
-        return [id for id in self.failures if self.verdicts[id].interrupted]
+        return self._ids(self.index.failed & self.index.interrupted)
 
     @property
     def contested(self) -> list[str]:
         """Ids of the executed grasps whose verdict is contested, see `Verdict.contested`."""
-        verdicts = self.verdicts
-        return [id for id in self.mine if id in verdicts and verdicts[id].contested]
+        rows = self.rows()
+        settled = self.index.judged_again[rows.places]
+        contested = np.zeros(len(self.candidates), dtype=bool)
+        contested[rows.places] = contested_rows(rows["confidence"], settled)
+        return self._ids(contested & self.is_mine)
+
+    def _ids(self, chosen: NDArray[np.bool_]) -> list[str]:
+        ids = self.candidates.id
+        return [ids[row] for row in np.flatnonzero(chosen).tolist()]
 
     def row(self, id: str) -> dict[str, Any]:
         """One row of the results.
@@ -161,10 +244,12 @@ class Run:
         Raises:
             UnknownNameError: no judged grasp goes by this id; the message names the nearest.
         """
-        (found,) = np.nonzero(self.results["id"] == id)
-        if not len(found):
+        (place,) = self.candidates.rows([id]).tolist()
+        rows = self.rows()
+        found = np.flatnonzero(rows.places == place)
+        if place < 0 or not len(found):
             raise self._unknown(id)
-        return table_row(self.results, found[0])
+        return table_row(rows.columns(list(rows), found), 0)
 
     def candidate(self, id: str) -> Candidate:
         """One grasp, judged or not, with its pose as it was judged, bit for bit.
@@ -172,10 +257,10 @@ class Run:
         Raises:
             UnknownNameError: the run has no such grasp; the message names the nearest.
         """
-        found = next((c for c in self.candidates if c.id == id), None)
-        if found is None:
+        (row,) = self.candidates.rows([id]).tolist()
+        if row < 0:
             raise self._unknown(id)
-        return found
+        return self.candidates[row]
 
     def trial(self, id: str) -> RecordedTrial:
         """One grasp, judged or not, with its verdict.
@@ -184,13 +269,14 @@ class Run:
             UnknownNameError: the run has no such grasp; the message names the nearest.
         """
         candidate = self.candidate(id)
-        verdict = self.verdicts.get(id)
+        place = int(self.index.place[self.candidates.rows([id])[0]])
+        found = read_verdicts(self.path / JOURNAL_FILE, [place] if place >= 0 else [])
         return RecordedTrial(
             id=id,
             instance=candidate.instance,
             X_OG=candidate.X_OG,
             width=candidate.width,
-            verdict=verdict,
+            verdict=found[0] if found else None,
         )
 
     def best(
@@ -206,8 +292,9 @@ class Run:
         Raises:
             UnknownNameError: there are no grasps of such an object or instance.
         """
-        rows = best_rows(self.results, count, each=each, only=only)
-        return [str(self.results["id"][row]) for row in rows]
+        rows = self.rows()
+        best = best_rows(rows, count, each=each, only=only)
+        return [self.candidates.id[row] for row in rows.places[best].tolist()]
 
     def scene(self) -> Scene:
         """The scene as it was judged.

@@ -30,6 +30,7 @@ from burg_drake.evaluation.campaign_folder import (
     open_results,
     save_campaign,
 )
+from burg_drake.evaluation.candidates import share_rows
 from burg_drake.evaluation.journal import JOURNAL_FILE, WriterLock, hold_unchanged
 from burg_drake.evaluation.merged_run import (
     JournalChoice,
@@ -48,7 +49,6 @@ from burg_drake.evaluation.run_identity import run_differences
 from burg_drake.evaluation.run_preparation import finish_run
 from burg_drake.evaluation.run_summary import run_shortfall_notes
 from burg_drake.evaluation.scene_tasks import is_finished
-from burg_drake.evaluation.settings import select_share
 from burg_drake.evaluation.table_parts import require_arrow
 
 
@@ -106,7 +106,7 @@ def _finish_campaign(campaign: Campaign) -> None:
         size = place.journal.stat().st_size
         if not is_finished(place.folder, size, document.table, report=reports):
             finish_run(load_run(place.folder), document.table, report=reports)
-    update_parts(campaign.path, campaign.places, document.instances)
+    update_parts(campaign)
     write_campaign_report(campaign)
 
 
@@ -214,23 +214,26 @@ class _Merge:
         if state is not None and state.state == "done" and state.size == size:
             self.states.append(state)
             return
-        choice = choose_verdicts([target / JOURNAL_FILE], run.mine)
+        mine = share_rows(len(run.candidates), run.document.shard)
+        choice = choose_verdicts([target / JOURNAL_FILE], run.candidates, mine)
         self._note_state(name, run, choice)
 
     def _note_state(self, name: str, run: Run, choice: JournalChoice) -> None:
-        self.missing += choice.missing
+        index = choice.index
+        missing = int((~index.judged).sum())
+        self.missing += missing
         count = len(run.candidates)
         size = (self._merged.folder(name) / JOURNAL_FILE).stat().st_size
         state = SceneState(
             scene=name,
-            state="open" if choice.missing else "done",
+            state="open" if missing else "done",
             run=run.document.hash,
             grasps=count,
-            mine=len(select_share(range(count), self._shard)),
+            mine=len(share_rows(count, self._shard)),
             sampling=run.document.grasps.cpu,
-            size=0 if choice.missing else size,
-            failed=choice.failed,
-            interrupted=choice.interrupted,
+            size=0 if missing else size,
+            failed=int(index.failed.sum()),
+            interrupted=int((index.failed & index.interrupted).sum()),
             missing="; ".join(run_shortfall_notes(run)),
         )
         self.states.append(state)
@@ -319,7 +322,8 @@ def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
         else:
             runs = [result for result in results if isinstance(result, Run)]
             choice = write_merged(runs, staging, folder)
-            left = MissingFromMerge(choice.missing, (), missing_shards(runs))
+            missing = int((~choice.index.judged).sum())
+            left = MissingFromMerge(missing, (), missing_shards(runs))
         note = _note_file(staging, folders)
         note.write_text(json.dumps(asdict(left)), encoding="utf-8")
         move_folder(staging, folder)

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core import (
     JUDGING_PACKAGES,
@@ -35,7 +36,6 @@ from burg_drake.core import (
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.candidates import (
     INSTANCE_COLUMN,
-    Candidate,
     Candidates,
     chosen_instances,
     drop_equal_grasps,
@@ -178,6 +178,11 @@ class RunRequest:
         found = self.grasps(scene) if callable(self.grasps) else self.grasps
         found = group_by_names(scene, found) if isinstance(found, GraspSet) else found
         return select_instances(scene, found, self.only)
+
+    def given_candidates(self, scene: Scene) -> Candidates | None:
+        """The same as candidates."""
+        given = self.given_grasps(scene)
+        return None if given is None else given_candidates(scene, given)
 
     def narrow_to_scene(self, scene: Scene) -> RunRequest | None:
         """What is asked about one scene of many: `only` and grasps may be for others alone.
@@ -385,7 +390,7 @@ def next_round(run: Run) -> RunDocument | None:
     grasps. A run that a second engine has judged again gets no further round.
     """
     grasps = run.document.grasps
-    if not grasps.until_balanced or any(v.judged_again for v in run.verdicts.values()):
+    if not grasps.until_balanced or run.index.judged_again.any():
         return None
     counts = lifted_and_failed(run)
     requested: RequestedCounts = {
@@ -437,7 +442,7 @@ def open_run(
     folder: Path,
     scene: Scene,
     request: RunRequest,
-    given: ByInstance | None,
+    given: Candidates | None,
     sampling: Callable[[], None] = lambda: None,
 ) -> Run:
     """Goes on with the run in a folder, or begins a new one there.
@@ -446,14 +451,14 @@ def open_run(
         folder: of the run.
         scene: to judge.
         request: what is asked about it.
-        given: the user's grasps by instance; sampled if None.
+        given: the user's grasps; sampled if None.
         sampling: called before grasps are sampled.
 
     Raises:
         InvalidInputError: the folder holds another run.
     """
     document = request.document(folder, scene)
-    candidates = None if given is None else given_candidates(scene, given)
+    candidates = given
     if candidates is not None:
         document = _record_grasps(document, scene, candidates, 0.0)
     if (folder / RUN_FILE).exists():
@@ -470,7 +475,8 @@ def open_run(
         candidates = sample_requested(scene, request.station, document)
         document = _record_grasps(document, scene, candidates, time.process_time() - start)
     document = replace(document, hash=run_hash(document))
-    return create_run(folder, document, scene, request.station, candidates)
+    run = create_run(folder, document, scene, request.station, candidates)
+    return run if given is None else run.with_candidates(given)
 
 
 def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
@@ -500,7 +506,8 @@ def _record_grasps(
 ) -> RunDocument:
     names = document.grasps.only or scene.instances
     counts = Counter({scene.instance(name).object: 0 for name in names})
-    counts.update(scene.instance(name).object for name in candidates.instance.tolist())
+    for name, count in zip(*np.unique(candidates.instance, return_counts=True), strict=True):
+        counts[scene.instance(str(name)).object] += int(count)
     return replace(
         document,
         grasps=replace(
@@ -514,22 +521,20 @@ def _record_grasps(
     )
 
 
-def open_grasps(run: Run, *, retry_failed: bool) -> list[Candidate]:
-    """Grasps that this run judges and has no verdict about, and those to be tried again."""
-    verdicts = run.verdicts
-    mine = set(run.mine)
-    known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
-    return [c for c in run.candidates if c.id in mine and c.id not in known]
+def open_rows(run: Run, *, retry_failed: bool) -> NDArray[np.int64]:
+    """Rows of the candidates that this run judges and has no verdict about, and of those to be
+    tried again."""
+    return np.flatnonzero(run.is_mine & run.index.open(retry_failed=retry_failed))
 
 
 def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
     """Writes table and report, unless they are there already; where no report is wanted, one that
     is out of date is removed."""
     if run.document.table != table:
-        run = save_run(Run(run.path, replace(run.document, table=table)))
+        run = save_run(run.with_document(replace(run.document, table=table)))
     journal = run.path / JOURNAL_FILE
     if not _is_up_to_date(run.table_path, journal):
-        write_table(run.table_path, run.results, asdict(run.document))
+        write_table(run.table_path, run.rows(), asdict(run.document))
     if not _is_up_to_date(run.report_path, journal):
         run.report_path.unlink(missing_ok=True)
         if report:
@@ -547,11 +552,12 @@ def require_judged(run: Run) -> None:
     Raises:
         SimulationError: there are such grasps.
     """
-    left = [id for id in run.mine if id not in run.verdicts]
-    if left:
+    left = run.left
+    if len(left):
         raise SimulationError(
-            f"{len(left)} of {len(run.mine)} grasps have no verdict yet, such as "
-            f"{left[0]}; the results so far are kept: run the same command to continue"
+            f"{len(left)} of {len(run.mine)} grasps have no verdict yet, such as"
+            f" {run.candidates.id[left[0]]}; the results so far are kept: run the same command to"
+            " continue"
         )
 
 

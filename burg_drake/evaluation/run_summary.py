@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,6 @@ from burg_drake.evaluation.outcome_counts import (
 )
 from burg_drake.evaluation.results_table import contested_rows
 from burg_drake.evaluation.run_folder import Run
-from burg_drake.evaluation.table_parts import StoredRows
 from burg_drake.evaluation.trial_origin import read_motion
 from burg_drake.station import GraspMotion
 
@@ -77,23 +77,27 @@ def run_shortfall_notes(run: Run) -> list[str]:
     asked = run.document.grasps.per_object
     if asked is None:
         return []
-    found = Counter(run.candidates.instance.tolist())
+    names, counts = np.unique(run.candidates.instance, return_counts=True)
+    found = Counter(dict(zip(names.tolist(), counts.tolist(), strict=True)))
     parts = run.candidates.grasps.provenance.get("parts", {})
     notes = (shortfall_note(name, asked, part, found[name]) for name, part in parts.items())
     return [note for note in notes if note]
 
 
 def _unexecuted_notes(run: Run) -> list[str]:
-    columns, notes = run.results, []
+    rows, notes = run.rows(), []
     motion = read_motion(run.document.trial)
     given = run.document.grasps.origin == "given"
+    outcome, objects = rows.codes("outcome"), rows.codes("object")
+    executed = np.zeros(len(outcome.codes), dtype=bool)
+    for name in outcome.names:
+        if Outcome(name).stage is Stage.EXECUTED and name != Outcome.SIMULATION_FAILED:
+            executed |= outcome.equal(name)
     for name, count in run.document.grasps.objects.items():
-        mine = columns["object"] == name
-        outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
-        tried = np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.EXECUTED])
-        executed = tried & (outcomes != Outcome.SIMULATION_FAILED)
-        if count and len(outcomes) == count and not executed.any():
-            stages = Counter(columns["stage"][mine].tolist())
+        mine = np.flatnonzero(objects.equal(name))
+        if count and len(mine) == count and not executed[mine].any():
+            outcomes, blockers = (rows.cells(key, mine) for key in ("outcome", "blocker"))
+            stages = Counter(rows.cells("stage", mine).tolist())
             remedy = _remedy(Stage(stages.most_common(1)[0][0]), given=given)
             if other := _motion_remedy(_most_frequent_outcome(outcomes, blockers), motion):
                 remedy = f"{other} may help; {remedy}"
@@ -208,11 +212,13 @@ def _cause_words(outcome: Outcome, blocker: str) -> str:
 def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
     """Numbers of lifted and of failing grasps by object, among the judged grasps that the run
     counts; see `EvaluationSettings.balanced_among`."""
-    columns, grasps = run.results, run.document.grasps
-    counted = np.isin(columns["stage"], [s.value for s in DECIDED_STAGES[grasps.balanced_among]])
-    counted &= columns["outcome"] != Outcome.SIMULATION_FAILED.value
-    lifted = columns["outcome"] == Outcome.LIFTED.value
-    own = {name: counted & (columns["object"] == name) for name in grasps.objects}
+    rows, grasps = run.rows(), run.document.grasps
+    stages, objects, outcomes = map(rows.codes, ("stage", "object", "outcome"))
+    among = [stage.value for stage in DECIDED_STAGES[grasps.balanced_among]]
+    counted = np.isin(stages.names, among)[stages.codes]
+    counted &= ~outcomes.equal(Outcome.SIMULATION_FAILED)
+    lifted = outcomes.equal(Outcome.LIFTED)
+    own = {name: counted & objects.equal(name) for name in grasps.objects}
     return {name: (int((m & lifted).sum()), int((m & ~lifted).sum())) for name, m in own.items()}
 
 
@@ -241,91 +247,69 @@ def _balance_notes(run: Run) -> list[str]:
 
 def summarize(run: Run | Campaign) -> Summary:
     """Counts what a run, of one scene or of many, has found so far."""
-    return _summarize_scene(run) if isinstance(run, Run) else _summarize_scenes(run)
-
-
-def _summarize_scene(run: Run) -> Summary:
-    columns, document = run.results, run.document
-    settled = columns["judged_again"] != ""
-    rows = _CodedRows(
-        member_codes(columns["outcome"], tuple(Outcome)),
-        member_codes(columns["stage"], tuple(Stage)),
-        contested_rows(columns["confidence"], settled),
-        settled,
-    )
-    grasps = document.grasps
-    places = {name: place for place, name in enumerate(grasps.objects)}
-    object = np.array([places[name] for name in columns["object"].tolist()], dtype=np.int64)
-    costs = [stage_cost(columns, stage) for stage in STAGES_BY_MODE[document.mode]]
-    if grasps.origin == "sampled" and grasps.count:
-        costs.insert(0, StageCost("sampling", grasps.count, grasps.cpu, math.nan))
-    return Summary(
-        objects=tuple(rows.count_groups(object, list(places))),
-        total=rows.count_all(),
-        costs=tuple(costs),
-        mode=document.mode,
-        pushes=count_pushes(columns),
-        lifts=count_short_lifts(
-            columns[MarginNames.lift_height], read_motion(document.trial).lift_height
-        ),
-        notes=run_notes(run),
-        knows_confidence=bool(np.isfinite(columns["confidence"]).any()),
-        settled_by=tuple(name for name in np.unique(columns["judged_again"]).tolist() if name),
-    )
-
-
-def _summarize_scenes(campaign: Campaign) -> Summary:
-    document = campaign.document
+    document = run.document
     stages = STAGES_BY_MODE[document.mode]
+    approached = document.mode == "arm" or bool(document.trial.get("approach"))
+    instances = run.instances if isinstance(run, Run) else run.document.instances
     names = [
         *("object", "outcome", "stage", "confidence", "judged_again"),
         MarginNames.lift_height,
-        *(CPU_COLUMNS[s] for s in stages),
+        *(CPU_COLUMNS[stage] for stage in stages),
+        *(["pushed", "instance"] if approached else []),
+        *(PUSHED_PREFIX + name for name in (instances if approached else ())),
     ]
-    approached = document.mode == "arm" or bool(document.trial.get("approach"))
-    if approached:
-        names += ["pushed", "instance", *(PUSHED_PREFIX + name for name in document.instances)]
-    stored = campaign.rows(names)
-    judges, judge_names = stored.codes("judged_again")
+    table = run.rows(names)
+    judges = table.codes("judged_again")
     # parts of earlier releases lack the column: -1 is the last one, which is no text
-    settled = np.array([*(name != "" for name in judge_names), False], dtype=bool)[judges]
+    settled = np.array([*(name != "" for name in judges.names), False], dtype=bool)[judges.codes]
+    confidence = table.column("confidence")
     rows = _CodedRows(
-        _stored_member_codes(stored, "outcome", tuple(Outcome)),
-        _stored_member_codes(stored, "stage", tuple(Stage)),
-        contested_rows(stored.column("confidence"), settled),
+        member_codes(table.codes("outcome"), tuple(Outcome)),
+        member_codes(table.codes("stage"), tuple(Stage)),
+        contested_rows(confidence, settled),
         settled,
     )
-    object, objects = stored.codes("object")
+    object, objects = table.codes("object")
     by_object = dict(zip(objects, rows.count_groups(object, objects), strict=True))
     none = OutcomeCounts("", 0, Counter(), Counter(), Counter())
-    costs = [stage_cost(stored.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
-    sampled = [s for s in campaign.states.values() if s.sampling > 0.0]
-    if sampled:
-        grasps, seconds = sum(s.grasps for s in sampled), sum(s.sampling for s in sampled)
-        costs.insert(0, StageCost("sampling", grasps, seconds, math.nan))
-    only = document.grasps.only
-    known = dict.fromkeys(o for entry in document.mine for o in entry.chosen(only).values())
+    costs = [stage_cost(table.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
     return Summary(
-        objects=tuple(replace(by_object.get(name, none), name=name) for name in known),
+        objects=tuple(replace(by_object.get(n, none), name=n) for n in _asked_objects(run)),
         total=rows.count_all(),
-        costs=tuple(costs),
+        costs=(*_sampling_cost(run), *costs),
         mode=document.mode,
-        pushes=count_pushes(stored.columns(stored.table.column_names)) if approached else None,
+        pushes=count_pushes(table.columns(names)) if approached else None,
         lifts=count_short_lifts(
-            stored.column(MarginNames.lift_height), read_motion(document.trial).lift_height
+            table.column(MarginNames.lift_height), read_motion(document.trial).lift_height
         ),
-        notes=_campaign_notes(campaign),
-        scenes=tuple(rows.count_groups(stored.run, campaign.names)),
-        knows_confidence=bool(np.isfinite(stored.column("confidence")).any()),
-        settled_by=tuple(sorted(name for name in judge_names if name)),
+        notes=run_notes(run) if isinstance(run, Run) else _campaign_notes(run),
+        scenes=(() if isinstance(run, Run) else tuple(rows.count_groups(table.run, run.names))),
+        knows_confidence=bool(np.isfinite(confidence).any()),
+        settled_by=tuple(sorted(name for name in judges.names if name)),
     )
 
 
-def _stored_member_codes(
-    rows: StoredRows, name: str, members: Sequence[str]
-) -> NDArray[np.integer]:
-    codes, texts = rows.codes(name)
-    return np.array([list(members).index(text) for text in texts], dtype=np.int64)[codes]
+def _asked_objects(run: Run | Campaign) -> Iterable[str]:
+    """Names of the objects whose grasps are judged, in the order of the scenes."""
+    if isinstance(run, Run):
+        return run.document.grasps.objects
+    only = run.document.grasps.only
+    entries = run.document.mine
+    return dict.fromkeys(object for entry in entries for object in entry.chosen(only).values())
+
+
+def _sampling_cost(run: Run | Campaign) -> list[StageCost]:
+    """CPU time of the sampling; none where grasps were given."""
+    if isinstance(run, Run):
+        grasps = run.document.grasps
+        known = grasps.origin == "sampled" and grasps.count > 0
+        sampled = [(grasps.count, grasps.cpu)] if known else []
+    else:
+        sampled = [(s.grasps, s.sampling) for s in run.states.values() if s.sampling > 0.0]
+    if not sampled:
+        return []
+    counts, seconds = zip(*sampled, strict=True)
+    return [StageCost("sampling", sum(counts), sum(seconds), math.nan)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,11 +331,11 @@ class _CodedRows:
         (total,) = self.count_groups(np.zeros(len(self.outcome), dtype=np.int64), ["all"])
         return total
 
-    def count_groups(self, keys: NDArray[np.int64], names: Sequence[str]) -> list[OutcomeCounts]:
+    def count_groups(self, keys: NDArray[Any], names: Sequence[str]) -> list[OutcomeCounts]:
         """Counts by group; `keys` (N,) are places in the names of the groups."""
         outcomes, stages = tuple(Outcome), tuple(Stage)
         shape = (len(names), len(outcomes), len(stages))
-        flat = (keys * shape[1] + self.outcome) * shape[2] + self.stage
+        flat = (keys.astype(np.int64) * shape[1] + self.outcome) * shape[2] + self.stage
         counts = np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
         lifted = self.contested & (self.outcome == outcomes.index(Outcome.LIFTED))
         contested, contested_lifts, settled = (

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from burg_drake.core import (
     Outcome,
     Prefetcher,
@@ -22,10 +24,10 @@ from burg_drake.core import (
     ensure_writable_folder,
     remove_unfinished,
 )
-from burg_drake.evaluation.campaign_folder import SceneState
+from burg_drake.evaluation.campaign_folder import Campaign, SceneState
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
-from burg_drake.evaluation.part_store import PART_ROWS, PartWriter, StoredRun
+from burg_drake.evaluation.part_store import PART_ROWS, PartWriter
 from burg_drake.evaluation.run_document import WorkSession, add_session, begin_session
 from burg_drake.evaluation.run_folder import (
     REPORT_FILE,
@@ -38,7 +40,7 @@ from burg_drake.evaluation.run_folder import (
 from burg_drake.evaluation.run_preparation import (
     RunRequest,
     finish_run,
-    open_grasps,
+    open_rows,
     open_run,
     require_sound,
 )
@@ -66,17 +68,15 @@ class SceneJudging:
         self.name = name
         self._run = load_run(folder)
         self._journal: Journal | None = Journal(folder / JOURNAL_FILE)
-        self.left: Sequence[Candidate] = open_grasps(self._run, retry_failed=request.retry_failed)
-        again = {grasp.id for grasp in self.left}
-        self.mine = len(self._run.mine)
-        self.known = self.mine - len(self.left)
-        self._before = len(self._run.verdicts)
-        # verdicts are not kept: a thousand runs have a million
-        self._failed = {
-            id: v.interrupted
-            for id, v in self._run.verdicts.items()
-            if v.outcome is Outcome.SIMULATION_FAILED and id not in again
-        }
+        run, index = self._run, self._run.index
+        left = open_rows(run, retry_failed=request.retry_failed)
+        self.left: Sequence[Candidate] = run.candidates.at(left)
+        self.mine = len(run.mine)
+        self.known = self.mine - len(left)
+        self._before = int(index.judged.sum())
+        failed = np.setdiff1d(np.flatnonzero(index.failed), left).tolist()
+        ids = run.candidates.id
+        self._failed = {ids[row]: bool(index.interrupted[row]) for row in failed}
         self._judged = 0
         self._workers = workers
         self._count = len(self._run.candidates)
@@ -207,7 +207,7 @@ class Preparer:
         require_run_folder(work.folder)
         if not (work.folder / RUN_FILE).exists():
             require_sound(scene, request.station, request.mode, request.engine)
-        given = request.given_grasps(scene)
+        given = request.given_candidates(scene)
         remove_unfinished(ensure_writable_folder(work.folder))
         with Journal(work.folder / JOURNAL_FILE):
             open_run(work.folder, scene, request, given)
@@ -219,16 +219,12 @@ class SceneOutputs:
     """What is kept of the scenes.
 
     Attributes:
-        folder: of the run over many scenes.
-        places: the runs of its scenes.
-        instances: names of the free objects of all of them.
+        campaign: the run over many scenes.
         table: format of the tables.
         reports: whether each scene gets a report.
     """
 
-    folder: Path
-    places: tuple[StoredRun, ...]
-    instances: Sequence[str]
+    campaign: Campaign
     table: TableFormat
     reports: bool
 
@@ -238,7 +234,6 @@ class SceneResultsWriter:
 
     def __init__(self, outputs: SceneOutputs) -> None:
         self._outputs = outputs
-        self._folders = {place.scene: place.folder for place in outputs.places}
         self._writer: PartWriter | None = None
 
     def __call__(self, work: FinishTask | None) -> None:
@@ -252,7 +247,7 @@ class SceneResultsWriter:
                 self.writer.catch_up()
             self.writer.close()
             return
-        run = load_run(self._folders[work.name])
+        run = load_run(self._outputs.campaign.folder(work.name))
         if work.judged:
             run = finish_run(run, self._outputs.table, report=self._outputs.reports)
         self.writer.add_rows(work.name, run)
@@ -261,8 +256,7 @@ class SceneResultsWriter:
     def writer(self) -> PartWriter:
         """Opened when it is needed, as it looks at all parts."""
         if self._writer is None:
-            outputs = self._outputs
-            self._writer = PartWriter(outputs.folder, outputs.places, outputs.instances)
+            self._writer = PartWriter(self._outputs.campaign)
         return self._writer
 
 

@@ -213,7 +213,7 @@ def _judge_scenes(
         if judged:
             document = _add_second_session(document, session.finish(judged, begun), engine)
             save_campaign(Campaign(campaign.path, document))
-        update_parts(campaign.path, campaign.places, document.instances)
+        update_parts(campaign)
         campaign = load_campaign(campaign.path)
         renew_report(campaign)
         return campaign
@@ -280,7 +280,7 @@ class _ContestedRun:
         self._run, self._engine = run, engine
         self.left = [run.trial(id).candidate for id in run.contested]
         self.open = len(self.left)
-        self._session, self._begun = begin_session(workers, len(run.verdicts)), time.monotonic()
+        self._session, self._begun = begin_session(workers, run.rows().count), time.monotonic()
         self._judged = 0
         if self.left:
             try:

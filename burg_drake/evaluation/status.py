@@ -16,7 +16,7 @@ from burg_drake.evaluation.campaign_folder import (
     open_results,
 )
 from burg_drake.evaluation.journal import JOURNAL_FILE, is_locked
-from burg_drake.evaluation.part_store import JournalTail, StoredRun, read_journal_tails
+from burg_drake.evaluation.part_store import JournalTail, read_journal_tails
 from burg_drake.evaluation.run_document import WorkSession
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.settings import select_share
@@ -79,8 +79,7 @@ class RunWatch:
         """
         self._date = _document_time(Path(path))
         self._result = result = open_results(path)
-        places = result.places if isinstance(result, Campaign) else [StoredRun("", result.path)]
-        self._tails = read_journal_tails(result.path, places)
+        self._tails = read_journal_tails(result)
         self._history: list[tuple[float, int]] = []
 
     def look(self) -> Status:

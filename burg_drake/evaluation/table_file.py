@@ -6,9 +6,11 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +34,13 @@ from burg_drake.core import (
     short_message,
     text_array,
 )
+from burg_drake.evaluation.result_rows import ResultRows
 from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
 from burg_drake.evaluation.table_parts import require_arrow
 
 T = TypeVar("T", int, float)
+CSV_ROWS = 2048
+"""Rows that become text at a time."""
 PARQUET_REMEDY = ", or choose csv"
 
 RUN_METADATA_KEY = b"burg_drake.run"
@@ -72,14 +77,16 @@ def require_table(path: Path) -> None:
     require_writable(path)
 
 
-def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
+def write_table(
+    path: Path, columns: Columns | ResultRows, metadata: Mapping[str, Any] | None = None
+) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
     Beside a CSV file what its columns are goes to a file, see `core.describe_column`.
 
     Args:
         path: the file.
-        columns: equally long arrays by name.
+        columns: equally long arrays by name; rows of a run are written piece by piece.
         metadata: JSON values that Parquet files carry along; of those of a CSV file the shard is
             told in the file beside it.
 
@@ -89,15 +96,18 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
     """
     # Of CSV on the Web, by the kind of an array.
     datatypes = {"U": "string", "f": "double", "i": "integer", "u": "integer", "O": "integer"}
+    pieces = columns.parts() if isinstance(columns, ResultRows) else iter([columns])
+    first = next(pieces)
+    pieces = chain([first], pieces)
     if path.suffix == ".parquet":
-        atomic_write(path, _parquet_bytes(columns, metadata or {}))
+        atomic_write(path, partial(_write_parquet, pieces, metadata or {}))
     else:
-        meant = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in columns.items()}
+        meant = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in first.items()}
         shard = (metadata or {}).get("shard")
         note = f"shard {shard}: only these grasps of the run are judged here"
         notes = [{"dc:description": note}] if shard else []
         description = json.dumps(csv_metadata(path.name, meant, notes), indent=1) + "\n"
-        atomic_write_all({metadata_path(path): description, path: _csv_text(columns)})
+        atomic_write_all({metadata_path(path): description, path: partial(_write_csv, pieces)})
 
 
 def read_table(path: Path) -> Columns:
@@ -174,12 +184,16 @@ def _csv_cells(rows: list[list[str]]) -> dict[str, list[str]]:
     return {name: [row[k] for row in rows] for k, name in enumerate(header)}
 
 
-def _csv_text(columns: Columns) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(_cells(values) for values in columns.values()), strict=True))
-    return stream.getvalue()
+def _write_csv(pieces: Iterable[Columns], stream: BinaryIO) -> None:
+    text = io.TextIOWrapper(stream, encoding="utf-8", newline="", write_through=True)
+    writer = csv.writer(text, lineterminator="\n")
+    for k, columns in enumerate(pieces):
+        if k == 0:
+            writer.writerow(columns)
+        for begin in range(0, len(next(iter(columns.values()), ())), CSV_ROWS):
+            part = (values[begin : begin + CSV_ROWS] for values in columns.values())
+            writer.writerows(zip(*map(_cells, part), strict=True))
+    text.detach()
 
 
 def _cells(values: NDArray[Any]) -> list[Any]:
@@ -194,7 +208,21 @@ def _cells(values: NDArray[Any]) -> list[Any]:
     return ["" if value != value else special.get(value, value) for value in values.tolist()]
 
 
-def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
+def _write_parquet(
+    pieces: Iterator[Columns], metadata: Mapping[str, Any], stream: BinaryIO
+) -> None:
+    """Writes groups of rows, each of a few pieces."""
+    arrow = require_arrow("Parquet", PARQUET_REMEDY)
+    writer = None
+    while group := [_parquet_table(columns, metadata) for columns in islice(pieces, 4)]:
+        table = arrow.concat_tables(group).combine_chunks()
+        writer = writer or arrow.parquet.ParquetWriter(stream, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
+
+
+def _parquet_table(columns: Columns, metadata: Mapping[str, Any]) -> Any:
     arrow = require_arrow("Parquet", PARQUET_REMEDY)
     kinds = {"U": arrow.string(), "O": arrow.int64()}
     arrays = {
@@ -205,10 +233,7 @@ def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
     }
     table = arrow.table(arrays)
     fields = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
-    table = table.cast(arrow.schema(fields, {RUN_METADATA_KEY: json.dumps(metadata)}))
-    sink = arrow.BufferOutputStream()
-    arrow.parquet.write_table(table, sink)
-    return bytes(sink.getvalue().to_pybytes())
+    return table.cast(arrow.schema(fields, {RUN_METADATA_KEY: json.dumps(metadata)}))
 
 
 def _typed_column(name: str, values: Sequence[Any], allowance: ReadBudget) -> NDArray[Any]:

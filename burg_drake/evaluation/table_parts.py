@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,7 +24,8 @@ from burg_drake.core import (
     column_metadata,
     open_regular,
 )
-from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
+from burg_drake.evaluation.result_rows import ResultRows
+from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns, TextValues
 
 if TYPE_CHECKING:
     import pandas
@@ -276,22 +277,24 @@ def to_numpy(name: str, column: Any) -> NDArray[Any]:
                 return np.full(len(column), "", dtype=np.str_)
             return np.asarray(column.fill_null("").to_numpy().astype(np.str_))
         codes, categories = to_codes(column)
-        return np.array([*categories, ""], dtype=np.str_)[codes]
+        texts: NDArray[Any] = np.array([*categories, ""], dtype=np.str_)[codes]
+        return texts
     values = column.to_numpy()
     plain: NDArray[Any] = values.astype(np.float64) if values.dtype.kind == "O" else values
     return plain
 
 
-def to_codes(column: Any) -> tuple[NDArray[np.int64], list[str]]:
+def to_codes(column: Any) -> TextValues:
     """A column of texts as numbers and the texts that they stand for; null is -1."""
     arrow = require_arrow("a columnar table")
     if not arrow.types.is_dictionary(column.type):
         column = column.dictionary_encode()
     column = column.unify_dictionaries()
     if not column.num_chunks:
-        return np.empty(0, dtype=np.int64), []
+        return TextValues(np.empty(0, dtype=np.int64), [])
     codes = [chunk.indices.fill_null(-1).to_numpy() for chunk in column.chunks]
-    return np.concatenate(codes).astype(np.int64), column.chunk(0).dictionary.to_pylist()
+    texts = column.chunk(0).dictionary.to_pylist()
+    return TextValues(np.concatenate(codes).astype(np.int64), texts)
 
 
 def _arrow_column(name: str, values: NDArray[Any]) -> Any:
@@ -340,7 +343,7 @@ class StoredRows:
         """A column as `Columns` has it."""
         return to_numpy(name, self.table.column(name))
 
-    def codes(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
+    def codes(self, name: str) -> TextValues:
         """A column of texts as numbers, and the texts that they stand for."""
         return to_codes(self.table.column(name))
 
@@ -362,53 +365,38 @@ COLUMN_MEMBERS: Mapping[str, Sequence[str]] = {
 """All texts that a column can have, where they are known."""
 
 
-def frame_of_columns(columns: Columns, names: Sequence[str] | None = None) -> pandas.DataFrame:
-    """A table of results as a data frame.
+def results_frame(
+    rows: StoredRows | ResultRows,
+    names: Sequence[str],
+    texts: Collection[str],
+    scenes: Sequence[str] | None = None,
+) -> pandas.DataFrame:
+    """Results as a data frame; texts that repeat are categories.
 
     Args:
-        columns: the table.
-        names: of its columns; all if None.
+        rows: of a run.
+        names: of the columns.
+        texts: names of the columns that have texts.
+        scenes: of a run over many scenes: their names, which become a column `name` in front.
 
     Raises:
         MissingDependencyError: pandas is not installed.
-        KeyError: the table has no such column.
-    """
-    series: dict[str, Any] = {}
-    for name in names or columns:
-        values = columns[name]
-        if values.dtype.kind == "U" and name not in UNIQUE_TEXT_COLUMNS:
-            texts, codes = np.unique(values, return_inverse=True)
-            series[name] = _category_column(name, codes, texts.tolist())
-        else:
-            series[name] = values.astype(object) if values.dtype.kind == "U" else values
-    return _pandas().DataFrame(series)
-
-
-def frame_of_rows(rows: StoredRows, scenes: Sequence[str]) -> pandas.DataFrame:
-    """The results of many scenes as a data frame, with a column `name` in front: the scene's name
-    in the run.
-
-    Args:
-        rows: of the run.
-        scenes: names of the scenes that `rows.run` counts.
-
-    Raises:
-        MissingDependencyError: pandas is not installed.
+        KeyError: the rows have no such column.
     """
     pandas = _pandas()
-    series: dict[str, Any] = {"name": _category_column("name", rows.run, list(scenes))}
-    for name in rows.table.column_names:
-        column = rows.table.column(name)
-        if name in TEXT_COLUMNS and name not in UNIQUE_TEXT_COLUMNS:
-            codes, texts = rows.codes(name)
-            series[name] = _category_column(name, *_fill_null(codes, texts))
+    series: dict[str, Any] = {}
+    if scenes is not None:
+        series["name"] = _category_column("name", rows.run, list(scenes))
+    for name in names:
+        if name in texts and name not in UNIQUE_TEXT_COLUMNS:
+            series[name] = _category_column(name, *_fill_null(*rows.codes(name)))
         else:
-            is_text = name in TEXT_COLUMNS
-            series[name] = column.fill_null("").to_pandas() if is_text else rows.column(name)
+            values = rows.columns([name])[name]
+            series[name] = values.astype(object) if name in texts else values
     return pandas.DataFrame(series)
 
 
-def _fill_null(codes: Any, texts: list[str]) -> tuple[Any, list[str]]:
+def _fill_null(codes: Any, texts: Sequence[str]) -> tuple[Any, Sequence[str]]:
     """Nulls as empty texts."""
     if not (codes < 0).any():
         return codes, texts
@@ -417,7 +405,7 @@ def _fill_null(codes: Any, texts: list[str]) -> tuple[Any, list[str]]:
     return np.where(codes < 0, texts.index(""), codes), texts
 
 
-def _category_column(name: str, codes: Any, texts: list[str]) -> Any:
+def _category_column(name: str, codes: Any, texts: Sequence[str]) -> Any:
     """Codes as categories: all members of what has members, else those that there are, sorted."""
     pandas = _pandas()
     members = list(COLUMN_MEMBERS.get(name, texts if name == "name" else sorted(texts)))

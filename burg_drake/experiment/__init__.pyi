@@ -16,23 +16,22 @@ from .comparison.comparison import (
     comparison_json as comparison_json,
     headline_sentence as headline_sentence,
 )
+from .comparison.comparison_findings import comparison_tables as comparison_tables
 from .comparison.comparison_report import comparison_page as comparison_page
 from .comparison.confusion_matrix import (
+    AGREEMENT_MEASURES as AGREEMENT_MEASURES,
+    CELL_PRIOR as CELL_PRIOR,
     Agreement as Agreement,
+    Estimate as Estimate,
     Paired as Paired,
     _compute_measures as _compute_measures,
     compare_paired as compare_paired,
     compare_paired_counts as compare_paired_counts,
     count_cells as count_cells,
     count_cells_by_group as count_cells_by_group,
+    distribute_prior as distribute_prior,
     estimate_agreement as estimate_agreement,
     estimate_agreements as estimate_agreements,
-)
-from .comparison.estimates import (
-    AGREEMENT_MEASURES as AGREEMENT_MEASURES,
-    CELL_PRIOR as CELL_PRIOR,
-    Estimate as Estimate,
-    distribute_prior as distribute_prior,
     interval_bounds as interval_bounds,
 )
 from .comparison.group_agreement import (
@@ -74,7 +73,6 @@ from .comparison.run_comparison import (
     compare as compare,
     pair_runs as pair_runs,
 )
-from .comparison.terminal_tables import comparison_tables as comparison_tables
 from .comparison.verdict_pairs import (
     PREDICTION_COLUMNS as PREDICTION_COLUMNS,
     REFERENCE_COLUMNS as REFERENCE_COLUMNS,
@@ -96,7 +94,6 @@ from .gap.gap_report import (
     change_section as change_section,
     gap_page as gap_page,
     push_section as push_section,
-    reality_section as reality_section,
     write_gap_report as write_gap_report,
 )
 from .gap.gap_steps import (
@@ -113,24 +110,23 @@ from .gap.gap_steps import (
 from .gap.gap_words import (
     gap_json as gap_json,
     reality_sentence as reality_sentence,
-    reality_view as reality_view,
+    reality_table as reality_table,
     step_sentences as step_sentences,
     steps_view as steps_view,
 )
-from .gap.rejudged_trials import (
+from .gap.rejudging import (
     Rejudged as Rejudged,
     Rejudging as Rejudging,
     match_runs_to_sources as match_runs_to_sources,
+    rejudge as rejudge,
     rejudging_json as rejudging_json,
 )
-from .gap.rejudging import rejudge as rejudge
 from .gap.rejudging_report import (
     rejudged_section as rejudged_section,
     rejudged_sentences as rejudged_sentences,
     rejudged_view as rejudged_view,
 )
 from .lab.lab_book import (
-    EntryConflict as EntryConflict,
     LabBook as LabBook,
     LabEntry as LabEntry,
     entry_data as entry_data,
@@ -154,14 +150,6 @@ from .lab.tried_grasps import (
     trials_by_block as trials_by_block,
 )
 from .trials.grasp_selection import allocate_to_strata as allocate_to_strata
-from .trials.journal import (
-    Entry as Entry,
-    MissingValues as MissingValues,
-    journal_path as journal_path,
-    lock_trials_file as lock_trials_file,
-    parse_real_outcome as parse_real_outcome,
-    read_entries as read_entries,
-)
 from .trials.motion_export import (
     MOTION_INDEX_FILE as MOTION_INDEX_FILE,
     ExportedMotion as ExportedMotion,
@@ -185,11 +173,19 @@ from .trials.statistical_power import (
     power_table as power_table,
     smallest_difference as smallest_difference,
 )
-from .trials.trial_book import TrialBook as TrialBook, TrialChanged as TrialChanged
+from .trials.trial_book import (
+    Entry as Entry,
+    MissingValues as MissingValues,
+    TrialBook as TrialBook,
+    TrialChanged as TrialChanged,
+    journal_path as journal_path,
+    lock_trials_file as lock_trials_file,
+    parse_real_outcome as parse_real_outcome,
+    read_entries as read_entries,
+)
 from .trials.trial_photos import (
     measure_placement as measure_placement,
-    require_same_scene as require_same_scene,
-    require_scene_of_check as require_scene_of_check,
+    require_scene_of_trial as require_scene_of_trial,
     save_photo_and_placement as save_photo_and_placement,
     summarize_placements as summarize_placements,
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from burg_drake.core import NO_PACKAGES, Array, InvalidInputError, Packages
+from burg_drake.core import NO_PACKAGES, Array, InvalidInputError, Packages, unused_name
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 from burg_drake.scene import Scene
 from burg_drake.station import FixedBox, Station, obstacle_boxes, table_box
@@ -127,9 +127,5 @@ def _make_unique(layout: Layout, legal: Callable[[str], str]) -> dict[str, str]:
     by_name = {name: name for name in names if legal(name) == name}
     for name in names:
         if name not in by_name:
-            candidate, number = legal(name), 1
-            while candidate in by_name.values():
-                number += 1
-                candidate = f"{legal(name)}_{number}"
-            by_name[name] = candidate
+            by_name[name] = unused_name(legal(name), by_name.values())
     return {name: by_name[name] for name in names}

@@ -70,10 +70,7 @@ SCENE_FORMATS = {
         hydroelastic=True,
     ),
     "mjcf": SceneFormat(
-        writer="mjcf_scene:write_mjcf",
-        main="scene.xml",
-        about="MuJoCo's XML",
-        with_hand=True,
+        writer="mjcf_scene:write_mjcf", main="scene.xml", about="MuJoCo's XML", with_hand=True
     ),
     "usd": SceneFormat(
         writer="usd:write_usd",

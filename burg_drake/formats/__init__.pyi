@@ -2,18 +2,13 @@ from .burg_grasps import BURG_TOOLKIT_FORMAT as BURG_TOOLKIT_FORMAT
 from .burg_toolkit import (
     BurgInstance as BurgInstance,
     BurgLibrary as BurgLibrary,
+    BurgMarkers as BurgMarkers,
     BurgObject as BurgObject,
     BurgPrintout as BurgPrintout,
     BurgScene as BurgScene,
     locate_file as locate_file,
     read_burg_library as read_burg_library,
     read_burg_scene as read_burg_scene,
-)
-from .frame_convention import (
-    axis_along as axis_along,
-    convention_of as convention_of,
-    group_by_convention as group_by_convention,
-    origin_in_words as origin_in_words,
 )
 from .grasp_conversion import (
     check_gripper_name as check_gripper_name,
@@ -40,6 +35,10 @@ from .grasp_format import (
     GripperJoint as GripperJoint,
     ImportedGrasps as ImportedGrasps,
     PoseFrame as PoseFrame,
+    axis_along as axis_along,
+    convention_of as convention_of,
+    group_by_convention as group_by_convention,
+    origin_in_words as origin_in_words,
 )
 from .graspnet import GRASPNET_FORMAT as GRASPNET_FORMAT, graspnet_X_FG as graspnet_X_FG
 from .isaac_grasp import (

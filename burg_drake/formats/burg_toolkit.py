@@ -168,9 +168,6 @@ class BurgObject:
         mass: [kg]; None for an object that BURG-Toolkit fixes in space (mass 0 or absent).
         friction: coefficient; None where BURG-Toolkit uses its default of 0.24.
         stable_poses: most probable first.
-        thumbnail: picture.
-        urdf: model for PyBullet.
-        vhacd: convex pieces, in the unit of the mesh file.
         line: where the object begins in the document.
     """
 
@@ -181,9 +178,6 @@ class BurgObject:
     mass: float | None = None
     friction: float | None = None
     stable_poses: tuple[BurgStablePose, ...] = ()
-    thumbnail: Path | None = None
-    urdf: Path | None = None
-    vhacd: Path | None = None
     line: int = 0
 
 
@@ -228,7 +222,10 @@ class _Poses:
 
 @dataclass(frozen=True, kw_only=True)
 class _Object:
-    """Schema of an object; the defaults are those of BURG-Toolkit's `ObjectType`."""
+    """Schema of an object; the defaults are those of BURG-Toolkit's `ObjectType`.
+
+    Its picture, its model for PyBullet and its convex pieces are not used.
+    """
 
     identifier: str
     name: str | None = None
@@ -324,9 +321,6 @@ def _burg_object(item: _Object, folder: Path, line: int) -> BurgObject:
             BurgStablePose(probability=p, X_SO=Pose.from_matrix(X_SO, quaternion=True))
             for p, X_SO in sorted(recorded, key=lambda pair: -pair[0])
         ),
-        thumbnail=locate_file(item.thumbnail_fn, folder),
-        urdf=locate_file(item.urdf_fn, folder),
-        vhacd=locate_file(item.vhacd_fn, folder),
         line=line,
     )
 
@@ -347,22 +341,43 @@ class BurgInstance:
 
 
 @dataclass(frozen=True, kw_only=True)
+class BurgMarkers:
+    """The markers on a printed board of BURG-Toolkit; keys are those of its files.
+
+    Attributes:
+        aruco_dict: dictionary as OpenCV names it.
+        marker_count_x, marker_count_y: columns and rows.
+        marker_size_mm: length of a marker's side [mm].
+        marker_spacing_mm: width of the gap between markers [mm].
+    """
+
+    aruco_dict: str
+    marker_count_x: int
+    marker_count_y: int
+    marker_size_mm: float
+    marker_spacing_mm: float
+
+    def __post_init__(self) -> None:
+        for name in ("marker_count_x", "marker_count_y", "marker_size_mm", "marker_spacing_mm"):
+            if getattr(self, name) <= 0:
+                raise FieldError(f"{name} is {getattr(self, name):g}; it must be above 0", name)
+
+
+@dataclass(frozen=True, kw_only=True)
 class BurgPrintout:
     """The printed board of a scene of BURG-Toolkit.
 
     Attributes:
         size: extents along x and y [m], from the ground area's origin.
-        dictionary: of its ArUco markers, as OpenCV names it, without `DICT_`.
-        count: columns and rows of markers.
-        side: length of a marker's side [m].
-        spacing: width of the gap between markers [m].
+        marker_info: its markers.
     """
 
     size: tuple[float, float]
-    dictionary: str
-    count: tuple[int, int]
-    side: float
-    spacing: float
+    marker_info: BurgMarkers
+
+    def __post_init__(self) -> None:
+        if min(self.size) <= 0.0:
+            raise FieldError(f"size {list(self.size)} must be above 0 [m]", "size")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -397,34 +412,6 @@ class _Instance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _MarkerInfo:
-    """Schema of the markers of a printout."""
-
-    aruco_dict: str
-    marker_count_x: int
-    marker_count_y: int
-    marker_size_mm: float
-    marker_spacing_mm: float
-
-    def __post_init__(self) -> None:
-        for name in ("marker_count_x", "marker_count_y", "marker_size_mm", "marker_spacing_mm"):
-            if getattr(self, name) <= 0:
-                raise FieldError(f"{name} is {getattr(self, name):g}; it must be above 0", name)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Printout:
-    """Schema of a printout."""
-
-    size: tuple[float, float]
-    marker_info: _MarkerInfo
-
-    def __post_init__(self) -> None:
-        if min(self.size) <= 0.0:
-            raise FieldError(f"size {list(self.size)} must be above 0 [m]", "size")
-
-
-@dataclass(frozen=True, kw_only=True)
 class _BurgSceneDocument:
     """Schema of the file."""
 
@@ -435,7 +422,7 @@ class _BurgSceneDocument:
     objects: tuple[_Instance, ...]
     bg_objects: tuple[_Instance, ...] = ()
     object_library_fn: str | None = None
-    printout: _Printout | None = None
+    printout: BurgPrintout | None = None
 
     def __post_init__(self) -> None:
         if min(self.ground_area_x, self.ground_area_y) <= 0.0:
@@ -471,40 +458,24 @@ def read_burg_scene(path: str | Path) -> BurgScene:
             f"{_size_from_millimetres(document.printout.size)}; the ground area of "
             f"{_size_from_millimetres(ground_area)} was ignored"
         )
-    placed = {}
-    for key in ("objects", "bg_objects"):
-        items = zip(getattr(document, key), reader.item_lines(node, key), strict=True)
-        placed[key] = tuple(_make_instance(item, str(path), line, notes) for item, line in items)
+    placed: dict[str, list[BurgInstance]] = {"objects": [], "bg_objects": []}
+    for key, instances in placed.items():
+        for item, line in zip(getattr(document, key), reader.item_lines(node, key), strict=True):
+            where = f"{path}:{line}: pose of {item.object_type!r}"
+            (X_SO,), rounded = nearest_rigid([item.pose], where)
+            notes += rounded
+            pose = Pose.from_matrix(X_SO, quaternion=True)
+            instances.append(BurgInstance(object_type=item.object_type, X_SO=pose, line=line))
     return BurgScene(
         path=path,
         ground_area=ground_area,
-        objects=placed["objects"],
-        bg_objects=placed["bg_objects"],
+        objects=tuple(placed["objects"]),
+        bg_objects=tuple(placed["bg_objects"]),
         library=locate_file(document.object_library_fn, path.parent),
-        printout=_make_printout(document.printout),
+        printout=document.printout,
         notes=tuple(notes),
-    )
-
-
-def _make_printout(given: _Printout | None) -> BurgPrintout | None:
-    if given is None:
-        return None
-    info = given.marker_info
-    return BurgPrintout(
-        size=given.size,
-        dictionary=info.aruco_dict.removeprefix("DICT_"),
-        count=(info.marker_count_x, info.marker_count_y),
-        side=round(info.marker_size_mm * 1e-3, 9),
-        spacing=round(info.marker_spacing_mm * 1e-3, 9),
     )
 
 
 def _size_from_millimetres(size: tuple[float, float]) -> str:
     return f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm"
-
-
-def _make_instance(item: _Instance, path: str, line: int, notes: list[str]) -> BurgInstance:
-    (X_SO,), rounded = nearest_rigid([item.pose], f"{path}:{line}: pose of {item.object_type!r}")
-    notes += rounded
-    pose = Pose.from_matrix(X_SO, quaternion=True)
-    return BurgInstance(object_type=item.object_type, X_SO=pose, line=line)

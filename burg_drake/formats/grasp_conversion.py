@@ -17,6 +17,7 @@ from burg_drake.core import (
     InvalidInputError,
     Outcome,
     UnknownNameError,
+    distinct_texts,
     list_names,
     make_name,
     provenance_parts,
@@ -150,7 +151,7 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
         InvalidInputError: one name is given for grasps of several objects.
         UnknownNameError: there are no grasps of an object of an old name.
     """
-    known = set(grasps.object.tolist())
+    known = distinct_texts(grasps.object)
     if not names or not known:
         return grasps
     if "" in names and "" not in known:

@@ -62,10 +62,6 @@ def graspnet_X_FG(depth: ArrayLike, gripper: Gripper) -> Array:
     return make_pose(rotation, beyond[..., None] * (1.0, 0.0, 0.0))
 
 
-def _X_GF(gripper: Gripper) -> Array:
-    return inverse(graspnet_X_FG(DEFAULT_DEPTH, gripper))
-
-
 def _X_GF_each(grasps: GraspSet, gripper: Gripper) -> Array:
     return inverse(graspnet_X_FG(_column_or_default(grasps, "depth", DEFAULT_DEPTH), gripper))
 
@@ -175,7 +171,7 @@ GRASPNET_FORMAT = GraspFormat(
         "provenance",
         "double precision",
     ),
-    X_GF=_X_GF,
+    X_GF=lambda gripper: inverse(graspnet_X_FG(DEFAULT_DEPTH, gripper)),
     X_GF_each=_X_GF_each,
     recognises=_recognise,
     read=_read,

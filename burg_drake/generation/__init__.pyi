@@ -9,6 +9,8 @@ from .scene_sampling import (
     SampledScene as SampledScene,
     SceneSampler as SceneSampler,
     attempts_with_same_objects as attempts_with_same_objects,
+    convert_drake_errors as convert_drake_errors,
+    kept_sampler as kept_sampler,
     sample_again as sample_again,
     sample_scene as sample_scene,
 )

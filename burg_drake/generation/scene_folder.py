@@ -9,14 +9,13 @@ import csv
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 from burg_drake.core import (
     DocumentError,
     FolderLock,
     InvalidInputError,
-    SimulationError,
     atomic_write,
     ensure_writable_folder,
     load_document,
@@ -28,13 +27,14 @@ from burg_drake.core import (
 )
 from burg_drake.generation.scene_sampling import (
     SampledScene,
-    SceneSampler,
+    convert_drake_errors,
+    kept_sampler,
     require_possible_recipe,
     sampling_provenance,
 )
-from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import SamplingProvenance, SceneDocument, SceneRecipe, save_scene
-from burg_drake.station import StationLike, as_station, load_station
+from burg_drake.station import StationLike, as_station
 
 
 @dataclass(frozen=True)
@@ -216,24 +216,6 @@ def read_scene_table(path: Path) -> list[SceneRow]:
 
 
 @dataclass(frozen=True)
-class SamplingInputs:
-    """Where a recipe's scenes are made: all that a worker needs to know.
-
-    Attributes:
-        recipe: the recipe.
-        library, station: where they are.
-        contents: hashes of the two, so that nobody goes on with what has changed.
-        folder: that scenes are written to.
-    """
-
-    recipe: SceneRecipe
-    library: Path
-    station: Path
-    contents: tuple[str, str]
-    folder: Path
-
-
-@dataclass(frozen=True)
 class SampledFolder:
     """What is in a folder after sampling.
 
@@ -284,15 +266,14 @@ def sample_scenes(
     require_possible_recipe(recipe, library, station)
     provenance = sampling_provenance(recipe, library, station)
     with SceneFolder(folder, provenance) as opened:
-        contents = (provenance.library_content, provenance.station_content)
-        inputs = SamplingInputs(recipe, library.root, station.path, contents, opened.path)
+        sample = partial(run_scene_task, provenance, library.root, station.path, opened.path)
         todo = [number for number in range(count) if number not in opened.rows]
         if known is not None:
             known(count - len(todo))
         new: list[int] = []
         failed: dict[int, str] = {}
         try:
-            for number, outcome in map_unordered(partial(run_scene_task, inputs), todo, workers):
+            for number, outcome in map_unordered(sample, todo, workers):
                 if isinstance(outcome, BaseException):
                     failed[number] = one_line(outcome)
                     continue
@@ -306,35 +287,32 @@ def sample_scenes(
     return SampledFolder(rows, tuple(sorted(new)), failed)
 
 
-def run_scene_task(inputs: SamplingInputs, number: int) -> SampledScene:
+def run_scene_task(
+    provenance: SamplingProvenance, library: Path, station: Path, folder: Path, number: int
+) -> SampledScene:
     """Samples the scene of a number, in a worker.
 
-    Raises:
-        SimulationError: Drake ended by a failed condition.
-        Exception: what cannot be simulated is one failure.
-    """
-    try:
-        return _worker_sampler(inputs).sample(number, inputs.folder)
-    except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake failed: {error}") from error
-
-
-@lru_cache(maxsize=1)
-def _worker_sampler(inputs: SamplingInputs) -> SceneSampler:
-    """The sampler that a process keeps from scene to scene.
+    Args:
+        provenance: what all scenes are made with.
+        library, station: where they are.
+        folder: that the scene is to be written to.
+        number: of the scene.
 
     Raises:
         InvalidInputError: library or station are not any more what they were.
+        SimulationError: Drake ended by a failed condition.
+        Exception: what cannot be simulated is one failure.
     """
-    library, station = load_library(inputs.library), load_station(inputs.station)
-    sampler = SceneSampler(inputs.recipe, library, station)
-    there = sampler.provenance
-    for what, found, path, content in (
-        ("library", there.library_content, library.root, inputs.contents[0]),
-        ("station", there.station_content, station.path, inputs.contents[1]),
-    ):
-        if found != content:
-            raise InvalidInputError(
-                f"the {what} {path} was changed while scenes were sampled; run the command again"
-            )
-    return sampler
+    with convert_drake_errors():
+        sampler = kept_sampler(provenance.recipe, library, station)
+        here = sampler.provenance
+        for what, path, same in (
+            ("library", library, here.library_content == provenance.library_content),
+            ("station", station, here.station_content == provenance.station_content),
+        ):
+            if not same:
+                raise InvalidInputError(
+                    f"the {what} {path} was changed while scenes were sampled; run the command"
+                    " again"
+                )
+        return sampler.sample(number, folder)

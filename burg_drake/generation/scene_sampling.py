@@ -7,8 +7,10 @@ Reasons of refused attempts are counted.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ import numpy as np
 from burg_drake.cameras import visible_from
 from burg_drake.core import (
     InvalidInputError,
+    SimulationError,
     UnknownNameError,
     content_hash,
     resolve_reference,
@@ -252,6 +255,34 @@ class SceneSampler:
     def _with_origin(self, scene: Scene, number: int, attempt: int) -> Scene:
         origin = SceneOrigin(**vars(self.provenance), number=number, attempt=attempt)
         return Scene(replace(scene.document, origin=origin), scene.library, scene.path)
+
+
+@lru_cache(maxsize=1)
+def kept_sampler(recipe: SceneRecipe, library: Path, station: Path) -> SceneSampler:
+    """The sampler that a process keeps from scene to scene.
+
+    Args:
+        recipe: how scenes are drawn.
+        library: folder of the objects.
+        station: file of the station.
+
+    Raises:
+        BurgError: one of them cannot be read; and see `SceneSampler`.
+    """
+    return SceneSampler(recipe, load_library(library), load_station(station))
+
+
+@contextmanager
+def convert_drake_errors() -> Iterator[None]:
+    """Around what Drake does: a failed condition of its own ends this alone.
+
+    Raises:
+        SimulationError: in the place of `SystemExit`.
+    """
+    try:
+        yield
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"Drake failed: {error}") from error
 
 
 def attempts_with_same_objects(recipe: SceneRecipe) -> int:

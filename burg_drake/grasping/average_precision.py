@@ -167,25 +167,17 @@ def precision_at_top(
         )
     if criteria.ndim == 1:
         criteria = criteria[:, None]
-    kept = suppress_near_grasps(grasps, per_object=per_object)[:top]
+    kept = suppress_near_grasps(grasps, per_object)[:top]
     hits = np.zeros((top, criteria.shape[1]))
     hits[: len(kept)] = criteria[kept]
     return TopPrecision(kept, np.cumsum(hits, axis=0) / np.arange(1, top + 1)[:, None])
 
 
-def suppress_near_grasps(
-    grasps: GraspSet,
-    *,
-    translation: float = GraspNetSettings.suppression_distance,
-    angle: float = GraspNetSettings.suppression_angle,
-    per_object: int | None = None,
-) -> NDArray[np.intp]:
+def suppress_near_grasps(grasps: GraspSet, per_object: int | None = None) -> NDArray[np.intp]:
     """Greedy suppression of grasps that are near a better one of the same object and instance.
 
     Args:
         grasps: N grasps with scores.
-        translation, angle: a grasp goes if it is less than both away from one that is kept
-            [m, rad].
         per_object: how many of an object (and instance) are kept at most; None for all.
 
     Returns:
@@ -197,7 +189,7 @@ def suppress_near_grasps(
     kept = [np.empty(0, dtype=np.intp)]
     for target in by_target(grasps):
         rows = target[np.argsort(rank[target])]
-        stay = _kept_positions(grasp_components(grasps.X_OG[rows]), translation, angle, per_object)
+        stay = _kept_positions(grasp_components(grasps.X_OG[rows]), per_object)
         kept.append(rank[rows[stay]])
     return order[np.sort(np.concatenate(kept))]
 
@@ -232,7 +224,7 @@ def precision_recall(score: ArrayLike, good: ArrayLike) -> PrecisionRecall:
     return PrecisionRecall(fall[last], hits[last] / (last + 1), recall)
 
 
-def _kept_positions(G: Array, translation: float, angle: float, limit: int | None) -> list[int]:
+def _kept_positions(G: Array, limit: int | None) -> list[int]:
     """Positions of the grasps that are kept, of (12, N) components in falling order of score."""
     kept: list[int] = []
     left = np.arange(G.shape[1])
@@ -240,8 +232,8 @@ def _kept_positions(G: Array, translation: float, angle: float, limit: int | Non
         best, left = left[0], left[1:]
         kept.append(int(best))
         F = G[:, best, None]
-        near = pair_translation(G[:, left], F) < translation
-        near[near] = pair_angle(G[:, left[near]], F) < angle
+        near = pair_translation(G[:, left], F) < GraspNetSettings.suppression_distance
+        near[near] = pair_angle(G[:, left[near]], F) < GraspNetSettings.suppression_angle
         left = left[~near]
     return kept
 

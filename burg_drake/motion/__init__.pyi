@@ -85,7 +85,7 @@ from .reach_layer import (
     reach_from_above as reach_from_above,
     reach_without_objects as reach_without_objects,
 )
-from .reach_verdict import Reach as Reach, Witness as Witness
+from .reach_verdict import ArmPath as ArmPath, Reach as Reach
 from .reachability import (
     ReachabilityMap as ReachabilityMap,
     ReachabilitySettings as ReachabilitySettings,

@@ -308,7 +308,7 @@ class ArmCollision:
             low, high = self._diagram.station.hand.opening
             closed = min(max((high - width) / (high - low), 0.0), 1.0)
             for index, finger in self._fingers:
-                positions[index] = finger.open + closed * (finger.closed - finger.open)
+                positions[index] = finger.position(closed)
         if carried:
             positions[self._carried.height(carried)] = rise
         return positions

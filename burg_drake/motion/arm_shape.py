@@ -26,7 +26,13 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, Arrays, cached, content_hash
 from burg_drake.motion.arm_links import ArmLinks
-from burg_drake.motion.ball_tree import Balls, BallTrees, BodyBalls, bodies_with_shape
+from burg_drake.motion.ball_tree import (
+    Balls,
+    BallTrees,
+    BodyBalls,
+    bodies_with_shape,
+    hull_vertices,
+)
 from burg_drake.motion.self_clearance import (
     ClearanceTable,
     JointGrid,
@@ -192,8 +198,7 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
         case Box():
             sizes = shape.size().tolist()
         case Convex() | Mesh():
-            hull = inspector.GetConvexHull(geometry)
-            sizes = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+            sizes = hull_vertices(inspector, geometry)
         case _:
             sizes = []  # not known; to cover it raises an error
     return [type(shape).__name__, sizes]

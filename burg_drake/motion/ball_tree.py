@@ -110,14 +110,25 @@ def _cover(
         case Cylinder():
             return _cover_cylinder(shape.radius(), shape.length() / 2, overshoot, given)
         case Convex() | Mesh():
-            hull = inspector.GetConvexHull(geometry)
-            points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-            return _cover_hull(points, overshoot, given)
-    raise InvalidInputError(
+            return _cover_hull(hull_vertices(inspector, geometry), overshoot, given)
+    raise unsupported_shape_error(inspector, geometry)
+
+
+def unsupported_shape_error(
+    inspector: SceneGraphInspector, geometry: GeometryId
+) -> InvalidInputError:
+    """The error of a collision geometry of the robot whose shape is not known here."""
+    return InvalidInputError(
         f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
-        f" {type(shape).__name__}; supported are boxes, capsules, cylinders, spheres and convex"
-        " meshes"
+        f" {type(inspector.GetShape(geometry)).__name__}; supported are boxes, capsules, cylinders,"
+        " spheres and convex meshes"
     )
+
+
+def hull_vertices(inspector: SceneGraphInspector, geometry: GeometryId) -> Array:
+    """(V, 3) vertices of the convex hull of a mesh [m]."""
+    hull = inspector.GetConvexHull(geometry)
+    return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
 
 
 def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:

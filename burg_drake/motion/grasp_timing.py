@@ -13,7 +13,7 @@ from burg_drake.motion.motion_settings import TimingSettings
 from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.plan_files import Plan
 from burg_drake.motion.polyline_timing import Cubics, IsFree, time_polyline
-from burg_drake.motion.reach_verdict import Witness
+from burg_drake.motion.reach_verdict import ArmPath
 from burg_drake.motion.trajectory import Motion, Trajectory
 from burg_drake.station import GraspMotion
 
@@ -23,7 +23,7 @@ REFERENCE_LIFT_HEIGHT = GraspMotion().lift_height
 
 @dataclass(frozen=True)
 class PathChecks:
-    """Checks of what leaves the paths of a witness, each of rows (R, n) that the arm moves through
+    """Checks of what leaves an arm path, each of rows (R, n) that the arm moves through
     straight from row to row.
 
     Attributes:
@@ -39,7 +39,7 @@ class PathChecks:
 
 
 def time_motion(
-    witness: Witness,
+    path: ArmPath,
     limits: ArmLimits,
     kinematics: ArmKinematics,
     *,
@@ -47,10 +47,10 @@ def time_motion(
     checks: PathChecks | None = None,
     limit_margin: float = 0.0,
 ) -> Plan:
-    """Gives the motions of a witness their time; each begins and ends at rest.
+    """Gives the segments of an arm path their time; each begins and ends at rest.
 
     Args:
-        witness: the paths.
+        path: the segments.
         limits: of the joints; none is exceeded.
         kinematics: the arm, to measure the path length of the hand.
         settings: how fast, how close to the paths.
@@ -64,16 +64,16 @@ def time_motion(
         InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
             keep the others.
     """
-    min_straightness = 2e-5  # Metres. The witness is no straighter.
+    min_straightness = 2e-5  # Metres. The path is no straighter.
     unmeasured_clearance = 2e-4  # Metres.
     settings, checks = settings or TimingSettings(), checks or PathChecks()
-    near = unmeasured_clearance if np.isnan(witness.clearance) else max(0.0, witness.clearance)
+    near = unmeasured_clearance if np.isnan(path.clearance) else max(0.0, path.clearance)
     lines = replace(
         settings, straightness=max(min_straightness, min(settings.straightness, near / 2.0))
     )
     gentle = limits.scaled_down(settings.velocity_share, settings.ramp)
     transfer = time_polyline(
-        _require_within_limits(witness.transfer, limits, "transfer"),
+        _require_within_limits(path.transfer, limits, "transfer"),
         gentle,
         deviation=settings.corner_deviation,
         is_free=checks.transfer,
@@ -88,17 +88,17 @@ def time_motion(
         )
 
     slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
-    approach = timed_line("approach", witness.approach, slow, checks.approach)
-    rising = _lift_speed(_hand_path_length(witness.lift, kinematics), settings)
-    lift = timed_line("lift", witness.lift, rising, checks.lift)
+    approach = timed_line("approach", path.approach, slow, checks.approach)
+    rising = _lift_speed(_hand_path_length(path.lift, kinematics), settings)
+    lift = timed_line("lift", path.lift, rising, checks.lift)
     retreat = None
-    if witness.retreat is not None:
-        back = timed_line("retreat", witness.retreat, _retreat_speed(settings), checks.retreat)
-        retreat = _sample_motion(back, witness.retreat, limits, settings)
+    if path.retreat is not None:
+        back = timed_line("retreat", path.retreat, _retreat_speed(settings), checks.retreat)
+        retreat = _sample_motion(back, path.retreat, limits, settings)
     return Plan(
-        _sample_motion(transfer, witness.transfer, limits, settings),
-        _sample_motion(approach, witness.approach, limits, settings),
-        _sample_motion(lift, witness.lift, limits, settings),
+        _sample_motion(transfer, path.transfer, limits, settings),
+        _sample_motion(approach, path.approach, limits, settings),
+        _sample_motion(lift, path.lift, limits, settings),
         retreat=retreat,
     )
 
@@ -108,7 +108,7 @@ def _require_within_limits(q: Array, limits: ArmLimits, name: str) -> Array:
     if outside.any():
         row, joint = np.argwhere(outside)[0]
         raise InvalidInputError(
-            f"{name} of a witness has joint {joint + 1} at {q[row, joint]:.4f} rad in waypoint"
+            f"{name} of the path has joint {joint + 1} at {q[row, joint]:.4f} rad in waypoint"
             f" {row}, outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
         )
     return q

@@ -1,7 +1,7 @@
 """Collision-free paths from the home posture to goals, which share their work.
 
-Goals are connected to the roadmap. If that fails, trees grow from the goals until one of them
-meets the roadmap. Paths are then shortened.
+Goals are connected to the roadmap. If that fails, a tree grows from a goal until it meets the
+roadmap. Paths are then shortened.
 """
 
 from __future__ import annotations
@@ -97,28 +97,26 @@ def _shortest_through(
             return np.asarray(q[chain])
 
 
-def search_from_goals(
-    roadmap: Roadmap, edges: EdgeChecker, goals: Array, lower: Array, upper: Array
-) -> tuple[int, Array] | None:
-    """Looks for a way from home to any of (K, n) goals; see `HomeTree.connect`."""
-    bounds = edges.proximity.bounds(goals)
-    roots = np.flatnonzero(~bounds.blocked if edges.exact else bounds.likely_free)
-    if not len(roots):
-        return None
-    rng = rng_from("burg_drake goal search", goals)
+def search_from_goal(
+    roadmap: Roadmap, edges: EdgeChecker, goal: Array, lower: Array, upper: Array
+) -> Array | None:
+    """Looks for a way (M, n) from home to a goal (n,) by a tree that grows from the goal."""
+    bounds = edges.proximity.bounds(goal[None])
     # A goal that is not even likely free says that bounds are too loose around here to guess by.
-    guess = bool(bounds.likely_free[roots].any())
-    trees = _Trees(goals[roots], guess)
+    guess = bool(bounds.likely_free[0])
+    if bounds.blocked[0] or not (edges.exact or guess):
+        return None
+    rng = rng_from("burg_drake goal search", goal[None])
+    tree = _GoalTree(goal, guess)
     for _ in range(24):  # batches of samples before the search gives up
-        new = trees.grow(roadmap, edges, _draw_samples(trees.q, lower, upper, rng))
-        for node, entry in _connections(roadmap, edges, trees.q, new, guess):
-            chain = trees.chain(node)
-            corners = np.concatenate([roadmap.q[entry][None], trees.q[chain]])
+        new = tree.grow(roadmap, edges, _draw_samples(tree.q, lower, upper, rng))
+        for node, entry in _connections(roadmap, edges, tree.q, new, guess):
+            corners = np.concatenate([roadmap.q[entry][None], tree.q[tree.chain(node)]])
             if edges.first_blocked(corners) is not None:
                 continue
             path = roadmap.path(entry)
             if path is not None:
-                return int(roots[chain[-1]]), np.concatenate([path, corners[1:]])
+                return np.concatenate([path, corners[1:]])
     return None
 
 
@@ -148,17 +146,17 @@ def _connections(
     return [(int(node[k]), int(entry[k])) for k in order]
 
 
-class _Trees:
+class _GoalTree:
     """Nodes that lead back to a goal.
 
     Attributes:
-        q: (T, n) configurations, the goals first.
+        q: (T, n) configurations, the goal first.
     """
 
-    def __init__(self, goals: Array, guess: bool) -> None:
-        self.q = goals
+    def __init__(self, goal: Array, guess: bool) -> None:
+        self.q = goal[None]
         self._guess = guess
-        self._towards = np.full(len(goals), -1)
+        self._towards = np.array([-1])
 
     def grow(self, roadmap: Roadmap, edges: EdgeChecker, samples: Array) -> NDArray[np.intp]:
         """Steps from the nearest nodes towards samples (S, n); indices of the new nodes."""
@@ -176,7 +174,7 @@ class _Trees:
         return np.arange(len(self.q) - int(free.sum()), len(self.q))
 
     def chain(self, node: int) -> list[int]:
-        """The nodes from one to its goal."""
+        """The nodes from one to the goal."""
         return chain_to_root(self._towards, node)
 
 
@@ -196,44 +194,32 @@ class HomeTree:
         upper: Array,
         *,
         focus: Array | None = None,
-        seed: object = "",
         nodes: int = 600,
     ) -> None:
         """Lays the roadmap out; for the arguments see there."""
         self.edges = edges
-        self.roadmap = Roadmap(edges, home, lower, upper, focus=focus, seed=seed, nodes=nodes)
+        self.roadmap = Roadmap(edges, home, lower, upper, focus=focus, nodes=nodes)
         self._lower, self._upper = lower, upper
 
-    def connect(self, goals: Array) -> tuple[int, Array] | None:
-        """A free way to one of several goals.
+    def connect(self, goals: Array) -> list[Array | None]:
+        """A free way to each of several goals, with few batches of the fast tier; what is found
+        for one does not depend on the others.
 
         Args:
-            goals: (K, n) postures in order of preference.
+            goals: (K, n) postures.
 
         Returns:
-            Index of the first goal that a segment from home or from a near node of the roadmap
-            leads to, else of one that a search has reached, and (M, n) the corners of the way, home
-            first; None if nothing was found.
+            (M, n) the corners of each way, home first: one that ends with a segment from home or
+            from a near node of the roadmap, else one that a search has found; None if there is
+            neither.
         """
-        goals = np.asarray(goals, dtype=float)
-        for index in range(len(goals)):
-            (path,) = self._by_segments(goals[index : index + 1])
-            if path is not None:
-                return index, path
-        return self._search(goals)
-
-    def connect_each(self, goals: Array) -> list[Array | None]:
-        """A free way to each of several goals (K, n), with few batches of the fast tier; what is
-        found for one does not depend on the others. See `connect`."""
         goals = np.asarray(goals, dtype=float)
         paths = self._by_segments(goals)
         for index in (k for k, path in enumerate(paths) if path is None):
-            found = self._search(goals[index : index + 1])
-            paths[index] = None if found is None else found[1]
+            paths[index] = search_from_goal(
+                self.roadmap, self.edges, goals[index], self._lower, self._upper
+            )
         return paths
-
-    def _search(self, goals: Array) -> tuple[int, Array] | None:
-        return search_from_goals(self.roadmap, self.edges, goals, self._lower, self._upper)
 
     def _by_segments(self, goals: Array) -> list[Array | None]:
         """Ways that end with a segment from home or from a near node, for each goal (K, n)."""

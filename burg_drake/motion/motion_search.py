@@ -17,7 +17,7 @@ from burg_drake.motion.edge_checker import EdgeChecker
 from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.line_search import Chain, Failure, LineSearchBatch
 from burg_drake.motion.motion_settings import ReachSettings
-from burg_drake.motion.reach_verdict import Reach, Witness
+from burg_drake.motion.reach_verdict import ArmPath, Reach
 
 PROGRESS_ORDER = (
     Outcome.ARM_COLLISION,
@@ -182,7 +182,7 @@ class MotionSearch:
         """A yes for each of the free chains that a path leads to; the others are refused."""
         if not chains:
             return {}
-        transfers = self._tree.connect_each(np.array([c.q[0] for c in chains.values()]))
+        transfers = self._tree.connect(np.array([c.q[0] for c in chains.values()]))
         found = {}
         for (grasp, chain), transfer in zip(chains.items(), transfers, strict=True):
             if transfer is None:
@@ -191,7 +191,7 @@ class MotionSearch:
                 continue
             at, corner = chain.at_grasp, chain.at_retreated
             hand = float(self._task.clearance[grasp, chain.flip])
-            witness = Witness(
+            path = ArmPath(
                 X_WG=self._task.X_WG[grasp, chain.flip],
                 transfer=transfer,
                 approach=chain.q[: at + 1],
@@ -200,7 +200,7 @@ class MotionSearch:
                 clearance=hand,
             )
             clearance = max(0.0, min(hand, float(chain.lower.min())))
-            found[grasp] = Reach(None, clearance=clearance, witness=witness)
+            found[grasp] = Reach(None, clearance=clearance, path=path)
         return found
 
     def _refused_reach(self, grasp: int) -> Reach:

@@ -8,7 +8,7 @@ chain in collision is rejected, and the next best takes its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -133,13 +133,6 @@ class ChainCandidates:
         return q, np.array([b[3] for b in of]).reshape(len(of), 3)
 
 
-SolvePostures = Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]
-"""Postures (S, n) at hand poses (S, 4, 4) by steps from near postures (S, n), and whether they meet
-them."""
-MeasureClearance = Callable[[Array], tuple[Array, Array]]
-"""Bounds of the clearance of postures (S, n): lower, and what has to be positive to count [m]."""
-
-
 @dataclass(frozen=True, eq=False)
 class FollowedPostures:
     """S postures at grasps, and what became of them at L poses of the way.
@@ -159,74 +152,6 @@ class FollowedPostures:
         """The pose at which a posture is deepest in collision; None if it is nowhere."""
         worst = int(self.upper[s].argmin())
         return None if self.upper[s, worst] > 0.0 else worst
-
-
-@dataclass(frozen=True, eq=False)
-class PostureFollower:
-    """Follows postures; those in collision on the way are not followed any further.
-
-    Attributes:
-        lines: where the hand goes.
-        travel: most that a joint may move from one to the next [rad].
-        solve: solves for postures.
-        measure: measures their clearance.
-    """
-
-    lines: LinePoses
-    travel: float
-    solve: SolvePostures
-    measure: MeasureClearance
-
-    def follow(self, X_AG: Array, q: Array) -> FollowedPostures:
-        """From the grasp to the pregrasp; then, from the grasp, back and up to the top.
-
-        Args:
-            X_AG: (S, 4, 4) grasps in the arm's base frame.
-            q: (S, n) postures there.
-        """
-        count, at_grasp = len(self.lines.layers), self.lines.at_grasp
-        at_retreated = self.lines.at_retreated
-        lower, upper = np.full((2, len(q), count), np.inf)
-        every = np.full((len(q), count, q.shape[1]), np.nan)
-        every[:, at_grasp] = q
-        found = FollowedPostures(every, lower, upper, np.full(len(q), COMPLETE_CHAIN))
-        self._measure(found, [at_grasp], GRASP)
-        for stage, begin, end in (
-            (APPROACH, at_grasp, 0),
-            (RETREAT, at_grasp, at_retreated),
-            (LIFT, at_retreated, count - 1),
-        ):
-            step = -1 if end < begin else 1
-            poses = range(begin + step, end + step, step)
-            for pose in poses:
-                self._step(found, X_AG, pose, step, stage, bent=pose - step == begin)
-            self._measure(found, poses, stage)
-        return found
-
-    def _step(
-        self, found: FollowedPostures, X_AG: Array, pose: int, step: int, stage: int, *, bent: bool
-    ) -> None:
-        """To the next pose, on from the last two; from the last one alone where the way is bent."""
-        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
-        before = found.q[alive, pose - step]
-        start = before
-        if not bent:
-            start = 2.0 * before - found.q[alive, pose - 2 * step]
-        X_AH = self.lines.X_AH(X_AG[alive], self.lines.layers[pose])
-        q, met = self.solve(X_AH, start)
-        met &= np.abs(q - before).max(axis=1, initial=0.0) <= self.travel
-        found.q[alive[met], pose] = q[met]
-        found.stage[alive[~met]] = stage
-
-    def _measure(self, found: FollowedPostures, poses: Sequence[int], stage: int) -> None:
-        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
-        if not len(alive) or not len(poses):
-            return
-        where = np.ix_(alive, np.array(poses))
-        lower, upper = self.measure(found.q[where].reshape(-1, found.q.shape[-1]))
-        shape = len(alive), len(poses)
-        found.lower[where], found.upper[where] = lower.reshape(shape), upper.reshape(shape)
-        found.stage[alive[~(found.upper[where] > 0.0).all(axis=1)]] = stage
 
 
 SEGMENT_STAGES = (
@@ -267,7 +192,6 @@ class NumericLineSearch:
         self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
         self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
         self.layers, self.at_grasp = lines.layers, lines.at_grasp
-        self.follower = PostureFollower(lines, settings.joint_travel, self.solve, self.measure)
 
     def lifted(self, height: float) -> NumericLineSearch:
         """See `LineSearch`."""
@@ -285,16 +209,63 @@ class NumericLineSearch:
         """See `LineSearch`."""
         return _NumericBatch(self, X_AG, clearance)
 
-    def solve(self, X_AH: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they
-        meet them (S,)."""
-        return solve_ik_near(self.arm, X_AH, start, self.settings)
-
     def measure(self, q: Array) -> tuple[Array, Array]:
         """Clearances of postures (S, n): lower bounds, and what has to be positive for a posture to
         count (S,) [m]: the upper bound where the last word is Drake's, else the best guess."""
         bounds = self.proximity.bounds(q, hand=False)
         return bounds.lower, decisive_clearance(bounds, self.settings.exact)
+
+    def follow(self, X_AG: Array, q: Array) -> FollowedPostures:
+        """Follows postures from the grasp to the pregrasp; then, from the grasp, back and up to
+        the top. Those in collision on the way are not followed any further.
+
+        Args:
+            X_AG: (S, 4, 4) grasps in the arm's base frame.
+            q: (S, n) postures there.
+        """
+        count, at_grasp = len(self.layers), self.at_grasp
+        at_retreated = self.lines.at_retreated
+        lower, upper = np.full((2, len(q), count), np.inf)
+        every = np.full((len(q), count, q.shape[1]), np.nan)
+        every[:, at_grasp] = q
+        found = FollowedPostures(every, lower, upper, np.full(len(q), COMPLETE_CHAIN))
+        self._measure_followed(found, [at_grasp], GRASP)
+        for stage, begin, end in (
+            (APPROACH, at_grasp, 0),
+            (RETREAT, at_grasp, at_retreated),
+            (LIFT, at_retreated, count - 1),
+        ):
+            step = -1 if end < begin else 1
+            poses = range(begin + step, end + step, step)
+            for pose in poses:
+                self._step(found, X_AG, pose, step, stage, bent=pose - step == begin)
+            self._measure_followed(found, poses, stage)
+        return found
+
+    def _step(
+        self, found: FollowedPostures, X_AG: Array, pose: int, step: int, stage: int, *, bent: bool
+    ) -> None:
+        """To the next pose, on from the last two; from the last one alone where the way is bent."""
+        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
+        before = found.q[alive, pose - step]
+        start = before
+        if not bent:
+            start = 2.0 * before - found.q[alive, pose - 2 * step]
+        X_AH = self.lines.X_AH(X_AG[alive], self.layers[pose])
+        q, met = solve_ik_near(self.arm, X_AH, start, self.settings)
+        met &= np.abs(q - before).max(axis=1, initial=0.0) <= self.settings.joint_travel
+        found.q[alive[met], pose] = q[met]
+        found.stage[alive[~met]] = stage
+
+    def _measure_followed(self, found: FollowedPostures, poses: Sequence[int], stage: int) -> None:
+        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
+        if not len(alive) or not len(poses):
+            return
+        where = np.ix_(alive, np.array(poses))
+        lower, upper = self.measure(found.q[where].reshape(-1, found.q.shape[-1]))
+        shape = len(alive), len(poses)
+        found.lower[where], found.upper[where] = lower.reshape(shape), upper.reshape(shape)
+        found.stage[alive[~(found.upper[where] > 0.0).all(axis=1)]] = stage
 
 
 class _NumericBatch:
@@ -381,7 +352,7 @@ class _NumericBatch:
         flip = np.array([self._of[g].flip[j] for g, j in places], dtype=np.intp)
         q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
         q = q.reshape(len(k), len(search.home))
-        found = search.follower.follow(self._X_AG[grasp, flip], q)
+        found = search.follow(self._X_AG[grasp, flip], q)
         for s, (g, j) in enumerate(places):
             stage, blocked = int(found.stage[s]), found.blocked(s)
             if stage == COMPLETE_CHAIN:

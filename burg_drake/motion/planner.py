@@ -15,7 +15,7 @@ from burg_drake.motion.joint_limits import ArmLimits
 from burg_drake.motion.motion_settings import ReachSettings, TimingSettings
 from burg_drake.motion.plan_files import Plan
 from burg_drake.motion.polyline_timing import IsFree
-from burg_drake.motion.reach_verdict import Reach, Witness
+from burg_drake.motion.reach_verdict import ArmPath, Reach
 from burg_drake.motion.trajectory import PlanOrigin
 from burg_drake.scene import SceneLike, as_scene
 from burg_drake.station import StationLike, as_station
@@ -64,25 +64,25 @@ class Planner:
         """
         X_WG = self.reach.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
         reach = self.reach.check(instance, X_WG, width)
-        if reach.witness is None:
+        if reach.path is None:
             return reach
-        return self.time(instance, reach.witness, width)
+        return self.time(instance, reach.path, width)
 
-    def time(self, instance: str, witness: Witness, width: float = np.nan) -> Plan:
-        """Gives a witness of `reach` its time, after shortening the transfer.
+    def time(self, instance: str, path: ArmPath, width: float = np.nan) -> Plan:
+        """Gives a path of `reach` its time, after shortening the transfer.
 
-        What leaves the witness's paths, rounded corners and smoothed lines, is checked for
-        collisions as the paths were.
+        What leaves the path, rounded corners and smoothed lines, is checked for collisions as the
+        path was.
 
         Args:
             instance: the target.
-            witness: its motion.
+            path: of the arm.
             width: distance between the pads that hold the target [m]; NaN if it is not known.
         """
         is_free, hand = self.reach.path_is_free, self.reach.diagram.station.hand
-        if len(witness.transfer) > 2:
-            witness = replace(witness, transfer=self.reach.shortcut(witness.transfer))
-        motion, back_W = self.reach.motion, -witness.X_WG[:3, 2]
+        if len(path.transfer) > 2:
+            path = replace(path, transfer=self.reach.shortcut(path.transfer))
+        motion, back_W = self.reach.motion, -path.X_WG[:3, 2]
 
         def carrying(u_W: Array, start_W: Array) -> IsFree:
             return lambda q: is_free(
@@ -100,7 +100,7 @@ class Planner:
             lift=carrying(motion.direction_W, motion.retreat * back_W),
         )
         plan = time_motion(
-            witness,
+            path,
             self.limits,
             self.reach.kinematics,
             settings=self.settings,
@@ -114,7 +114,7 @@ class Planner:
             close_time=finger_travel / 2.0 / hand.closing_speed + 0.2,  # builds up the force
             opening=high,
             width=width,
-            origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),
+            origin=replace(self._origin, instance=instance, X_WG=path.X_WG),
         )
 
     def _along(self, u_W: Array, q: Array) -> Array:

@@ -13,11 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from burg_drake.core import Array, Booleans, Indices, Single
-from burg_drake.motion.clearance_bounds import (
-    ArmProximity,
-    Bounding,
-    ClearanceBounds,
-)
+from burg_drake.motion.clearance_bounds import ArmProximity, Bounding, ClearanceBounds
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.motion_settings import ReachSettings
 from burg_drake.motion.numeric_ik import ArmKinematics

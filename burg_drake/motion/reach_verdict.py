@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,8 @@ from burg_drake.core import Array, Outcome
 
 
 @dataclass(frozen=True, eq=False)
-class Witness:
-    """A collision-free motion of an arm with n joints.
+class ArmPath:
+    """A collision-free path of an arm with n joints, from home to the top of the lift.
 
     Between two rows the arm moves straight in joint space.
 
@@ -49,7 +50,7 @@ class Reach:
             the way, negative where it overlaps [m]; NaN where nothing was.
         excess: how far the best configuration is beyond a joint limit, less
             `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason.
-        witness: the motion; None if there is none.
+        path: the motion; None if there is none.
         lift: of a yes, length of its lift [m]; NaN of a no.
     """
 
@@ -57,15 +58,21 @@ class Reach:
     blocker: str = ""
     clearance: float = np.nan
     excess: float = np.nan
-    witness: Witness | None = None
+    path: ArmPath | None = None
     lift: float = np.nan
 
     @property
     def q_grasp(self) -> Array | None:
         """(n,) arm positions at the grasp [rad]; None if it is not reached."""
-        return None if self.witness is None else self.witness.approach[-1]
+        return None if self.path is None else self.path.approach[-1]
 
     @property
     def q_pregrasp(self) -> Array | None:
         """(n,) arm positions at the pregrasp [rad]; None if it is not reached."""
-        return None if self.witness is None else self.witness.approach[0]
+        return None if self.path is None else self.path.approach[0]
+
+    @property
+    def witness(self) -> ArmPath | None:
+        """`path`, by its earlier name; goes with 0.2."""
+        warnings.warn("Reach.witness is Reach.path since 0.1", DeprecationWarning, stacklevel=2)
+        return self.path

@@ -104,7 +104,6 @@ class Roadmap:
         upper: Array,
         *,
         focus: Array | None,
-        seed: object,
         nodes: int,
     ) -> None:
         """Lays the graph out.
@@ -114,17 +113,16 @@ class Roadmap:
             home: (n,) the posture that all ways begin at.
             lower, upper: (n,) joint limits [rad or m].
             focus: (F, n) postures like the goals to come, for two thirds of the nodes.
-            seed: content that the samples follow from, see `core.rng_from`.
             nodes: how many configurations to look for; those that home does not lead to are
                 dropped.
         """
         self._edges = edges
         near = np.empty((0, len(home))) if focus is None else focus
-        asked = (edges.content, home, lower, upper, near, seed, nodes)
+        asked = (edges.content, home, lower, upper, near, nodes)
         arrays = cached(
             "roadmap",
             content_hash(*asked),
-            lambda: _build_roadmap(edges, home, lower, upper, near, seed, nodes),
+            lambda: _build_roadmap(edges, home, lower, upper, near, nodes),
         )
         self.q, self.scale = arrays["q"], arrays["scale"]
         self._ends, self._length = arrays["ends"], arrays["length"]
@@ -191,13 +189,12 @@ def _build_roadmap(
     lower: Array,
     upper: Array,
     focus: Array,
-    seed: object,
     nodes: int,
 ) -> Arrays:
     """Nodes and edges of a roadmap; for the arguments see there."""
     node_clearance = 0.01  # Metres. Lower bound of the clearance of all nodes but home.
     clearance_margin = 1e-3  # Metres below the clearance at home, where that is small.
-    rng = rng_from("burg_drake home tree", seed, nodes)
+    rng = rng_from("burg_drake home tree", "", nodes)
     scale = _joint_levers(edges, rng.uniform(lower, upper, (64, len(home))))
     at_home = float(edges.proximity.bounds(home[None]).lower[0])
     clearance = min(node_clearance, at_home - clearance_margin)

@@ -33,10 +33,15 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, Indices, InvalidInputError, Single, transform_points
+from burg_drake.core import Array, Indices, Single, transform_points
 from burg_drake.geometry import Poses, ShapeBatch, shape_distances
 from burg_drake.motion.arm_links import ArmLinks, LinkPoses
-from burg_drake.motion.ball_tree import BallTrees, BodyBalls
+from burg_drake.motion.ball_tree import (
+    BallTrees,
+    BodyBalls,
+    hull_vertices,
+    unsupported_shape_error,
+)
 from burg_drake.station import StationDiagram
 
 
@@ -154,13 +159,8 @@ def _core(inspector: SceneGraphInspector, geometry: GeometryId) -> _Core:
             signs = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
             return _Core(signs * shape.size())
         case Convex() | Mesh():
-            hull = inspector.GetConvexHull(geometry)
-            return _Core(np.array([hull.vertex(i) for i in range(hull.num_vertices())]))
-    raise InvalidInputError(
-        f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
-        f" {type(shape).__name__}; supported are boxes, capsules, cylinders, spheres and convex"
-        " meshes"
-    )
+            return _Core(hull_vertices(inspector, geometry))
+    raise unsupported_shape_error(inspector, geometry)
 
 
 def _segment_ends(length: float) -> Array:

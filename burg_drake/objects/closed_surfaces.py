@@ -281,7 +281,8 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
     tolerances = (1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3)
     max_face_share = 0.5  # Share of the faces; if more remain, the surface is that rough.
     max_points = 10_000  # Points that are measured.
-    if len(surface.faces) <= max_faces:
+    count = len(surface.faces)
+    if count <= max_faces:
         return surface, []
     diagonal = float(np.linalg.norm(surface.extents))
     manifold, best = _to_manifold(surface), surface
@@ -295,14 +296,12 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
         best = merged
         if len(best.faces) <= max_faces:
             break
-    if len(best.faces) > max(max_faces, max_face_share * len(surface.faces)):
-        return surface, [
-            (f"kept all {len(surface.faces)} faces, as the surface is too rough to reduce")
-        ]
+    if len(best.faces) > max(max_faces, max_face_share * count):
+        return surface, [f"kept all {count} faces, as the surface is too rough to reduce"]
     step = max(1, len(surface.vertices) // max_points)
     away = one_sided_hausdorff(surface.vertices[::step], best)
     return best, [
-        f"reduced from {len(surface.faces)} to {len(best.faces)} faces, at most "
+        f"reduced from {count} to {len(best.faces)} faces, at most "
         f"{1e3 * max(away, DEVIATION_RESOLUTION):.2g} mm off"
     ]
 

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from burg_drake.core import Array, MeshError
+from burg_drake.core import Array, MeshError, count_with_noun
 from burg_drake.geometry import triangle_distances
 from burg_drake.objects.closed_surfaces import coarser_surfaces, decimate
 from burg_drake.objects.library import ContactGeometry, ContactKind, Fit, ObjectLibrary
@@ -35,18 +35,12 @@ NEAREST_FACES = 8  # Faces compared for each point.
 AVERAGED_NORMALS = 24  # Points whose normals are averaged.
 
 
-def contact_surface(
-    surface: trimesh.Trimesh,
-    closed: bool,
-    most_distance: float = MAX_CONTACT_DISTANCE,
-    most_angle: float = MAX_NORMAL_ANGLE,
-) -> tuple[trimesh.Trimesh, Fit]:
-    """The coarsest surface that keeps both bounds.
+def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Trimesh, Fit]:
+    """The coarsest surface within `MAX_CONTACT_DISTANCE` and `MAX_TURNED_SHARE`.
 
     Args:
         surface: of the object [m].
         closed: whether it is watertight, wound outward.
-        most_distance, most_angle: the bounds [m and rad].
 
     Returns:
         The surface, closed and wound outward, and how well it fits.
@@ -60,22 +54,19 @@ def contact_surface(
     min_height = 1e-6  # Metres; Drake finds no normal of a face with a smaller height.
     if not closed:
         raise MeshError("its surface is not closed")
-    normals = SurfaceNormals(surface, most_distance)
-    for rung in reversed(coarser_surfaces(surface, max_mean_to_bound * most_distance)):
+    normals = SurfaceNormals(surface)
+    for rung in reversed(coarser_surfaces(surface, max_mean_to_bound * MAX_CONTACT_DISTANCE)):
         if len(rung.faces) > max_faces:
             break
         mesh = trimesh.Trimesh(np.round(rung.vertices, decimals), rung.faces, process=False)
-        if (
-            min_face_height(mesh) < min_height
-            or normals.turned_share(mesh, most_angle) > MAX_TURNED_SHARE
-        ):
+        if min_face_height(mesh) < min_height or normals.turned_share(mesh) > MAX_TURNED_SHARE:
             continue
-        distance = surface_distance(mesh, surface, most_distance)
-        if distance <= most_distance:
+        distance = surface_distance(mesh, surface, MAX_CONTACT_DISTANCE)
+        if distance <= MAX_CONTACT_DISTANCE:
             return mesh, Fit(volume_ratio=float(mesh.volume / surface.volume), hausdorff=distance)
     raise MeshError(
         f"its surface cannot be reduced to {max_faces} faces without being more than "
-        f"{1e3 * most_distance:g} mm or {np.rad2deg(most_angle):g} degrees off"
+        f"{1e3 * MAX_CONTACT_DISTANCE:g} mm or {np.rad2deg(MAX_NORMAL_ANGLE):g} degrees off"
     )
 
 
@@ -84,11 +75,9 @@ class SurfaceNormals:
 
     Args:
         surface: [m].
-        reach: how far away a place may be that faces the same way, to count as the nearest [m].
     """
 
-    def __init__(self, surface: trimesh.Trimesh, reach: float = MAX_CONTACT_DISTANCE) -> None:
-        self.reach = reach
+    def __init__(self, surface: trimesh.Trimesh) -> None:
         self.triangles = np.asarray(surface.triangles)
         self.normals = np.asarray(surface.face_normals)
         self.samples, self.owner = spread_samples(surface, OBJECT_SAMPLES)
@@ -98,25 +87,27 @@ class SurfaceNormals:
         alike = AVERAGING_RADIUS * self.normals[self.owner]
         self.alike = cKDTree(np.hstack([self.samples, alike]))
 
-    def turned_share(self, mesh: trimesh.Trimesh, most_angle: float = MAX_NORMAL_ANGLE) -> float:
-        """Share of a mesh's area whose normals are more than an angle [rad] off the
+    def turned_share(self, mesh: trimesh.Trimesh) -> float:
+        """Share of a mesh's area whose normals are more than `MAX_NORMAL_ANGLE` off the
         surface's, both of the nearest place and of the mean around it."""
         points, face = spread_samples(mesh, RESULT_SAMPLES)
         normals = np.asarray(mesh.face_normals)[face]
         own = self._nearest(points, normals)
         mean = self._mean(points, own)
         cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
-        return float((cosine < np.cos(most_angle)).mean())
+        return float((cosine < np.cos(MAX_NORMAL_ANGLE)).mean())
 
     def _nearest(self, points: Array, normals: Array) -> Array:
-        """Normals (N, 3) of the surface at the nearest places: within `reach` at those that
-        face the same way, as near a thin wall its other side may be nearer."""
+        """Normals (N, 3) of the surface at the nearest places: within
+        `MAX_CONTACT_DISTANCE` at those that face the same way, as near a thin wall its other side
+        may be nearer."""
         _, near = self.places.query(points, min(NEAREST_FACES, len(self.every)))
         _, alike = self.alike.query(np.hstack([points, AVERAGING_RADIUS * normals]), NEAREST_FACES)
         which = np.hstack([self.every[near], self.owner[alike]])
         apart = triangle_distances(points[:, None], self.triangles[which])
         facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
-        apart -= np.where(facing & (apart <= self.reach), self.reach, 0.0)
+        near_and_facing = facing & (apart <= MAX_CONTACT_DISTANCE)
+        apart -= np.where(near_and_facing, MAX_CONTACT_DISTANCE, 0.0)
         return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])
 
     def _mean(self, points: Array, own: Array) -> Array:
@@ -169,7 +160,7 @@ def contact_geometry(
     closed: bool,
     pieces: Sequence[trimesh.Trimesh],
     folder: Path,
-) -> tuple[ContactGeometry, tuple[str, ...]]:
+) -> ContactGeometry:
     """What of an object touches others.
 
     Args:
@@ -181,22 +172,22 @@ def contact_geometry(
         folder: the object's; the mesh of kinds `surface` and `mesh` is written into it.
 
     Returns:
-        The contact geometry, whose mesh is relative to `folder`, and the files written.
+        The contact geometry, whose mesh is relative to `folder`.
 
     Raises:
         MeshError: the object is not near any primitive, not closed, or cannot be decimated, and
             `kind` needs it.
     """
     if kind == "mesh":
-        return _write_contact_mesh(surface, closed, folder), (CONTACT_FILE,)
+        return _write_contact_mesh(surface, closed, folder)
     if kind in ("pieces", "compliant_pieces"):
-        return ContactGeometry(kind=kind), ()
+        return ContactGeometry(kind=kind)
     if kind != "surface":
         volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
         found = fit_primitive(surface, volume)
         if found is not None:
             primitive, fit = found
-            return ContactGeometry(kind="primitive", primitive=primitive, fit=fit), ()
+            return ContactGeometry(kind="primitive", primitive=primitive, fit=fit)
         if kind == "primitive":
             raise MeshError(_primitive_error_message(surface, volume))
     try:
@@ -206,12 +197,10 @@ def contact_geometry(
             raise MeshError(
                 f"contact 'surface': {error}; {MESH_REPAIR_HINT}, or choose 'pieces'"
             ) from error
-        return ContactGeometry(reason=str(error)), ()
+        return ContactGeometry(reason=str(error))
     write_piece(mesh, folder / CONTACT_FILE)
     excess = max_excess(mesh, pieces)
-    return ContactGeometry(kind="surface", mesh=CONTACT_FILE, fit=fit, excess=excess), (
-        CONTACT_FILE,
-    )
+    return ContactGeometry(kind="surface", mesh=CONTACT_FILE, fit=fit, excess=excess)
 
 
 def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
@@ -224,7 +213,7 @@ def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
     if not contact.reason:
         return ""
     return (
-        f"finger pads touch {_piece_count_text(pieces)}, because {contact.reason};"
+        f"finger pads touch {count_with_noun(pieces, 'convex piece')}, because {contact.reason};"
         f" {MESH_REPAIR_HINT}, or accept that by 'contact: pieces' in an objects.yaml"
     )
 
@@ -243,14 +232,10 @@ def describe_pad_contact(library: ObjectLibrary, name: str) -> str:
     elif contact.mesh:
         what = f"a surface with {len(library.mesh(contact.mesh).faces)} faces"
     else:
-        return _piece_count_text(len(entry.pieces))
+        return count_with_noun(len(entry.pieces), "convex piece")
     if contact.fit is None:
         return what
     return f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm from the mesh"
-
-
-def _piece_count_text(count: int) -> str:
-    return f"{count} convex piece{'' if count == 1 else 's'}"
 
 
 def _write_contact_mesh(surface: trimesh.Trimesh, closed: bool, folder: Path) -> ContactGeometry:

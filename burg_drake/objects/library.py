@@ -432,10 +432,8 @@ class ObjectLibrary:
     def save(self) -> None:
         """Writes `library.yaml`, and `package.xml`, by which Drake's Parser and ROS know the folder
         as a package: `package://NAME/mug/mug.sdf`."""
-        manifest, package = (
-            self.root / "package.xml",
-            package_manifest(package_name(self.name), "Object library"),
-        )
+        manifest = self.root / "package.xml"
+        package = package_manifest(package_name(self.name), "Object library")
         if not manifest.is_file() or manifest.read_text() != package:
             atomic_write(manifest, package)
         save_document(self.document, self.root / LIBRARY_FILE)

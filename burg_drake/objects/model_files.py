@@ -96,16 +96,15 @@ def write_piece(mesh: trimesh.Trimesh, path: Path) -> None:
     )
 
 
-def corner_normals(mesh: trimesh.Trimesh, crease: float = np.deg2rad(35.0)) -> Array:
-    """Normals at the corners of each face, smooth across edges flatter than `crease`.
+def corner_normals(mesh: trimesh.Trimesh) -> Array:
+    """Normals at the corners of each face, smooth across edges flatter than 35 degrees.
 
     Args:
         mesh: F faces; vertices merged.
-        crease: [rad].
 
     Returns:
         (F, 3, 3) unit vectors, by face and corner: the mean, weighted by area, of the normals of
-        the faces around the corner's vertex that are within `crease` of the face's own.
+        the faces around the corner's vertex that are within 35 degrees of the face's own.
     """
     vertices, place = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)
     faces = place.reshape(-1)[mesh.faces]
@@ -120,7 +119,7 @@ def corner_normals(mesh: trimesh.Trimesh, crease: float = np.deg2rad(35.0)) -> A
     corner = np.repeat(np.arange(faces.size), around)
     offset = np.arange(len(corner)) - np.repeat(np.cumsum(around) - around, around)
     neighbour = order[start[faces.reshape(-1)[corner]] + offset] // 3
-    smooth = (unit[corner // 3] * unit[neighbour]).sum(axis=1) >= np.cos(crease)
+    smooth = (unit[corner // 3] * unit[neighbour]).sum(axis=1) >= np.cos(np.deg2rad(35.0))
     total = np.zeros((faces.size, 3))
     for k in range(3):
         total[:, k] = np.bincount(

@@ -14,10 +14,11 @@ from burg_drake.core import (
     InvalidInputError,
     Pose,
     UnknownNameError,
+    count_with_noun,
     make_name,
     suggest_names,
 )
-from burg_drake.formats import BurgInstance, BurgLibrary, BurgScene, YcbObject
+from burg_drake.formats import BurgLibrary, BurgScene, YcbObject
 from burg_drake.objects import ObjectLibrary, SymmetrySearch
 from burg_drake.pipeline.object_source import ObjectSource, check_source, object_name
 from burg_drake.scene import Board, Instance, Markers, SceneDocument
@@ -163,14 +164,14 @@ class PoseComparison:
 
     def sentence(self, file: str) -> str:
         """For people."""
-        listed = f"{file} lists {_count_text(self.listed, 'stable pose')}"
+        listed = f"{file} lists {count_with_noun(self.listed, 'stable pose')}"
         if self.distinct < self.listed:
             listed += f" ({self.distinct} different)"
         unknown = ""
         if self.unknown:
             was = "was" if len(self.unknown) == 1 else "were"
             unknown = f"; {len(self.unknown)} of the listed {was} not found"
-        return f"{listed}, {_count_text(self.here, 'pose')} found here{unknown}"
+        return f"{listed}, {count_with_noun(self.here, 'pose')} found here{unknown}"
 
 
 def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -> PoseComparison:
@@ -245,10 +246,6 @@ def _ycb_description(item: YcbObject, weighed: bool) -> str:
     return f"YCB {item.number} {label}{scan}{mass}"
 
 
-def _count_text(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 @dataclass(frozen=True)
 class ImportedScene:
     """A scene of another collection.
@@ -285,10 +282,9 @@ def import_burg_scene(
         InvalidInputError: an identifier makes no object name; the printout's markers do not exist
             or do not fit.
     """
-    names = _InstanceNames(scene, library)
+    made = _make_instances(scene, library)
     free, fixed, notes = [], [], []
-    for item in scene.objects:
-        instance = names.make_instance(item)
+    for item, instance in zip(scene.objects, made, strict=False):
         if library.entry(instance.object).is_fixed:
             fixed.append(instance)
             notes.append(
@@ -297,7 +293,7 @@ def import_burg_scene(
             )
         else:
             free.append(instance)
-    fixed += [names.make_instance(item) for item in scene.bg_objects]
+    fixed += made[len(scene.objects) :]
     notes += [
         f"an instance of object {i.object!r} is called {i.name!r}, as every station has"
         f" something called {i.object!r} already"
@@ -319,11 +315,12 @@ def _import_board(scene: BurgScene) -> Board:
     printout = scene.printout
     if printout is None:
         return Board(size=scene.ground_area)
+    given = printout.marker_info
     markers = Markers(
-        dictionary=printout.dictionary,
-        side=printout.side,
-        spacing=printout.spacing,
-        count=printout.count,
+        dictionary=given.aruco_dict.removeprefix("DICT_"),
+        side=round(given.marker_size_mm * 1e-3, 9),
+        spacing=round(given.marker_spacing_mm * 1e-3, 9),
+        count=(given.marker_count_x, given.marker_count_y),
     )
     board = Board(size=printout.size, markers=markers)
     try:
@@ -333,29 +330,27 @@ def _import_board(scene: BurgScene) -> Board:
     return board
 
 
-class _InstanceNames:
-    """Finds objects, and gives names to their instances."""
-
-    def __init__(self, scene: BurgScene, library: ObjectLibrary) -> None:
-        self.count: Counter[str] = Counter()
-        items = sorted((*scene.objects, *scene.bg_objects), key=lambda item: item.line)
-        self.taken = {object_name(item.object_type) for item in items}
-        lacking = [i for i in items if object_name(i.object_type) not in library.objects]
-        if lacking:
-            named = [(i, object_name(i.object_type)) for i in lacking]
-            raise UnknownNameError(
-                "; ".join(
-                    f"{scene.path}:{i.line}: object {name!r} ({i.object_type!r}) is not in library"
-                    f" {library.root}; {suggest_names(name, library.objects)}"
-                    for i, name in named
-                )
-            )
-
-    def make_instance(self, item: BurgInstance) -> Instance:
-        object = object_name(item.object_type)
-        self.count[object] += 1
-        if self.count[object] == 1 and object not in MODEL_NAMES:
-            return Instance(object=object, X_SO=item.X_SO)
-        while f"{object}_{self.count[object]}" in self.taken:  # an object may be called mug_2
-            self.count[object] += 1
-        return Instance(name=f"{object}_{self.count[object]}", object=object, X_SO=item.X_SO)
+def _make_instances(scene: BurgScene, library: ObjectLibrary) -> list[Instance]:
+    """Instances of the scene's objects, then of its fixed ones; objects that the library lacks are
+    an error."""
+    items = [(item, object_name(item.object_type)) for item in (*scene.objects, *scene.bg_objects)]
+    lacking = [
+        f"{scene.path}:{item.line}: object {name!r} ({item.object_type!r}) is not in library"
+        f" {library.root}; {suggest_names(name, library.objects)}"
+        for item, name in sorted(items, key=lambda pair: pair[0].line)
+        if name not in library.objects
+    ]
+    if lacking:
+        raise UnknownNameError("; ".join(lacking))
+    taken = {name for _, name in items}  # an object may be called mug_2
+    count: Counter[str] = Counter()
+    made = []
+    for item, object in items:
+        count[object] += 1
+        name = "" if count[object] == 1 and object not in MODEL_NAMES else object
+        if name:
+            while f"{object}_{count[object]}" in taken:
+                count[object] += 1
+            name = f"{object}_{count[object]}"
+        made.append(Instance(name=name, object=object, X_SO=item.X_SO))
+    return made

@@ -19,7 +19,12 @@ from burg_drake.core import (
     require_name,
 )
 from burg_drake.objects import UNITS, ContactKind, Decomposition, Inertia, Openings
-from burg_drake.pipeline.object_source import OBJECT_NAME_PATTERN, ObjectSource, object_name
+from burg_drake.pipeline.object_source import (
+    OBJECT_NAME_PATTERN,
+    ObjectSource,
+    check_numbers,
+    object_name,
+)
 
 Unit = Literal["mm", "cm", "m", "in"]
 
@@ -87,12 +92,7 @@ class Defaults:
     def __post_init__(self) -> None:
         if self.unit is not None and self.scale is not None:
             raise InvalidInputError("give unit or scale, not both")
-        for label, unit in (("scale", ""), ("density", " kg/m^3"), ("wall_thickness", " m")):
-            _check_positive(label, getattr(self, label), unit)
-        if self.friction is not None and self.friction < 0.0:
-            raise InvalidInputError(f"friction is {self.friction:g}; it must be at least 0")
-        if self.rgba is not None and not all(0.0 <= c <= 1.0 for c in self.rgba):
-            raise InvalidInputError(f"rgba is {list(self.rgba)}; each number must be from 0 to 1")
+        check_numbers(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,6 @@ class RecipeObject(Defaults):
             raise InvalidInputError("mesh is empty; give a mesh file")
         if self.mass is not None and self.density is not None:
             raise InvalidInputError("give mass or density, not both")
-        _check_positive("mass", self.mass, " kg")
         if self.inertia is not None and min(self.inertia[:3]) <= 0.0:
             raise InvalidInputError(
                 f"inertia is {list(self.inertia)}; its moments Ixx, Iyy and Izz must be above 0"
@@ -209,11 +208,6 @@ def _invalid_name_message(name: str) -> str:
     except InvalidInputError:
         hint = ""
     return f"{name!r} is not a valid object name; use a-z, 0-9 and underscores{hint}"
-
-
-def _check_positive(label: str, value: float | None, unit: str) -> None:
-    if value is not None and value <= 0.0:
-        raise InvalidInputError(f"{label} is {value:g}{unit}; it must be above 0")
 
 
 def _set_fields(values: Any) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def build_geometry(
     with _time_stage(seconds, "mass"):
         solid, wall = _make_solid(source, mesh, pieces)
     with _time_stage(seconds, "fit"):
-        contact, _ = contact_geometry(source.contact, mesh.surface, mesh.closed, pieces, folder)
+        contact = contact_geometry(source.contact, mesh.surface, mesh.closed, pieces, folder)
     with _time_stage(seconds, "visual"):
         image = texture_image(mesh.visual)
         rgba = source.rgba if source.rgba is not None else mesh.rgba

@@ -132,22 +132,33 @@ def check_source(source: ObjectSource) -> None:
             f"{source.name!r} is not a valid object name; use a-z, 0-9 and underscores,"
             f" such as {object_name(source.name + '_0').removesuffix('_0') or 'mug'!r}"
         )
-    for label, value, unit in (
-        ("mass", source.mass, " kg"),
-        ("density", source.density, " kg/m^3"),
-        ("wall_thickness", source.wall_thickness, " m"),
-        ("scale", source.scale, ""),
+    try:
+        check_numbers(source)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{source.name}: {error}") from error
+
+
+def check_numbers(given: Any) -> None:
+    """Checks the numbers of an object, or the defaults of several.
+
+    Args:
+        given: has attributes named as those of `ObjectSource`, or some of them.
+
+    Raises:
+        InvalidInputError: a mass, density, wall thickness, scale, friction or colour that no object
+            can have.
+    """
+    for label, unit in (
+        ("mass", " kg"),
+        ("density", " kg/m^3"),
+        ("wall_thickness", " m"),
+        ("scale", ""),
     ):
+        value = getattr(given, label, None)
         if value is not None and not 0.0 < value < float("inf"):
-            raise InvalidInputError(
-                f"{source.name}: {label} is {value:g}{unit}; it must be above 0"
-                + (" (leave it out to use a density)" if label == "mass" else "")
-            )
-    if not 0.0 <= source.coefficient < float("inf"):
-        raise InvalidInputError(
-            f"{source.name}: friction is {source.coefficient:g}; it must be at least 0"
-        )
-    if source.rgba is not None and not all(0.0 <= c <= 1.0 for c in source.rgba):
-        raise InvalidInputError(
-            f"{source.name}: rgba is {source.rgba}; each number must be from 0 to 1"
-        )
+            hint = " (leave it out to use a density)" if label == "mass" else ""
+            raise InvalidInputError(f"{label} is {value:g}{unit}; it must be above 0{hint}")
+    if given.friction is not None and not 0.0 <= given.friction < float("inf"):
+        raise InvalidInputError(f"friction is {given.friction:g}; it must be at least 0")
+    if given.rgba is not None and not all(0.0 <= c <= 1.0 for c in given.rgba):
+        raise InvalidInputError(f"rgba is {list(given.rgba)}; each number must be from 0 to 1")

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.core import Array, InvalidInputError, atomic_write
-from burg_drake.printout.guide import BoardFacts, Guide, draw_guide, guide_steps
+from burg_drake.core import Array, InvalidInputError, atomic_write, count_with_noun
+from burg_drake.printout.guide import Guide, draw_guide, guide_steps
 from burg_drake.printout.object_drawings import (
     FIXED_TINT_COLOR,
     MAX_TINT_HEIGHT,
@@ -82,34 +82,23 @@ class Caption:
     how: str
 
 
-def draw_page_frame(
-    pen: Pen,
-    tile: Tile,
-    tiling: Tiling,
-    size: tuple[float, float],
-    caption: Caption,
-    *,
-    marks: Array,
-    tints: bool,
-) -> None:
+def draw_page_frame(pen: Pen, tile: Tile, tiling: Tiling, sheet: Sheet, caption: Caption) -> None:
     """Draws what stands around the board on a page, with the page's origin lower left.
 
     Args:
         pen: draws in metres of the page.
         tile: the page.
         tiling: all pages.
-        size: extents of the board [m].
+        sheet: the board, whose alignment marks words keep clear of.
         caption: words at the foot.
-        marks: (N, 2) middles of alignment marks in the scene frame [m], which words keep clear of.
-        tints: explain the tints of the height map.
     """
-    paper = tiling.paper
+    paper, tints = tiling.paper, bool(sheet.drawings)
     draw_rulers(pen, paper)
     right = paper.width - paper.margin
     base = paper.margin
     if len(tiling.tiles) > 1:
         right -= MAP_SIZE[0]
-        _draw_map(pen, tile, tiling, size, (right, base))
+        _draw_map(pen, tile, tiling, sheet.size, (right, base))
         right -= 4e-3
     left = paper.lower[0] + RULER_LENGTH + 8e-3
     above = paper.lower[1] + RULER_LENGTH + 8e-3
@@ -120,7 +109,7 @@ def draw_page_frame(
         _draw_legend(pen, (right, base + 5.8e-3), turned=False)
         right -= 6e-3
     _draw_caption(pen, caption, tile, len(tiling.tiles), (left, right), base)
-    _draw_cuts(pen, tile, tiling, size, marks)
+    _draw_cuts(pen, tile, tiling, sheet.size, sheet.marks)
 
 
 def draw_rulers(pen: Pen, paper: Paper) -> None:
@@ -179,22 +168,17 @@ def _draw_map(
 ) -> None:
     """The board with its cuts, and this page filled."""
     scale = min(MAP_SIZE[0] / size[0], MAP_SIZE[1] / size[1])
-    left, bottom = corner[0] + MAP_SIZE[0] - scale * size[0], corner[1] + 0.5e-3
-    xs = [0.0, *tiling.x_cuts, size[0]]
-    ys = [size[1], *tiling.y_cuts, 0.0]
-    for other in tiling.tiles:
-        lower = (left + scale * xs[other.column], bottom + scale * ys[other.row + 1])
-        upper = (left + scale * xs[other.column + 1], bottom + scale * ys[other.row])
+    start = np.array([corner[0] + MAP_SIZE[0] - scale * size[0], corner[1] + 0.5e-3])
+    for other, area in zip(tiling.tiles, tiling.areas(size), strict=True):
+        lower, upper = (start + scale * p for p in area)
         here = other.number == tile.number
         if here:
             pen.area([rectangle(lower, upper)], TEXT_RGB)
         pen.outline([rectangle(lower, upper)], THIN_LINE, TEXT_RGB)
-        text = min(6.0, 0.6 * (upper[1] - lower[1]) / METRES_PER_POINT)
-        middle = (
-            (lower[0] + upper[0]) / 2,
-            (lower[1] + upper[1]) / 2 - 0.35 * text * METRES_PER_POINT,
-        )
-        pen.text(*middle, str(other.number), text, align=0.5, color=WHITE_RGB if here else TEXT_RGB)
+        text = min(6.0, 0.6 * float(upper[1] - lower[1]) / METRES_PER_POINT)
+        x, y = ((lower + upper) / 2 - [0.0, 0.35 * text * METRES_PER_POINT]).tolist()
+        color = WHITE_RGB if here else TEXT_RGB
+        pen.text(x, y, str(other.number), text, align=0.5, color=color)
 
 
 def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
@@ -236,22 +220,12 @@ def _draw_cuts(
         at = tile.p_PS[axis] + cut
         start, end = ((at, y0), (at, y1)) if axis == 0 else ((x0, at), (x1, at))
         pen.line(start, end, width=THIN_LINE, color=FAINT_LINE_RGB, dash=1.2e-3)
-        places = np.array([0.0, size[1 - axis], *_mark_positions(marks, axis, cut)])
-        words = _cut_label(trimmed, tile.number + (columns if axis else 1), tiling.flap)
-        crossed = tile.p_PS[1 - axis] + places
+        on_cut = marks[np.abs(marks[:, axis] - cut) < 1e-5, 1 - axis]
+        crossed = tile.p_PS[1 - axis] + np.array([0.0, size[1 - axis], *on_cut])
+        neighbour = tile.number + (columns if axis else 1)
+        words = f"page {neighbour} " + ("is glued here" if tiling.flap else "joins here")
+        words = "CUT" if trimmed else words
         _label_cut(pen, end, words, trimmed, crossed, turned=axis == 0)
-
-
-def _mark_positions(marks: Array, axis: int, cut: float) -> list[float]:
-    """Where on a cut across `axis` alignment marks lie."""
-    here = np.abs(marks[:, axis] - cut) < 1e-5
-    return [float(p) for p in marks[here, 1 - axis]]
-
-
-def _cut_label(trimmed: bool, neighbour: int, flap: float) -> str:
-    if trimmed:
-        return "CUT"
-    return f"page {neighbour} " + ("is glued here" if flap else "joins here")
 
 
 def _label_cut(
@@ -523,18 +497,11 @@ def _make_pdf(
     )
     draw_sheet(pen, sheet)
     canvas.endForm()
+    caption = _make_caption(scene, settings, len(tiling.tiles), tiling.flap)
     for tile in tiling.tiles:
         canvas.scale(*print_scale.tolist())
         _draw_tile(pen, sheet, tile)
-        draw_page_frame(
-            pen,
-            tile,
-            tiling,
-            sheet.size,
-            _make_caption(scene, settings, len(tiling.tiles), tiling.flap),
-            marks=sheet.marks,
-            tints=bool(sheet.drawings),
-        )
+        draw_page_frame(pen, tile, tiling, sheet, caption)
         canvas.showPage()
     canvas.save()
     return stream.getvalue(), first
@@ -543,22 +510,12 @@ def _make_pdf(
 def _make_guide(
     scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
 ) -> Guide:
-    facts = BoardFacts(
-        size=sheet.size,
-        side=sheet.layout.side,
-        margin=settings.margin,
-        measured=settings.measured,
-        tiling=tiling,
-        objects=sheet.drawings,
-        losses=tuple(f"{loss[0].upper()}{loss[1:]}." for loss in losses),
-    )
-    pages, paper = len(tiling.tiles), tiling.paper.name
+    pages, paper = count_with_noun(len(tiling.tiles), "page"), tiling.paper.name
     x, y = (f"{1e3 * s:g}" for s in sheet.size)
     return Guide(
         title="How to make this board",
-        subtitle=f"{scene.name}: {x} x {y} mm on {pages} page{'s' * (pages > 1)} {paper}, content"
-        f" {scene.content[:8]}",
-        steps=tuple(guide_steps(facts)),
+        subtitle=f"{scene.name}: {x} x {y} mm on {pages} {paper}, content {scene.content[:8]}",
+        steps=tuple(guide_steps(sheet, tiling, settings, losses)),
     )
 
 

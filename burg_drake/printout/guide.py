@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from burg_drake.core import Array, Rgb
+from burg_drake.core import Array, Rgb, count_with_noun
 from burg_drake.printout.object_drawings import ObjectDrawing
 from burg_drake.printout.page_tiling import Paper, Tiling
+from burg_drake.printout.print_settings import PrintSettings
 from burg_drake.printout.sheet import (
     BOLD_FONT,
     FAINT_LINE_RGB,
@@ -20,6 +21,7 @@ from burg_drake.printout.sheet import (
     TEXT_RGB,
     WHITE_RGB,
     Pen,
+    Sheet,
     draw_arrow,
     rectangle,
     text_width,
@@ -53,14 +55,8 @@ def draw_scale(pen: Pen) -> None:
                 half = share * 1.9e-3
                 pen.area([rectangle(at - half, at + half)], TEXT_RGB)
         _draw_tick_or_cross(pen, (x + 18.5e-3, 15e-3), good=good)
-        pen.text(
-            x + 17.5e-3,
-            7e-3,
-            words,
-            LABEL_SIZE,
-            font=BOLD_FONT,
-            color=GOOD_COLOR if good else BAD_COLOR,
-        )
+        color = GOOD_COLOR if good else BAD_COLOR
+        _draw_label(pen, x + 17.5e-3, 7e-3, words, bold=True, color=color)
 
 
 def draw_measuring(pen: Pen) -> None:
@@ -75,9 +71,9 @@ def draw_measuring(pen: Pen) -> None:
         pen.line((x, line), (x, line - (2.6e-3 if long else 1.5e-3)), width=0.3e-3)
         pen.line((x, line + 0.6e-3), (x, line + (3.2e-3 if long else 2.2e-3)), width=0.2e-3)
     for x, words in ((left, "0"), (right, "100 mm")):
-        pen.text(x, line - 6.6e-3, words, LABEL_SIZE, align=0.5)
-        pen.text(x, line + 4.4e-3, words[:3].strip(), LABEL_SIZE, align=0.5)
-    pen.text(left, line + 11.5e-3, "both printed rulers: 100 mm each", LABEL_SIZE, font=BOLD_FONT)
+        _draw_label(pen, x, line - 6.6e-3, words, align=0.5)
+        _draw_label(pen, x, line + 4.4e-3, words[:3].strip(), align=0.5)
+    _draw_label(pen, left, line + 11.5e-3, "both printed rulers: 100 mm each", bold=True)
     _draw_tick_or_cross(pen, (right + 6e-3, line + 13e-3), good=True)
 
 
@@ -92,16 +88,10 @@ def draw_cutting(pen: Pen) -> None:
     x, y = high[0] - 5e-3, low[1] + 5e-3
     for start, end in (((x, low[1]), (x, cut[1])), ((cut[0], y), (high[0], y))):
         pen.line(start, end, width=0.2e-3, color=FAINT_LINE_RGB, dash=1.2e-3)
-    _draw_scissors(pen, (float(high[0]) + 1.5e-3, float(cut[1])))
-    pen.text(
-        float(cut[0]) + 7e-3,
-        float(cut[1]) + 1.6e-3,
-        "CUT",
-        LABEL_SIZE,
-        font=BOLD_FONT,
-        color=BAD_COLOR,
-    )
-    pen.text(float(cut[0]) + 7e-3, float(cut[1]) - 8.5e-3, "stays", LABEL_SIZE)
+    left, top = cut.tolist()
+    _draw_scissors(pen, (float(high[0]) + 1.5e-3, top))
+    _draw_label(pen, left + 7e-3, top + 1.6e-3, "CUT", bold=True, color=BAD_COLOR)
+    _draw_label(pen, left + 7e-3, top - 8.5e-3, "stays")
 
 
 def draw_gluing(pen: Pen, flap: float) -> None:
@@ -125,7 +115,7 @@ def draw_gluing(pen: Pen, flap: float) -> None:
     _draw_sketch_arrow(pen, (start - 1.5e-3, 9.0e-3), (seam + 0.8e-3, 7.0e-3), TEXT_RGB)
     pen.text(19e-3, 12e-3, "1", 16, font=BOLD_FONT, align=0.5)
     pen.text(start + 17e-3, 14e-3, "2", 16, font=BOLD_FONT, align=0.5)
-    pen.text(8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge", LABEL_SIZE)
+    _draw_label(pen, 8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge")
 
 
 def draw_plan(
@@ -134,34 +124,30 @@ def draw_plan(
     """The whole board: its pages with their numbers, cuts, and the outlines of its objects."""
     scale = min(SKETCH_SIZE[0] / size[0], PLAN_HEIGHT / size[1])
     shift = np.array([(SKETCH_SIZE[0] - scale * size[0]) / 2, 0.0])
-    xs = [0.0, *tiling.x_cuts, size[0]]
-    ys = [size[1], *tiling.y_cuts, 0.0]
-    for tile in tiling.tiles:
-        lower = shift + scale * np.array([xs[tile.column], ys[tile.row + 1]])
-        upper = shift + scale * np.array([xs[tile.column + 1], ys[tile.row]])
-        _draw_box(pen, lower, upper, PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE_RGB)
+    areas = list(zip(tiling.tiles, tiling.areas(size), strict=True))
+    for tile, (lower, upper) in areas:
+        color = PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE_RGB
+        _draw_box(pen, shift + scale * lower, shift + scale * upper, color)
     for drawing in objects:
         loops = [shift + scale * loop for loop in (*drawing.outline, *drawing.raised)]
         pen.outline(loops, 0.3e-3, drawing.outline_color)
-    for tile in tiling.tiles:
-        (left, right), (top, bottom) = xs[tile.column :][:2], ys[tile.row :][:2]
-        middle, height = ((left + right) / 2, (top + bottom) / 2), scale * (top - bottom)
-        points = min(18.0, 0.5 * height / 0.35e-3)
-        at = shift + scale * np.array(middle) - [0.0, 0.12e-3 * points]
-        pen.text(float(at[0]), float(at[1]), str(tile.number), points, font=BOLD_FONT, align=0.5)
+    for tile, (lower, upper) in areas:
+        points = min(18.0, 0.5 * scale * float(upper[1] - lower[1]) / 0.35e-3)
+        x, y = (shift + scale * ((lower + upper) / 2) - [0.0, 0.12e-3 * points]).tolist()
+        pen.text(x, y, str(tile.number), points, font=BOLD_FONT, align=0.5)
 
 
 def draw_flatness(pen: Pen) -> None:
     """A sheet on a stiff plate, and one that waves."""
     _draw_box(pen, (2e-3, 8e-3), (36e-3, 12e-3), SHADE_COLOR, 0.2e-3)
     pen.line((2e-3, 12.5e-3), (36e-3, 12.5e-3), width=0.8e-3)
-    pen.text(19e-3, 2.5e-3, "glued to a plate", LABEL_SIZE, align=0.5)
+    _draw_label(pen, 19e-3, 2.5e-3, "glued to a plate", align=0.5)
     _draw_tick_or_cross(pen, (17e-3, 17e-3), good=True)
     x = np.linspace(44e-3, 78e-3, 60)
     y = 11e-3 + 2.0e-3 * np.sin((x - 44e-3) / 34e-3 * 4 * np.pi)
     pen.line((44e-3, 8e-3), (78e-3, 8e-3), width=0.3e-3, color=FAINT_LINE_RGB)
     pen.line(*zip(x.tolist(), y.tolist(), strict=True), width=0.8e-3)
-    pen.text(61e-3, 2.5e-3, "waves, curls", LABEL_SIZE, align=0.5)
+    _draw_label(pen, 61e-3, 2.5e-3, "waves, curls", align=0.5)
     _draw_tick_or_cross(pen, (59e-3, 17e-3), good=False)
 
 
@@ -174,13 +160,13 @@ def draw_lighting(pen: Pen) -> None:
     pen.area([rectangle((6e-3, 23.5e-3), (32e-3, 25.5e-3))], lamp_color)
     for x in (8e-3, 15e-3, 22e-3, 29e-3):
         _draw_sketch_arrow(pen, (x, 22.5e-3), (x, 16e-3), FAINT_LINE_RGB)
-    pen.text(19e-3, 0.5e-3, "wide, soft light", LABEL_SIZE, align=0.5)
+    _draw_label(pen, 19e-3, 0.5e-3, "wide, soft light", align=0.5)
     _draw_tick_or_cross(pen, (34.5e-3, 20e-3), good=True)
     lamp = 48e-3, 22e-3
     pen.area([_ellipse_outline(lamp, 2.2e-3)], lamp_color)
     _draw_sketch_arrow(pen, (50e-3, 20.5e-3), (57e-3, 13.5e-3), FAINT_LINE_RGB)
     pen.area([rectangle((64e-3, 5.2e-3), (73e-3, 6.0e-3))], TEXT_RGB)
-    pen.text(61e-3, 0.5e-3, "lamp, hard shadow", LABEL_SIZE, align=0.5)
+    _draw_label(pen, 61e-3, 0.5e-3, "lamp, hard shadow", align=0.5)
     _draw_tick_or_cross(pen, (72e-3, 20e-3), good=False)
 
 
@@ -198,15 +184,8 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
     around = np.radians(np.linspace(-tilt_deg, tilt_deg, 30))
     rays = np.column_stack([np.sin(around), np.cos(around)])
     pen.area([np.concatenate([foot + reach * rays, foot + 0.5 * reach * rays[::-1]])], range_color)
-    pen.line((40e-3, 3e-3), (40e-3, 25e-3), width=0.2e-3, color=FAINT_LINE_RGB, dash=1e-3)
-    edge = foot + 1.1 * reach * rays[-1]
-    pen.line(
-        (40e-3, 3e-3),
-        (float(edge[0]), float(edge[1])),
-        width=0.2e-3,
-        color=FAINT_LINE_RGB,
-        dash=1e-3,
-    )
+    for end in ((40e-3, 25e-3), foot + 1.1 * reach * rays[-1]):
+        pen.line((40e-3, 3e-3), end, width=0.2e-3, color=FAINT_LINE_RGB, dash=1e-3)
     at = foot + 0.78 * reach * rays[8]
     along = -rays[8]
     across = np.array([-along[1], along[0]])
@@ -215,8 +194,8 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
         ((1.0, 1.0), (1.0, -1.0), (2.6, -1.6), (2.6, 1.6)),
     ):
         pen.area([np.array([at + 1e-3 * (a * along + b * across) for a, b in shape])], TEXT_RGB)
-    pen.text(58.5e-3, 17e-3, f"{tilt_deg:g}°", LABEL_SIZE)
-    pen.text(2e-3, 18e-3, f"{distances[0]:.1f} to {distances[1]:.1f} m", LABEL_SIZE, font=BOLD_FONT)
+    _draw_label(pen, 58.5e-3, 17e-3, f"{tilt_deg:g}°")
+    _draw_label(pen, 2e-3, 18e-3, f"{distances[0]:.1f} to {distances[1]:.1f} m", bold=True)
 
 
 def draw_placing(pen: Pen) -> None:
@@ -247,6 +226,20 @@ def _draw_box(
 ) -> None:
     pen.area([rectangle(lower, upper)], color)
     pen.outline([rectangle(lower, upper)], line_width, TEXT_RGB)
+
+
+def _draw_label(
+    pen: Pen,
+    x: float,
+    y: float,
+    words: str,
+    *,
+    align: float = 0.0,
+    bold: bool = False,
+    color: Rgb = TEXT_RGB,
+) -> None:
+    font = BOLD_FONT if bold else REGULAR_FONT
+    pen.text(x, y, words, LABEL_SIZE, font=font, color=color, align=align)
 
 
 def _draw_tick_or_cross(pen: Pen, at: Spot, *, good: bool) -> None:
@@ -283,143 +276,115 @@ class GuideStep:
 
     Attributes:
         heading: what, in a word or two.
-        words: paragraphs.
-        draw: its sketch, in a box of `SKETCH_SIZE`; None without.
+        words: paragraphs, one a line.
+        draw: its sketch, in a box of `SKETCH_SIZE`.
         height: of the sketch [m].
     """
 
     heading: str
-    words: tuple[str, ...]
-    draw: Callable[[Pen], None] | None = None
+    words: str
+    draw: Callable[[Pen], None]
     height: float = SKETCH_SIZE[1]
 
 
 FLATTEN_STEP = GuideStep(
     "Keep it flat",
-    (
-        "Glue the sheet, all over, onto a flat, stiff plate of wood, foam or aluminium. A sheet"
-        " that waves moves the pose that a camera finds.",
-    ),
+    "Glue the sheet, all over, onto a flat, stiff plate of wood, foam or aluminium. A sheet"
+    " that waves moves the pose that a camera finds.",
     draw_flatness,
 )
 LIGHTING_STEP = GuideStep(
     "Light",
-    (
-        "Soft, even light. No lamp or sun whose shadows have hard edges or that shines back from"
-        " the paper; white paper must not be overexposed.",
-    ),
+    "Soft, even light. No lamp or sun whose shadows have hard edges or that shines back from"
+    " the paper; white paper must not be overexposed.",
     draw_lighting,
 )
 PLACING_STEP = GuideStep(
     "Place the objects",
-    (
-        "Each object on its silhouette. The thick line is where it touches the sheet, the thin one"
-        " its outline from above; darker is closer to the sheet. Begin at the far edge. Then let a"
-        " camera check: burg-drake ar, or burg-drake camera placement.",
-    ),
+    "Each object on its silhouette. The thick line is where it touches the sheet, the thin one"
+    " its outline from above; darker is closer to the sheet. Begin at the far edge. Then let a"
+    " camera check: burg-drake ar, or burg-drake camera placement.",
     draw_placing,
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class BoardFacts:
-    """What the steps depend on.
+def guide_steps(
+    sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: Sequence[str]
+) -> list[GuideStep]:
+    """The steps for a board, in their order.
 
-    Attributes:
-        size: extents of the board [m].
-        side: of a marker [m].
-        margin: that pages leave white [m].
-        measured: what rulers of 100 mm along x and y measured before, for which all is drawn larger
-            [m].
-        tiling: the pages.
-        objects: that are drawn; none if there are only markers.
+    Args:
+        sheet: the board.
+        tiling: its pages.
+        settings: how it is printed.
         losses: what the margins of printers cut off, a sentence each.
     """
-
-    size: tuple[float, float]
-    side: float
-    margin: float
-    measured: tuple[float, float]
-    tiling: Tiling
-    objects: list[ObjectDrawing]
-    losses: tuple[str, ...]
+    steps = [_print_step(settings.margin, losses), _measure_step(settings.measured)]
+    if len(tiling.tiles) > 1:
+        steps += _assembly_steps(sheet, tiling)
+    steps += [FLATTEN_STEP, LIGHTING_STEP, _camera_step(sheet.layout.side)]
+    return [*steps, PLACING_STEP] if sheet.drawings else steps
 
 
-def guide_steps(facts: BoardFacts) -> list[GuideStep]:
-    """The steps for a board, in their order."""
-    steps = [_print_step(facts), _measure_step(facts)]
-    if len(facts.tiling.tiles) > 1:
-        steps += _assembly_steps(facts)
-    steps += [FLATTEN_STEP, LIGHTING_STEP, _camera_step(facts)]
-    return [*steps, PLACING_STEP] if facts.objects else steps
-
-
-def _print_step(facts: BoardFacts) -> GuideStep:
-    white = f"The printer may leave {1e3 * facts.margin:g} mm white on each side."
-    lost = facts.losses or ("Nothing is cut off by that.",)
+def _print_step(margin: float, losses: Sequence[str]) -> GuideStep:
+    white = f"The printer may leave {1e3 * margin:g} mm white on each side."
+    lost = [f"{loss[0].upper()}{loss[1:]}." for loss in losses] or ["Nothing is cut off by that."]
     scale = "Print at 100 %, on matt paper; not “fit to page”, not “shrink to printable area”."
-    return GuideStep("Print", (scale, " ".join((white, *lost))), draw_scale)
+    return GuideStep("Print", f"{scale}\n{' '.join((white, *lost))}", draw_scale)
 
 
-def _measure_step(facts: BoardFacts) -> GuideStep:
+def _measure_step(measured: tuple[float, float]) -> GuideStep:
     words = "On every page hold a steel ruler to the two printed rulers, along x and along y."
     remedy = (
         "Each must be 100 mm long, to 0.2 mm. If not, print again and tell the program what they"
         " measure: it draws all larger or smaller by as much."
     )
-    if facts.measured != (0.1, 0.1):
-        x, y = (f"{1e3 * m:g}" for m in facts.measured)
+    if measured != (0.1, 0.1):
+        x, y = (f"{1e3 * m:g}" for m in measured)
         remedy = (
             f"These pages are drawn for a printer that made 100 mm {x if x == y else f'{x} x {y}'}"
             " mm. " + remedy
         )
-    return GuideStep("Measure", (words, remedy), draw_measuring)
+    return GuideStep("Measure", f"{words}\n{remedy}", draw_measuring)
 
 
-def _assembly_steps(facts: BoardFacts) -> list[GuideStep]:
-    tiling = facts.tiling
+def _assembly_steps(sheet: Sheet, tiling: Tiling) -> list[GuideStep]:
     columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
     plan = GuideStep(
         "Plan of pages",
-        (
-            f"{len(tiling.tiles)} pages, {columns} side by side in {rows} row"
-            f"{'s' if rows > 1 else ''}. They are numbered from the upper left, row by row.",
-        ),
-        partial(draw_plan, tiling=tiling, size=facts.size, objects=facts.objects),
+        f"{len(tiling.tiles)} pages, {columns} side by side in {count_with_noun(rows, 'row')}."
+        " They are numbered from the upper left, row by row.",
+        partial(draw_plan, tiling=tiling, size=sheet.size, objects=sheet.drawings),
         PLAN_HEIGHT,
     )
     cut = GuideStep(
         "Cut",
-        (
-            "Cut each page along the dashed lines that say CUT, on its left and above, with a knife"
-            " and a ruler. What lies beyond the other dashed lines stays.",
-        ),
+        "Cut each page along the dashed lines that say CUT, on its left and above, with a knife"
+        " and a ruler. What lies beyond the other dashed lines stays.",
         draw_cutting,
     )
     strip = "onto the strips of those before it" if tiling.flap else "edge to edge with the others"
     glue = GuideStep(
         "Glue",
-        (
-            f"In the order of the numbers: lay each page {strip}, so that the crosses in circles"
-            " meet, and glue. Check every cross before the glue sets.",
-        ),
+        f"In the order of the numbers: lay each page {strip}, so that the crosses in circles"
+        " meet, and glue. Check every cross before the glue sets.",
         partial(draw_gluing, flap=tiling.flap),
     )
     return [plan, cut, glue]
 
 
-def _camera_step(facts: BoardFacts) -> GuideStep:
+def _camera_step(marker_side: float) -> GuideStep:
     min_distance = 11.0  # Distance of the camera in sides of a marker: 0.5 m for 45 mm.
     max_distance = 22.0  # Distance of the camera in sides of a marker: 1 m for 45 mm.
     max_tilt_deg = 50.0  # Degrees of the camera from the vertical.
-    near, far = (times * facts.side for times in (min_distance, max_distance))
+    near, far = (times * marker_side for times in (min_distance, max_distance))
     words = (
         f"From {near:.1f} to {far:.1f} m away (with 640 x 480 pixels; twice as far with twice as"
         f" many), up to {max_tilt_deg:g}° off the vertical. As many markers as possible in sight;"
         " nothing moves, nothing is blurred."
     )
     sketch = partial(draw_camera, distances=(near, far), tilt_deg=max_tilt_deg)
-    return GuideStep("Camera", (words,), sketch)
+    return GuideStep("Camera", words, sketch)
 
 
 HEADING_SIZE = 12.5  # Points, on A4.
@@ -534,17 +499,17 @@ def lay_out_steps(guide: Guide, paper: Paper, scale: float) -> list[StepPlace]:
 
 def step_height(step: GuideStep, width: float) -> float:
     """What a step takes of a column [m]."""
-    lines = sum(len(wrap_text(words, width)) for words in step.words)
-    sketch = step.height + 2e-3 if step.draw else 0.0
-    return LINE_SPACING * METRES_PER_POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE) + sketch
+    lines = sum(len(wrap_text(words, width)) for words in step.words.splitlines())
+    text = LINE_SPACING * METRES_PER_POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE)
+    return text + (step.height + 2e-3)
 
 
-def wrap_text(words: str, width: float, size: float = BODY_SIZE) -> list[str]:
+def wrap_text(words: str, width: float) -> list[str]:
     """Lines of text that are no longer than a width [m], where its words allow that."""
     lines, line = [], ""
     for word in words.split():
         longer = f"{line} {word}" if line else word
-        if line and text_width(longer, size, REGULAR_FONT) > width:
+        if line and text_width(longer, BODY_SIZE) > width:
             lines.append(line)
             longer = word
         line = longer
@@ -564,17 +529,14 @@ def _draw_step(pen: Pen, place: StepPlace) -> None:
     heading = f"{place.number}  {place.step.heading}"
     pen.text(place.left, y, heading, HEADING_SIZE, font=BOLD_FONT, color=TEXT_RGB)
     y -= 2.0 * LINE_SPACING * METRES_PER_POINT
-    if place.step.draw:
-        y -= place.step.height + 1e-3
-        pen.canvas.saveState()
-        pen.canvas.translate(
-            (place.left + (place.width - SKETCH_SIZE[0]) / 2) / METRES_PER_POINT,
-            y / METRES_PER_POINT,
-        )
-        place.step.draw(pen)
-        pen.canvas.restoreState()
-        y -= 1e-3
-    for paragraph in place.step.words:
+    y -= place.step.height + 1e-3
+    left = place.left + (place.width - SKETCH_SIZE[0]) / 2
+    pen.canvas.saveState()
+    pen.canvas.translate(left / METRES_PER_POINT, y / METRES_PER_POINT)
+    place.step.draw(pen)
+    pen.canvas.restoreState()
+    y -= 1e-3
+    for paragraph in place.step.words.splitlines():
         for line in wrap_text(paragraph, place.width):
             y -= LINE_SPACING * BODY_SIZE * METRES_PER_POINT
             pen.text(place.left, y + 0.25 * BODY_SIZE * METRES_PER_POINT, line, BODY_SIZE)

@@ -203,6 +203,18 @@ class Tiling:
     tiles: tuple[Tile, ...]
     flap: float
 
+    def areas(self, size: tuple[float, float]) -> list[tuple[Array, Array]]:
+        """Lower and upper corner (2,) of what of the board each page shows once all is glued [m].
+
+        Args:
+            size: extents of the board [m].
+        """
+        xs, ys = [0.0, *self.x_cuts, size[0]], [size[1], *self.y_cuts, 0.0]
+        return [
+            (np.array([xs[t.column], ys[t.row + 1]]), np.array([xs[t.column + 1], ys[t.row]]))
+            for t in self.tiles
+        ]
+
 
 def tile_board(
     size: tuple[float, float],

@@ -53,7 +53,7 @@ class Pen:
 
     def line(
         self,
-        *points: tuple[float, float],
+        *points: Sequence[float] | Array,
         width: float = 0.15e-3,
         color: Rgb = TEXT_RGB,
         dash: float = 0.0,
@@ -167,7 +167,7 @@ def draw_arrow(
     along = (end - begin) / np.linalg.norm(end - begin)
     across = np.array([-along[1], along[0]])
     neck = end - head * along
-    pen.line(start, (neck[0], neck[1]), width=width, color=color)
+    pen.line(start, neck, width=width, color=color)
     pen.area([np.array([end, neck + head / 2 * across, neck - head / 2 * across])], color)
 
 
@@ -232,7 +232,7 @@ def draw_origin(pen: Pen, tile: Tile, clear: float) -> bool:
         along = np.eye(2)[axis]
         across = np.eye(2)[1 - axis]
         tip, neck = axis_length * along, (axis_length - 2.5e-3) * along
-        pen.line((0.0, 0.0), (float(neck[0]), float(neck[1])), width=0.4e-3)
+        pen.line((0.0, 0.0), neck, width=0.4e-3)
         pen.area([np.array([tip, neck + 0.9e-3 * across, neck - 0.9e-3 * across])], TEXT_RGB)
     pen.text(axis_length + 0.8e-3, 0.6e-3, "x", 8)
     pen.text(0.8e-3, axis_length + 0.6e-3, "y", 8)
@@ -286,11 +286,15 @@ class FreeSpace:
         self.taken |= cv2.dilate(covered.astype(np.uint8), disc) > 0
         return covered
 
+    def cell_of(self, point: Array) -> tuple[int, int]:
+        """Row and column of the cell at a point (2,) [m]."""
+        column, row = np.rint(self.grid.pixels(point)).astype(int)
+        return int(row), int(column)
+
     def cell(self, point: Iterable[float]) -> NDArray[np.bool_]:
         """(H, W) only the cell at a point."""
         at = np.zeros_like(self.taken)
-        column, row = np.rint(self.grid.pixels(np.array([*point]))).astype(int)
-        at[row, column] = True
+        at[self.cell_of(np.array([*point]))] = True
         return at
 
     def within(self, lower: Iterable[float], upper: Iterable[float]) -> NDArray[np.bool_]:
@@ -461,7 +465,8 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
         for tile in tiling.tiles if len(tiling.tiles) > 1 else ():
             page = space.within(*tile.core)
             part = beside & page
-            if part.sum() * LABEL_CELL_SIZE**2 < min_area or page[_grid_cell(space, corner)]:
+            stands_here = page[space.cell_of(corner + LABEL_CELL_SIZE)]
+            if part.sum() * LABEL_CELL_SIZE**2 < min_area or stands_here:
                 continue
             again = space.place(extent, part, page)
             if again is None:
@@ -492,12 +497,6 @@ def _space_for_names(sheet: Sheet, tiling: Tiling) -> FreeSpace:
     for mark in sheet.marks:
         space.take(mark, mark, ALIGNMENT_MARK_RADIUS + NAME_CLEARANCE)
     return space
-
-
-def _grid_cell(space: FreeSpace, point: Array) -> tuple[int, int]:
-    """Row and column of the cell at a point."""
-    column, row = np.rint(space.grid.pixels(point + LABEL_CELL_SIZE)).astype(int)
-    return int(row), int(column)
 
 
 def draw_sheet(pen: Pen, sheet: Sheet) -> None:

@@ -3,7 +3,6 @@ from .camera_messages import (
     IMAGE_ENCODINGS as IMAGE_ENCODINGS,
     decode_image_message as decode_image_message,
     intrinsics_from_camera_info as intrinsics_from_camera_info,
-    jpeg_bytes as jpeg_bytes,
 )
 from .distribution import (
     CLIENT_LIBRARIES as CLIENT_LIBRARIES,

@@ -115,12 +115,6 @@ def _decode_compressed(message: Any) -> Bytes:
     return image
 
 
-def jpeg_bytes(image: Bytes) -> bytes:
-    """An (H, W, 3) RGB image as JPEG."""
-    _, octets = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    return bytes(octets.tobytes())
-
-
 def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Intrinsics:
     """Intrinsics of the images that come with a `camera_info`.
 

@@ -39,7 +39,6 @@ class Ros1Node(RosNode):
         self._rospy = rospy
         rospy.init_node(names.node, argv=["burg-drake"], disable_signals=True)
         self._news = threading.Condition()
-        self._image: Any | None = None
         self.publications = Publications(
             names,
             classes,
@@ -50,18 +49,9 @@ class Ros1Node(RosNode):
         )
         # Bytes per read. With rospy's 65536, images pile up in the socket and arrive late.
         self._topics = {
-            names.image: rospy.Subscriber(
-                names.image,
-                classes.CompressedImage if names.compressed else classes.Image,
-                self._store_image,
-                queue_size=1,
-                buff_size=1 << 25,
-            )
+            topic: rospy.Subscriber(topic, message, store, queue_size=1, buff_size=1 << 25)
+            for topic, (message, store) in self._handlers(names, classes, with_camera_info).items()
         }
-        if with_camera_info:
-            self._topics[names.info_topic] = rospy.Subscriber(
-                names.info_topic, classes.CameraInfo, self._store_camera_info, queue_size=1
-            )
 
     def running(self) -> bool:
         """See `RosNode`."""
@@ -151,7 +141,6 @@ class Ros2Node(RosNode):
         self._node = rclpy.create_node(names.node)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
-        self._image: Any | None = None
         self.publications = Publications(
             names,
             classes,
@@ -160,14 +149,7 @@ class Ros2Node(RosNode):
             ),
             lambda publisher: int(publisher.get_subscription_count()),
         )
-        self._topics = {
-            names.image: (
-                classes.CompressedImage if names.compressed else classes.Image,
-                self._store_image,
-            )
-        }
-        if with_camera_info:
-            self._topics[names.info_topic] = (classes.CameraInfo, self._store_camera_info)
+        self._topics = self._handlers(names, classes, with_camera_info)
         self._subscriptions: dict[str, Any] = {}
         self._incompatible: set[str] = set()
         for topic in self._topics:
@@ -239,6 +221,3 @@ class Ros2Node(RosNode):
         self._executor.shutdown()
         self._node.destroy_node()
         self._rclpy.try_shutdown()
-
-    def _store_image(self, message: Any) -> None:
-        self._image = message

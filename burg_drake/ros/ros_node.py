@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras import encode_jpeg
 from burg_drake.core import (
     Array,
     Bytes,
@@ -25,7 +26,6 @@ from burg_drake.core import (
     quaternion_from_rotation,
 )
 from burg_drake.ros.board_node import Sighting
-from burg_drake.ros.camera_messages import jpeg_bytes
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def compressed_message(classes: MessageClasses, sighting: Sighting, image: Bytes
     message = classes.CompressedImage()
     _set_header(message, sighting, sighting.camera_frame)
     message.format = "rgb8; jpeg compressed bgr8"  # as image_transport's plugin has it
-    message.data = classes.octets(jpeg_bytes(image))
+    message.data = classes.octets(encode_jpeg(image, 95))
     return message
 
 
@@ -276,6 +276,7 @@ class RosNode(ABC):
 
     publications: Publications
     camera_info: Any | None = None
+    _image: Any | None = None
 
     @abstractmethod
     def running(self) -> bool:
@@ -296,6 +297,21 @@ class RosNode(ABC):
     @abstractmethod
     def close(self) -> None:
         """Leaves the graph."""
+
+    def _handlers(
+        self, names: NodeNames, classes: MessageClasses, with_camera_info: bool
+    ) -> dict[str, tuple[type, Callable[[Any], None]]]:
+        """By topic that the node listens to, the class of its messages and what stores them."""
+        image_class = classes.CompressedImage if names.compressed else classes.Image
+        handlers: dict[str, tuple[type, Callable[[Any], None]]] = {
+            names.image: (image_class, self._store_image)
+        }
+        if with_camera_info:
+            handlers[names.info_topic] = (classes.CameraInfo, self._store_camera_info)
+        return handlers
+
+    def _store_image(self, message: Any) -> None:
+        self._image = message
 
     def _store_camera_info(self, message: Any) -> None:
         self.camera_info = message

@@ -14,6 +14,7 @@ from burg_drake.core import (
     rot_z,
     rotation_from_quaternion,
     suggest_names,
+    unused_name,
 )
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes
@@ -141,7 +142,7 @@ class Heap:
             if best is None or X_SO[2, 3] < best[2, 3]:
                 best = X_SO
         if best is not None:
-            self._below.append(shape.hull.moved(best))
+            self.add(shape, best)
         return best
 
     def add(self, shape: ObjectShape, X_SO: Array) -> None:
@@ -228,9 +229,7 @@ def choose_objects(
     wanted: list[ObjectRequest] = []
     used = set(taken)
     for name in drawn:
-        unique, k = name, 2
-        while unique in used:
-            unique, k = f"{name}_{k}", k + 1
+        unique = unused_name(name, used)
         used.add(unique)
         wanted.append(ObjectRequest(name=unique, object=name))
     return tuple(wanted)

@@ -20,7 +20,7 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array
-from burg_drake.station import StationDiagram, touching_bodies
+from burg_drake.station import StationDiagram, collision_geometries, touching_bodies
 
 
 @dataclass(frozen=True)
@@ -248,15 +248,6 @@ def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
         found.append([index for index in left if index in island])
         left = [index for index in left if index not in island]
     return found
-
-
-def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> list[GeometryId]:
-    """Collision geometries of bodies, in the plant's order."""
-    return [
-        geometry
-        for index in sorted(bodies)
-        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
-    ]
 
 
 def assign_friction(

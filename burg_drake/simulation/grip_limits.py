@@ -85,24 +85,18 @@ class Grip:
     def __init__(self, trial: HandTrial, instance: str, friction: float | None = None) -> None:
         self._world = world = trial.world
         assert isinstance(world.hand, FloatingHand)
-        self._hand = world.hand
-        self._plant = world.diagram.plant
-        self._context = world.context
-        self._plant_context = self._plant.GetMyContextFromRoot(self._context)
-        self._contacts_port = self._plant.get_contact_results_output_port()
+        self._hand, plant = world.hand, world.diagram.plant
         self._forces_port = world.diagram.diagram.GetInputPort("applied_forces")
-        self._target = self._plant.get_body(world.diagram.free[instance])
-        self._gravity = float(np.linalg.norm(self._plant.gravity_field().gravity_vector()))
-        self._step = world.diagram.engine.time_step
-        self._mass = self._target.get_mass(self._plant_context)
-        self.weight = self._mass * self._gravity
+        self._target = plant.get_body(world.free[instance])
+        self._step = world.engine.time_step
+        gravity = float(np.linalg.norm(plant.gravity_field().gravity_vector()))
+        self.weight = self._target.get_mass(world.plant_context) * gravity
         mu = trial.scene.entry(instance).friction if friction is None else friction
         self.friction_force = 2.0 * mu * trial.station.hand.force
         world.isolate(self._target.index())
         self._brake()
         self._rest()
-        self._time = self._context.get_time()
-        self._state = self._context.get_discrete_state().Clone()
+        self._time, self._state = world.time, world.state()
         self._X_GO = self._current_X_GO()
 
     def withstands(
@@ -128,10 +122,9 @@ class Grip:
         Raises:
             RuntimeError, SystemExit: from Drake.
         """
-        self._context.SetTime(self._time)
-        self._context.SetDiscreteState(self._state)
+        self._world.go_back(self._time, self._state)
         self._world.simulator.Initialize()
-        R_WG = self._hand.X_WG(self._plant_context)[:3, :3]
+        R_WG = self._world.X_WG()[:3, :3]
         steps_per_check = max(1, round(self._world.settings.poll / self._step))
         checks = math.ceil(duration / (steps_per_check * self._step) - 1e-9)
         X_GO, at_rest = self._X_GO, 0
@@ -149,7 +142,7 @@ class Grip:
                     return True
             return True
         finally:
-            self._forces_port.FixValue(self._context, [])
+            self._forces_port.FixValue(self._world.context, [])
 
     def _apply(self, f_W: Array) -> None:
         """Puts a force (3,) on the target's centre of mass [N]."""
@@ -157,11 +150,11 @@ class Grip:
         force.body_index = self._target.index()
         force.p_BoBq_B = self._target.default_com()
         force.F_Bq_W = SpatialForce(np.zeros(3), f_W)
-        self._forces_port.FixValue(self._context, [force])
+        self._forces_port.FixValue(self._world.context, [force])
 
     def _is_touched(self) -> bool:
-        contacts = self._world.contacts.read(self._contacts_port.Eval(self._plant_context))
-        return finger_contact(contacts, self._hand.fingers, self._target.index()).both
+        contacts = self._world.look()
+        return finger_contact(contacts, self._world.fingers, self._target.index()).both
 
     def _is_at_rest(self, before: Array, after: Array) -> bool:
         """Whether the target has hardly moved in the hand from one look to the next."""
@@ -172,7 +165,7 @@ class Grip:
         """Stops the hand as gently as it was accelerated."""
         settings = self._world.settings
         braking = settings.acceleration
-        speed = self._hand.lift.get_translation_rate(self._plant_context)
+        speed = self._hand.lift.get_translation_rate(self._world.plant_context)
         checks = math.ceil(speed / (braking * settings.poll))
         for i in range(checks):
             self._world.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / checks)]))
@@ -194,12 +187,11 @@ class Grip:
 
     def _advance_by(self, steps: int) -> None:
         """To a whole number of steps since 0, with the rounding that Drake's own steps have."""
-        done = round(self._context.get_time() / self._step)
+        done = round(self._world.time / self._step)
         self._world.simulator.AdvanceTo((done + steps) * self._step)
 
     def _current_X_GO(self) -> Array:
-        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        X_GO: Array = inverse(self._hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._world.X_WG()) @ self._world.X_WB(self._target.index())
         return X_GO
 
 

@@ -17,7 +17,6 @@ from burg_drake.core import Array, inverse
 from burg_drake.simulation.contacts import (
     BodyContact,
     RobotContactWatch,
-    collision_geometries,
     touched_bodies,
 )
 from burg_drake.simulation.settings import TrialSettings
@@ -28,6 +27,7 @@ from burg_drake.station import (
     FloatingHand,
     MountedHand,
     StationDiagram,
+    collision_geometries,
     replace_meshes_by_pieces,
 )
 

@@ -21,11 +21,7 @@ from burg_drake.export import lay_out
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.simulation.grasp_trial import HandAloneTrial, HandTrial
-from burg_drake.simulation.hand_carrier import (
-    FloatingCarrier,
-    LiftPath,
-    check_count,
-)
+from burg_drake.simulation.hand_carrier import FloatingCarrier, check_count
 from burg_drake.simulation.mujoco_world import MujocoWorld, load_mujoco
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.simulation.trial_execution import Execution
@@ -123,12 +119,13 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
         world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
     """
 
-    _path: LiftPath | None = None
+    _length = 0.0  # Metres, of the present segment.
     _step: int | None = None
 
     def approach(self) -> None:
         """Begins the way to the grasp."""
-        self._is_approaching, self._path, self._step = True, self._approach, 0
+        assert self._approach is not None
+        self._is_approaching, self._length, self._step = True, self._approach.length, 0
 
     def close(self) -> None:
         """Closes the fingers; without an approach they have been closing from the start."""
@@ -143,7 +140,7 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
         segment = self.segments[number]
         if self._begin_segment(number):
             self._world.turn_lift(segment.direction_W)
-        self._path = LiftPath(segment.direction_W, segment.length)
+        self._length = segment.length
         self._step = check * self.approach_steps
 
     def stop(self) -> None:
@@ -172,8 +169,7 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
     def _command(self, step: int) -> tuple[float, float]:
         """Place [m] and speed [m/s] at the end of a step: half of the way accelerates, half of it
         brakes."""
-        assert self._path is not None
-        length = self._path.length
+        length = self._length
         steps = check_count(length, self._world.settings) * self.approach_steps
         share = min(1.0, step / steps)
         left = min(share, 1.0 - share)

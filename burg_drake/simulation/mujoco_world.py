@@ -304,7 +304,7 @@ class MujocoWorld:
         self._lay_lift(X_WH[:3, 3], direction_W)
         self._mj.mj_resetData(model, data)
         for at, finger in zip(self._index.finger_qpos, hand.fingers, strict=True):
-            data.qpos[at] = finger.open + (closed or 0.0) * (finger.closed - finger.open)
+            data.qpos[at] = finger.position(closed or 0.0)
         self._command_fingers(-1.0 if closed is None else 1.0)
         if closed is not None:
             data.qvel[self._index.finger_dofs] = data.ctrl[self._index.finger_servos]

@@ -80,21 +80,14 @@ class DropTest:
         library: the library; its folder holds the object's SDF.
         name: the object.
         support: (N, 3) points of O whose hull rests on the table [m].
-        tilt: of the object when it is dropped [rad].
 
     Raises:
         InvalidInputError: the SDF cannot be loaded.
         RuntimeError, SystemExit: from Drake.
     """
 
-    def __init__(
-        self,
-        library: ObjectLibrary,
-        name: str,
-        support: Array,
-        tilt: float = float(DropSettings.tilt),
-    ) -> None:
-        self.tilt, self.support = tilt, support
+    def __init__(self, library: ObjectLibrary, name: str, support: Array) -> None:
+        self.support = support
         self.built = _build_drop_diagram(library, name)
         self._body = self.built.plant.get_body(self.built.free[name])
         self._default = self.built.diagram.CreateDefaultContext()
@@ -147,7 +140,7 @@ class DropTest:
 
     def _start(self, X_SO: Array, side: float) -> Array:
         """`X_WO` (4, 4) from which the object is dropped; S is in the world's origin."""
-        R = rot_z(side) @ rotation_from_rpy([0.0, self.tilt, 0.0]) @ rot_z(-side)
+        R = rot_z(side) @ rotation_from_rpy([0.0, DropSettings.tilt, 0.0]) @ rot_z(-side)
         X_WO = make_pose(R) @ X_SO
         X_WO[2, 3] += DropSettings.height - transform_points(X_WO, self.support)[:, 2].min()
         return X_WO
@@ -256,7 +249,7 @@ def _drop_all_poses(
 def _drop_pose(drop: DropTest, classes: PoseClasses, k: int) -> _DropOutcome:
     tilt_count = 4  # Drops of each pose, tilted to evenly spread sides.
     X_SO, residual = classes.poses[k].X_SO.matrix(), 0.0
-    weakest = weakest_side(classes.landscape, X_SO[:3, :3], drop.tilt)
+    weakest = weakest_side(classes.landscape, X_SO[:3, :3], float(DropSettings.tilt))
     for side in weakest + 2.0 * np.pi * np.arange(tilt_count) / tilt_count:
         dropped = drop.run(X_SO, float(side))
         found = classes.find(dropped.down)

@@ -14,7 +14,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -237,10 +237,10 @@ def confidence_from_signs(
     return 1.0 / (1.0 + math.exp(-logit))
 
 
-@lru_cache(maxsize=1)
-def calibration(path: Path = CALIBRATION_FILE) -> Mapping[tuple[str, bool], Curves]:
+@cache
+def calibration() -> Mapping[tuple[str, bool], Curves]:
     """The curves by name of the engine, and by whether it holds the target to the end."""
-    content = json.loads(path.read_text(encoding="utf-8"))
+    content = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
     return {
         (engine, held == "held"): {
             sign: Curve(tuple(curve["knots"]), tuple(curve["logits"]))

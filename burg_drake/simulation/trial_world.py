@@ -21,11 +21,15 @@ from burg_drake.simulation.contacts import (
     ContactReader,
     Neighbours,
     assign_friction,
-    collision_geometries,
 )
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_execution import OtherTouched
-from burg_drake.station import HandHandle, StationDiagram, filter_contact_pairs
+from burg_drake.station import (
+    HandHandle,
+    StationDiagram,
+    collision_geometries,
+    filter_contact_pairs,
+)
 
 
 class TrialWorld:

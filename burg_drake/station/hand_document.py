@@ -39,6 +39,10 @@ class Finger:
     closed: float
     open: float
 
+    def position(self, closed: float) -> float:
+        """Joint position [m] by how far the finger is closed, from 0 (open) to 1."""
+        return self.open + closed * (self.closed - self.open)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hand:

@@ -420,7 +420,7 @@ class _HandBench:
 
     def _at(self, closed: float) -> tuple[float, float]:
         """Joint positions of the document, from open (0) to closed (1) [m]."""
-        one, other = (f.open + closed * (f.closed - f.open) for f in self._hand.fingers)
+        one, other = (finger.position(closed) for finger in self._hand.fingers)
         return one, other
 
     def _put(self, positions: tuple[float, float]) -> None:

@@ -19,6 +19,7 @@ from pydrake.geometry import (
     RoleAssign,
 )
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
@@ -41,9 +42,10 @@ def filter_contact_pairs(station_diagram: StationDiagram, context: Context | Non
     """
     graph = station_diagram.diagram.mutable_scene_graph()
     objects = {**station_diagram.free, **station_diagram.standing, **station_diagram.fixed}
-    geometries = {name: _geometries_of(station_diagram, [index]) for name, index in objects.items()}
-    robot = _geometries_of(station_diagram, station_diagram.robot_bodies)
-    table = _geometries_of(station_diagram, [station_diagram.table])
+    plant = station_diagram.plant
+    geometries = {name: collision_geometries(plant, [index]) for name, index in objects.items()}
+    robot = collision_geometries(plant, station_diagram.robot_bodies)
+    table = collision_geometries(plant, [station_diagram.table])
     surroundings = [g for one in geometries.values() for g in one] + table
     declaration = CollisionFilterDeclaration()
     patches, rolling = _ball_geometries(station_diagram, geometries)
@@ -81,11 +83,13 @@ def _exclude_pairs(
         declaration.ExcludeBetween(GeometrySet(list(some)), GeometrySet(list(others)))
 
 
-def _geometries_of(
-    station_diagram: StationDiagram, bodies: Iterable[BodyIndex]
-) -> list[GeometryId]:
-    plant = station_diagram.plant
-    return [g for i in bodies for g in plant.GetCollisionGeometriesForBody(plant.get_body(i))]
+def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> list[GeometryId]:
+    """Collision geometries of bodies, in the plant's order."""
+    return [
+        geometry
+        for index in sorted(bodies)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
+    ]
 
 
 def _ball_geometries(

@@ -121,8 +121,7 @@ class HandHandle:
             closed: how far they are closed, from 0 (open) to 1 (pads together).
         """
         for joint, finger in zip(self.joints, self.document.fingers, strict=True):
-            q = finger.open + closed * (finger.closed - finger.open)
-            joint.set_translation(plant_context, q)
+            joint.set_translation(plant_context, finger.position(closed))
             joint.set_translation_rate(plant_context, 0.0)
 
     def closing_command(self) -> Array:

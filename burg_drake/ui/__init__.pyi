@@ -19,11 +19,11 @@ from .page_server import (
     require_viser as require_viser,
     serve_page as serve_page,
 )
-from .panel_html import (
+from .panel_parts import (
     STATUS_STYLES as STATUS_STYLES,
     html_table as html_table,
-    join_html as join_html,
     notice_html as notice_html,
+    paragraph as paragraph,
 )
 from .scene_panels import scene_names as scene_names
 from .scene_view import footprint as footprint

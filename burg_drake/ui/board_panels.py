@@ -5,16 +5,16 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import viser
 
 from burg_drake.compose import BOARD_SIZES, SessionView, SetBoard, board_size, board_size_name
-from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.core import BurgError, InvalidInputError, count_with_noun
 from burg_drake.ui.board_view import BoardLayers, BoardOverlay
-from burg_drake.ui.buttons import SidePanel, upload_button
 from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_html import count_with_noun, join_html, paragraph, secondary_text
+from burg_drake.ui.panel_parts import SidePanel, paragraph, secondary_text, upload_button
 from burg_drake.ui.scene_view import Coloring
 from burg_drake.ui.viewpoints import PageViews
 
@@ -180,9 +180,7 @@ class BackdropPanel(SidePanel):
                 self._watch,
             )
             self._opacity = actions.on_choice(
-                gui.add_slider("Opacity", 0.0, 1.0, 0.05, 0.8),
-                self._set_opacity,
-                key="backdrop",
+                gui.add_slider("Opacity", 0.0, 1.0, 0.05, 0.8), self._set_opacity, key="backdrop"
             )
             self._remove = self._button("Remove the picture", self._clear, icon=icon.X)
             self._show_sheet(None, "")
@@ -286,7 +284,7 @@ class BackdropPanel(SidePanel):
         self.show(self._actions.session.view)
 
     def _show_line(self, line: str) -> None:
-        self._text.content = join_html(paragraph(secondary_text(line)))
+        self._text.content = paragraph(secondary_text(line))
 
 
 COLORING_CHOICES: dict[str, Coloring] = {
@@ -315,28 +313,18 @@ class DisplayPanel(SidePanel):
         on_change: Callable[[], None],
     ) -> None:
         super().__init__(gui, actions)
-        self._views = views
         self._on_change = on_change
-        down, front = viser.Icon.ARROW_BAR_DOWN, viser.Icon.PERSPECTIVE
         with gui.add_folder("Display"):
             self._colors: Any = gui.add_dropdown("Objects", tuple(COLORING_CHOICES))
             self._markers = gui.add_checkbox("Markers", True)
             for field in (self._colors, self._markers):
                 actions.on_choice(field, lambda value: on_change())
-            self._page_button(
-                "From above",
-                self.look_from_above,
-                width=6,
-                icon=down,
-                hint="View (T)",
-            )
-            self._page_button(
-                "From the front",
-                self.look_from_front,
-                width=6,
-                icon=front,
-                hint="View (F)",
-            )
+            for label, key, icon, above in (
+                ("From above", "T", viser.Icon.ARROW_BAR_DOWN, True),
+                ("From the front", "F", viser.Icon.PERSPECTIVE, False),
+            ):
+                look = partial(views.set_view, above=above)
+                self._page_button(label, look, width=6, icon=icon, hint=f"View ({key})")
 
     @property
     def coloring(self) -> Coloring:
@@ -353,13 +341,3 @@ class DisplayPanel(SidePanel):
         names = tuple(COLORING_CHOICES)
         self._colors.value = names[(names.index(self._colors.value) + 1) % len(names)]
         self._on_change()
-
-    def look_from_above(self, client: viser.ClientHandle | None) -> None:
-        """Brings a page's camera above the board."""
-        if client is not None:
-            self._views.set_view(client, above=True)
-
-    def look_from_front(self, client: viser.ClientHandle | None) -> None:
-        """Brings a page's camera in front of the board."""
-        if client is not None:
-            self._views.set_view(client, above=False)

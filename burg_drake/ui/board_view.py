@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from burg_drake.core import Array, InvalidInputError, inverse, quaternion_from_rotation
 from burg_drake.scene import Board
 from burg_drake.station import Station, marker_grid
-from burg_drake.ui.panel_html import FIXED_COLOR
+from burg_drake.ui.panel_parts import FIXED_COLOR
 
 
 def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:

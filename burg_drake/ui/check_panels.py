@@ -20,13 +20,12 @@ from burg_drake.core import TaskCancelled, list_names as names_of
 from burg_drake.scene import Board
 from burg_drake.ui.background_pictures import ReachTask
 from burg_drake.ui.board_view import BoardLayers, BoardOverlay
-from burg_drake.ui.buttons import SidePanel
 from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_html import (
+from burg_drake.ui.panel_parts import (
+    SidePanel,
     color_dot,
     html_list,
     html_table,
-    join_html,
     notice_html,
     paragraph,
     secondary_text,
@@ -52,7 +51,7 @@ class CheckPanel:
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
-        self._text.content = join_html(paragraph(*issues_html(view)))
+        self._text.content = paragraph(*issues_html(view))
 
 
 def issues_html(view: SessionView) -> list[Child]:
@@ -104,7 +103,7 @@ class SettlePanel(SidePanel):
         self._settle.disabled = not view.instances
         self._accept.visible = self._revert.visible = view.proposal is not None
         self._cancel.visible = view.working is not None
-        self._text.content = join_html(paragraph(*_status_lines(view)))
+        self._text.content = paragraph(*_status_lines(view))
 
 
 def _status_lines(view: SessionView) -> list[Child]:
@@ -163,11 +162,8 @@ class GraspPanel:
         text = ""
         if self._on.value:
             late = view.grasps_revision != view.revision
-            text = join_html(
-                paragraph(
-                    _grasp_count_table(view.grasps),
-                    secondary_text("Counting ...") if late else None,
-                )
+            text = paragraph(
+                _grasp_count_table(view.grasps), secondary_text("Counting ...") if late else None
             )
         self._text.content = text
 
@@ -262,7 +258,7 @@ class ReachPanel:
         pixels = reach_image(layer, pixels=8)  # of each cell, so that cells keep sharp edges
         self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), opacity=0.55))
         share = f"Some orientation of the hand reaches {layer.covered:.0%} of the board."
-        self._text.content = join_html(paragraph(reachability_key(), secondary_text(share)))
+        self._text.content = paragraph(reachability_key(), secondary_text(share))
 
     def _show_line(self, line: str) -> None:
-        self._text.content = join_html(paragraph(secondary_text(line))) if line else ""
+        self._text.content = paragraph(secondary_text(line)) if line else ""

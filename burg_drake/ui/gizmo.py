@@ -245,7 +245,6 @@ class Gizmo:
         self._who: int | None = None
         self._held: _GizmoPart | None = None
         self._X_SGi = np.eye(4)
-        self._start: dict[str, Array] = {}
 
     def show(self, view: SessionView) -> None:
         """Brings the handles to a view; those that are dragged are the pointer's."""
@@ -347,17 +346,14 @@ class Gizmo:
         return node
 
     def _begin(self, who: int | None, part: _GizmoPart, X_SG: Array) -> None:
-        self._who, self._held = who, part
-        view = self._actions.session.view
-        self._X_SGi = X_SG
-        self._start = {name: view.X_SO(name) for name in view.selection}
-        self._drag = self._actions.session.drag(view.selection)
+        self._who, self._held, self._X_SGi = who, part, X_SG
+        session = self._actions.session
+        self._drag = session.drag(session.view.selection)
 
     def _move(self, who: int | None, X_SG: Array) -> None:
         if who != self._who or self._drag is None or self._drag.is_over:
             return
-        X = X_SG @ inverse(self._X_SGi)
-        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, changes_height=True)
+        self._drag.transform(X_SG @ inverse(self._X_SGi), changes_height=True)
 
     def _end(self, who: int | None) -> None:
         if who != self._who:

@@ -14,21 +14,18 @@ from burg_drake.compose import (
     RandomConfiguration,
     SessionView,
 )
+from burg_drake.core import count_with_noun
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import LAYOUT_NAMES
 from burg_drake.ui.background_pictures import ObjectPictures
-from burg_drake.ui.buttons import (
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_parts import (
     SidePanel,
     ask_for_confirmation,
-    picture_button,
-    set_button_picture,
-)
-from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_html import (
-    count_with_noun,
-    join_html,
     paragraph,
+    picture_button,
     secondary_text,
+    set_button_picture,
     title_html,
 )
 from burg_drake.visualization import element
@@ -79,7 +76,7 @@ class LibraryPanel(SidePanel):
             for name, entry in library.objects.items():
                 hint = entry.description or name
                 weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
-                button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
+                button = picture_button(self._gui, name, f"{hint} ({weight})")
                 self._actions.on_click(button, partial(self._actions.session.do, AddObject(name)))
                 self._buttons[name] = button
         self._filter(self._search.value)
@@ -102,12 +99,10 @@ class LibraryPanel(SidePanel):
         if found < total:
             count = f"{found} of {count}"
         why = self._pictures.missing if self._pictures else ""
-        self._title.content = join_html(
-            paragraph(
-                title_html(library.name),
-                element("span", f" {count}; click one to add it", class_="bd-quiet"),
-                secondary_text(why) if why else None,
-            )
+        self._title.content = paragraph(
+            title_html(library.name),
+            element("span", f" {count}; click one to add it", class_="bd-quiet"),
+            secondary_text(why) if why else None,
         )
 
 

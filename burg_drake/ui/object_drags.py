@@ -27,7 +27,6 @@ class _PageDrag:
 
     Attributes:
         drag: of the session.
-        X_SO: (4, 4) poses by instance at the start.
         p_SM: (3,) what turns go about [m].
         p_SG: (3,) what was grabbed [m].
         x: of the pointer on the page at the start, 0 to 1.
@@ -35,7 +34,6 @@ class _PageDrag:
     """
 
     drag: Drag
-    X_SO: dict[str, Array]
     p_SM: Array
     p_SG: Array
     x: float
@@ -119,9 +117,8 @@ class ObjectDrags:
         view = self._actions.session.view
         handle = self._gizmo.handle_under(camera, p_SG)
         names = view.selection if handle or name in view.selection else (name,)
-        X_SO = {held: view.X_SO(held) for held in names}
         drag = self._actions.session.drag(names)
-        self._held[client_id] = _PageDrag(drag, X_SO, mean_center(view, names), p_SG, x, handle)
+        self._held[client_id] = _PageDrag(drag, mean_center(view, names), p_SG, x, handle)
 
     def _follow_pointer(
         self, client_id: int, camera: PageCamera, p_SQ: Array, x: float | None
@@ -138,16 +135,10 @@ class ObjectDrags:
             X = rotation_about_point(held.p_SM, rot_z(turn), np.zeros(3))
         elif (p_SP := camera.on_plane(p_SQ, held.p_SG, (0.0, 0.0, 1.0))) is not None:
             X = make_pose(p_AB=p_SP - held.p_SG)
-        if X is not None:
-            self._move_held(client_id, held, X)
-
-    def _move_held(self, client_id: int, held: _PageDrag, X: Array) -> None:
-        """Holds what is dragged where a motion (4, 4) in S brings it from the start."""
+        if X is None:
+            return
         try:
-            held.drag.move(
-                {name: X @ X_SO for name, X_SO in held.X_SO.items()},
-                changes_height=held.handle is not None,
-            )
+            held.drag.transform(X, changes_height=held.handle is not None)
         except BurgError:
             self._held.pop(client_id, None)  # one error; the rest of the gesture is ignored
             raise

@@ -211,27 +211,17 @@ class PageActions:
 
     Attributes:
         queue: in which all actions are done.
+        submit: puts an action into it, with the page that hears of errors.
         on_refused: called after an action that was refused: fields show again what is so.
     """
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
         self.session = session
         self.queue = ActionQueue(self._show_error)
+        self.submit = self.queue.submit
         self.on_refused: Callable[[], None] = lambda: None
         self._server = server
         self._messages: WeakKeyDictionary[viser.ClientHandle, list[Any]] = WeakKeyDictionary()
-
-    def submit(
-        self,
-        action: Callable[[], Any],
-        client: viser.ClientHandle | None = None,
-        *,
-        key: str = "",
-        after: float = 0.0,
-        wait_for_typing: bool = False,
-    ) -> None:
-        """Has something done; see `ActionQueue.submit`."""
-        self.queue.submit(action, client, key=key, after=after, wait_for_typing=wait_for_typing)
 
     def on_click(self, button: Any, action: Callable[[], Any]) -> Any:
         """Has something done at each click of a button; gives the button."""

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 import http.client
 import ipaddress
-import socket
 from dataclasses import dataclass
 from http import HTTPStatus
 from importlib.util import find_spec
-from types import TracebackType
 from typing import TYPE_CHECKING
 
-from burg_drake.core import (
-    InvalidInputError,
-    MissingDependencyError,
-    address_in_use_error,
-    page_url,
-)
+from burg_drake.core import MissingDependencyError, open_listener, page_url
 
 if TYPE_CHECKING:
     import viser
@@ -62,12 +54,7 @@ class ServedPage:
     def __enter__(self) -> ServedPage:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
@@ -100,7 +87,8 @@ def serve_page(
     from burg_drake.ui.admission import Admission
     from burg_drake.ui.guarded_viser import guarded_server, stop_server
 
-    listener = open_listener(host, port)
+    # The live camera view starts at 7100.
+    listener = open_listener(host, port, first_port=7200, title="page")
     address, bound = listener.getsockname()[:2]
     local = ipaddress.ip_address(address).is_loopback
     admission = Admission(host, bound, title=title, by_token=not local)
@@ -112,35 +100,6 @@ def serve_page(
         raise
     server.gui.configure_theme(show_share_button=False, show_logo=False)
     return ServedPage(server, host, bound, admission)
-
-
-def open_listener(host: str, port: int | None) -> socket.socket:
-    """A socket that listens.
-
-    Args:
-        host: address to listen on.
-        port: as of `serve_page`.
-
-    Raises:
-        InvalidInputError: the port is taken, or the address is not this machine's.
-    """
-    # The live camera view starts at 7100.
-    ports = range(7200, 7250) if port is None else range(port, port + 1)
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    for candidate in ports:
-        try:
-            return socket.create_server(
-                (host, candidate), family=family, dualstack_ipv6=host == "::"
-            )
-        except OSError as error:
-            failure = error
-            if error.errno != errno.EADDRINUSE:
-                raise InvalidInputError(
-                    f"the page cannot be served on {host}: {error.strerror or error}"
-                ) from error
-    raise InvalidInputError(
-        address_in_use_error(host, ports, any_of_them=port is None)
-    ) from failure
 
 
 def require_guarded(address: str, port: int) -> None:

@@ -5,18 +5,20 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import viser
 
 from burg_drake.compose import FileChanged, SessionView, UnsavedChanges
+from burg_drake.core import BurgError
 from burg_drake.printout import PAPER_SIZES, PrintSettings
-from burg_drake.ui.buttons import SidePanel, ask_for_confirmation
 from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_html import (
+from burg_drake.ui.panel_parts import (
     STATUS_STYLES,
-    join_html,
+    SidePanel,
+    ask_for_confirmation,
     notice_html,
     paragraph,
     secondary_text,
@@ -49,7 +51,7 @@ class SummaryPanel(SidePanel):
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
-        self._text.content = join_html(paragraph(*_summary_html(view)))
+        self._text.content = paragraph(*_summary_html(view))
         self._dismiss.visible = bool(view.notices)
         _set_enabled(self._undo, view.undo_label, "Undo")
         _set_enabled(self._redo, view.redo_label, "Redo")
@@ -160,38 +162,34 @@ class FilePanel(SidePanel):
         view = session.view
         own = view.path is not None and name == view.path.stem
         other_name = None if own else name or None
+
+        def overwrite() -> None:
+            session.save(other_name, overwrite=True)
+
         try:
             view = session.save(other_name)
         except FileChanged as error:
-            if client is None:
-                raise
-            ask_for_confirmation(
-                self._actions,
-                client,
-                "Overwrite the file?",
-                str(error),
-                "Overwrite",
-                lambda: session.save(other_name, overwrite=True),
-            )
+            self._confirm(client, error, "Overwrite the file?", "Overwrite", overwrite)
             return
         assert view.path is not None
         self._actions.show_message(client, str(view.path), "Saved")
 
     def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
         """Goes over to another scene, and asks first if something would be lost."""
+        discard = partial(open, name, discard=True)
         try:
             open(name)
         except UnsavedChanges as error:
-            if client is None:
-                raise
-            ask_for_confirmation(
-                self._actions,
-                client,
-                "Discard changes?",
-                str(error),
-                "Discard them",
-                lambda: open(name, discard=True),
-            )
+            self._confirm(client, error, "Discard changes?", "Discard them", discard)
+
+    def _confirm(
+        self, client: Client, error: BurgError, title: str, label: str, action: Callable[[], Any]
+    ) -> None:
+        """Asks a page whether something shall be done in spite of an error, which is raised if
+        there is no page to ask."""
+        if client is None:
+            raise error
+        ask_for_confirmation(self._actions, client, title, str(error), label, action)
 
     def print_out(self, client: Client) -> None:
         """Sends the printout of the board to a page."""

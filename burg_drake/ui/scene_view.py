@@ -30,7 +30,7 @@ from burg_drake.core import (
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import convex_polygon
-from burg_drake.ui.panel_html import FIXED_COLOR, Rgb8, status_style
+from burg_drake.ui.panel_parts import FIXED_COLOR, Rgb8, status_style
 from burg_drake.visualization import linear_light
 
 
@@ -172,10 +172,7 @@ class SceneView:
     """
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        shapes: ObjectMeshes,
-        attach: Callable[[Any, str], None],
+        self, scene: viser.SceneApi, shapes: ObjectMeshes, attach: Callable[[Any, str], None]
     ) -> None:
         self._scene = scene
         self._shapes = shapes
@@ -351,14 +348,6 @@ class ProposalView:
         )
 
 
-@dataclass(eq=False)
-class _GapLine:
-    """A line and its label."""
-
-    line: viser.LineSegmentsHandle
-    label: viser.LabelHandle
-
-
 class HeightView:
     """Shows how far selected objects are above what is below them.
 
@@ -368,26 +357,28 @@ class HeightView:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self._shown: dict[str, _GapLine] = {}
+        self._shown: dict[str, tuple[viser.LineSegmentsHandle, viser.LabelHandle]] = {}
 
     def show(self, view: SessionView) -> None:
         """Brings the browser to a view."""
         for name in [name for name in self._shown if name not in view.gaps]:
-            self._shown.pop(name).line.remove()  # and the label below it
+            self._shown.pop(name)[0].remove()  # and the label below it
         for name, gap in view.gaps.items():
             lower, upper = instance_bounds(view.state, name)
             x, y = (lower[:2] + upper[:2]) / 2.0
             ends = np.array([[x, y, lower[2]], [x, y, lower[2] - gap]])
-            shown = self._shown.get(name) or self._add_line(name, ends)
-            self._shown[name] = shown
-            shown.line.points = ends[None].astype(np.float32)
-            shown.label.position = ends.mean(axis=0)
-            shown.label.text = f"{1e3 * gap:.1f} mm"
+            if name not in self._shown:
+                self._shown[name] = self._add_line(name, ends)
+            line, label = self._shown[name]
+            line.points = ends[None].astype(np.float32)
+            label.position = ends.mean(axis=0)
+            label.text = f"{1e3 * gap:.1f} mm"
 
-    def _add_line(self, name: str, ends: Array) -> _GapLine:
+    def _add_line(
+        self, name: str, ends: Array
+    ) -> tuple[viser.LineSegmentsHandle, viser.LabelHandle]:
         color = status_style("hovering").color
         line = self._scene.add_line_segments(
             f"/heights/{name}", ends[None], color, thickness=2.0, thickness_units="screen"
         )
-        label = self._scene.add_label(f"/heights/{name}/label", "", anchor="center-left")
-        return _GapLine(line, label)
+        return line, self._scene.add_label(f"/heights/{name}/label", "", anchor="center-left")

@@ -31,13 +31,14 @@ from burg_drake.compose import (
 from burg_drake.core import Array, rot_z, rotation_angle, rotation_from_rpy, rpy_from_rotation
 from burg_drake.objects import ObjectEntry
 from burg_drake.ui.background_pictures import ObjectPictures
-from burg_drake.ui.buttons import SidePanel, picture_button, set_button_picture
 from burg_drake.ui.page_actions import NAME_TYPING_DELAY, PageActions
-from burg_drake.ui.panel_html import (
+from burg_drake.ui.panel_parts import (
+    SidePanel,
     color_dot,
-    join_html,
     paragraph,
+    picture_button,
     secondary_text,
+    set_button_picture,
     small_heading,
     status_style,
     title_html,
@@ -57,6 +58,7 @@ class ObjectPanel(SidePanel):
         self, gui: viser.GuiApi, actions: PageActions, switch_axes: Callable[[], None]
     ) -> None:
         super().__init__(gui, actions)
+        session = actions.session
         self._text = gui.add_html("")
         self._one = gui.add_folder(None)
         with self._one:
@@ -67,7 +69,7 @@ class ObjectPanel(SidePanel):
                 gui.add_checkbox(
                     "Background", False, hint="It stays where it is when the scene is simulated"
                 ),
-                self._fix,
+                lambda fixed: session.do(SetFixed(session.view.selection, fixed)),
             )
             self._numbers = _PoseFields(gui, actions)
         self._restrict = actions.on_choice(
@@ -77,7 +79,7 @@ class ObjectPanel(SidePanel):
                 hint="Objects keep their tilt while they are moved, and their height unless they"
                 " are raised; without it they have handles for all six directions",
             ),
-            actions.session.restrict_movement,
+            session.restrict_movement,
         )
         self._axes = self._button(
             "Arrows: board or object",
@@ -108,9 +110,6 @@ class ObjectPanel(SidePanel):
         if len(names) == 1:
             self._actions.session.do(Rename(names[0], new), field="name")
 
-    def _fix(self, fixed: bool) -> None:
-        self._actions.session.do(SetFixed(self._actions.session.view.selection, fixed))
-
     def _add_buttons(self) -> None:
         icon, add = viser.Icon, self._selection_button
         add("−90°", lambda names: Turn(names, -90.0), width=2, hint="Turn clockwise")
@@ -130,8 +129,7 @@ class _PoseFields:
             gui.add_vector3("x, y, z [mm]", zeros, step=0.01), self._place
         )
         self._yaw = actions.typed_field(
-            gui.add_number("yaw [°]", 0.0, step=0.01, min=-max_value, max=max_value),
-            self._turn,
+            gui.add_number("yaw [°]", 0.0, step=0.01, min=-max_value, max=max_value), self._turn
         )
         self._angles = actions.typed_field(
             gui.add_vector3("roll, pitch, yaw [°]", zeros, step=0.01), self._turn_freely
@@ -192,18 +190,14 @@ def _pose_numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
 def _selection_html(view: SessionView) -> str:
     names = view.selection
     if not names:
-        return join_html(
-            paragraph(
-                secondary_text(
-                    "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag on"
-                    " free space selects all in a rectangle."
-                )
+        return paragraph(
+            secondary_text(
+                "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag on"
+                " free space selects all in a rectangle."
             )
         )
     if len(names) > 1:
-        return join_html(
-            paragraph(title_html(f"{len(names)} objects"), secondary_text(", ".join(names)))
-        )
+        return paragraph(title_html(f"{len(names)} objects"), secondary_text(", ".join(names)))
     status = view.status.get(names[0], "ok")
     entry = view.library.objects.get(view.instances[names[0]].object)
     kind = view.instances[names[0]].object
@@ -212,10 +206,8 @@ def _selection_html(view: SessionView) -> str:
     look = status_style(status)
     gap = view.gaps.get(names[0])
     height = secondary_text(f"{1e3 * gap:.1f} mm above what is below") if gap else None
-    return join_html(
-        paragraph(
-            title_html(names[0]), secondary_text(kind), color_dot(look.hex), look.words, height
-        )
+    return paragraph(
+        title_html(names[0]), secondary_text(kind), color_dot(look.hex), look.words, height
     )
 
 
@@ -265,15 +257,14 @@ class PosePanel(SidePanel):
         self._text.visible = not poses
         if not poses:
             missing = "It has no stable poses." if entry else "Select objects of one kind."
-            self._text.content = join_html(paragraph(secondary_text(missing)))
+            self._text.content = paragraph(secondary_text(missing))
         with self._folder:
             for k, pose in enumerate(poses[:max_poses]):
                 tested = "confirmed by dropping it" if pose.residual is not None else "not dropped"
                 button = picture_button(
                     self._gui,
                     f"{100.0 * pose.probability:.0f} %",
-                    None,
-                    hint=f"Pose {k}: {100.0 * pose.probability:.1f} % of drops end so; {tested}"
+                    f"Pose {k}: {100.0 * pose.probability:.1f} % of drops end so; {tested}"
                     + ("; it can roll on" if pose.rolls else ""),
                 )
                 self._actions.on_click(button, partial(self._set, k))
@@ -322,7 +313,7 @@ class ArrangePanel(SidePanel):
         self._several.visible = len(view.selection) > 1
 
     def _add_contact_buttons(self) -> None:
-        self._gui.add_html(join_html(paragraph(small_heading("Move until it touches"))))
+        self._gui.add_html(paragraph(small_heading("Move until it touches")))
         directions: tuple[tuple[str, Direction, str], ...] = (
             ("←", "-x", "to the left"),
             ("→", "x", "to the right"),
@@ -339,7 +330,7 @@ class ArrangePanel(SidePanel):
         self._selection_button("Put down", PutDown, width=4, hint="Lower it until it stands (B)")
 
     def _add_alignment_buttons(self) -> None:
-        self._gui.add_html(join_html(paragraph(small_heading("Align"))))
+        self._gui.add_html(paragraph(small_heading("Align")))
         icon = viser.Icon
         edges: tuple[tuple[Edge, Any, str], ...] = (
             ("left", icon.LAYOUT_ALIGN_LEFT, "left edges"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import viser
@@ -93,39 +94,28 @@ class SetupPage:
             self._library = LibraryPanel(gui, actions)
         left.dock_left()
         left.set_width(290)
-        self._summary = SummaryPanel(gui, actions, self._keys)
+        panels: list[Any] = [SummaryPanel(gui, actions, self._keys)]
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):
             self._object = ObjectPanel(gui, actions, self._gizmo.switch_axes)
             self._poses = PosePanel(gui, actions)
             self._arrange = ArrangePanel(gui, actions)
+            panels += [self._object, self._arrange]
         with tabs.add_tab("Scene", viser.Icon.LAYOUT_GRID):
             self._board_panel = BoardPanel(gui, actions)
-            self._fill = FillPanel(gui, actions)
+            fill = FillPanel(gui, actions)
             self._files = FilePanel(gui, actions)
+            panels += [self._board_panel, fill, self._files]
         with tabs.add_tab("Check", viser.Icon.CHECKLIST):
-            self._check = CheckPanel(gui)
-            self._settle = SettlePanel(gui, actions)
-            self._grasps = GraspPanel(gui, actions)
+            panels += [CheckPanel(gui), SettlePanel(gui, actions), GraspPanel(gui, actions)]
         with tabs.add_tab("View", viser.Icon.EYE):
             self._display = DisplayPanel(gui, actions, self._views, self._refresh)
             self._reach = ReachPanel(gui, actions, self._layers)
             self._backdrop = BackdropPanel(gui, actions, self._layers)
+            panels += [self._reach, self._backdrop]
         gui.main_panel.dock_right()
         gui.main_panel.set_width(330)
-        self._panels: tuple[Any, ...] = (
-            self._summary,
-            self._object,
-            self._arrange,
-            self._board_panel,
-            self._fill,
-            self._files,
-            self._check,
-            self._settle,
-            self._grasps,
-            self._reach,
-            self._backdrop,
-        )
+        self._panels = panels
         register_shortcuts(gui, actions, self._shortcut_calls())
 
     def _shortcut_calls(self) -> dict[str, ActionCall]:
@@ -141,8 +131,8 @@ class SetupPage:
             "settle": anywhere(self._session.settle),
             "axes": anywhere(self._gizmo.switch_axes),
             "snap": anywhere(self._arrange.snap),
-            "top": self._display.look_from_above,
-            "front": self._display.look_from_front,
+            "top": partial(self._views.set_view, above=True),
+            "front": partial(self._views.set_view, above=False),
             "colors": anywhere(self._display.next_colors),
             "help": self._keys.toggle,
         }

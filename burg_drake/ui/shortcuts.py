@@ -22,9 +22,8 @@ from burg_drake.compose import (
     nearest_stable_pose,
 )
 from burg_drake.core import InvalidInputError
-from burg_drake.ui.buttons import plain_button
 from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_html import html_table, join_html, paragraph
+from burg_drake.ui.panel_parts import html_table, paragraph, text_button
 from burg_drake.visualization import element
 
 
@@ -223,7 +222,7 @@ class KeysDialog:
             return
         modal = self._open[client] = client.gui.add_modal("Mouse and keys")
         with modal:
-            button = plain_button(client.gui, "Close", hint="Close (H or Esc)")
+            button = text_button(client.gui, "Close", hint="Close (H or Esc)")
             client.gui.add_html(shortcut_list_html())
         self._actions.on_click(button, lambda: self.close(client))
 
@@ -246,4 +245,4 @@ def shortcut_list_html() -> str:
         keys.setdefault(shortcut.label, []).append(shortcut.keys)
     rows = [(key(how), what) for how, what in MOUSE_ACTIONS]
     rows += [(key(" or ".join(how)), what) for what, how in keys.items()]
-    return join_html(paragraph(html_table(("Do", "What happens"), rows)))
+    return paragraph(html_table(("Do", "What happens"), rows))

@@ -108,12 +108,11 @@ class PageViews:
         camera.fov = FRONT_FOV
         server.on_client_connect(self._on_connect)
 
-    def set_view(self, client: viser.ClientHandle, *, above: bool) -> None:
+    def set_view(self, client: viser.ClientHandle | None, *, above: bool) -> None:
         """Brings a page's camera above the board, or in front of it."""
-        fov = TOP_FOV if above else FRONT_FOV
-        self._in_server_thread(
-            lambda: self._assign_view(client, direction_to_camera(above=above), fov)
-        )
+        if client is not None:
+            back, fov = direction_to_camera(above=above), TOP_FOV if above else FRONT_FOV
+            self._in_server_thread(lambda: self._assign_view(client, back, fov))
 
     def show(self) -> None:
         """Brings a board of another size into view on all pages, from where they look."""

@@ -1,4 +1,15 @@
 from .calibration_report import write_calibration_report as write_calibration_report
+from .charts import (
+    HistogramSeries as HistogramSeries,
+    Limit as Limit,
+    RankedShare as RankedShare,
+    bars_of_counts_file as bars_of_counts_file,
+    histogram_file as histogram_file,
+    interval_mark as interval_mark,
+    mirrored_histogram as mirrored_histogram,
+    nice_step as nice_step,
+    ranked_chart as ranked_chart,
+)
 from .colors import (
     COLOR_BINS as COLOR_BINS,
     OTHERS_COLOR as OTHERS_COLOR,
@@ -64,10 +75,14 @@ from .hand_visual import (
 from .html_page import (
     Child as Child,
     Html as Html,
+    PageTable as PageTable,
     element as element,
     html_document as html_document,
     join as join,
     page_style as page_style,
+    render_page as render_page,
+    svg_line as svg_line,
+    svg_text as svg_text,
 )
 from .hydroelastic_mesh import (
     HydroelasticMesh as HydroelasticMesh,
@@ -83,7 +98,6 @@ from .legend import (
     HISTOGRAM_HEIGHT as HISTOGRAM_HEIGHT,
     ColorBar as ColorBar,
     LegendEntry as LegendEntry,
-    legend_html as legend_html,
 )
 from .library_gallery import (
     show_library as show_library,
@@ -95,7 +109,6 @@ from .meshcat_drawing import (
     aim_at as aim_at,
     camera_rotation_along as camera_rotation_along,
     draw_triad as draw_triad,
-    text_triangles as text_triangles,
 )
 from .meshcat_page import (
     GraspPicker as GraspPicker,

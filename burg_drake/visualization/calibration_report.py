@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +15,13 @@ from burg_drake.cameras import (
     image_grid,
 )
 from burg_drake.core import Array, atomic_write
-from burg_drake.visualization.html_page import Child, Html, element, html_document, join
+from burg_drake.visualization.html_page import (
+    Html,
+    element,
+    render_page,
+    svg_rectangle,
+    svg_text,
+)
 
 FIGURE_WIDTH = 460.0
 """Width of a drawing of the image, in CSS pixels."""
@@ -28,20 +33,6 @@ ACCENT_HEX = "#b3261e"
 """Colour of residuals, uncertainty and advice."""
 BAR_HEX = "#2f6db5"
 """Colour of bars, coverage and distortion."""
-CALIBRATION_STYLE = f"""
-body {{ font: 15px/1.5 system-ui, sans-serif; color: {TEXT_HEX}; max-width: 62rem;
-  margin: 2rem auto; padding: 0 1rem; }}
-h1 {{ font-size: 1.4rem; }} h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; }}
-table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
-td, th {{ padding: .15rem .9rem .15rem 0; text-align: right; border-bottom: 1px solid #e4e7ec; }}
-td:first-child, th:first-child {{ text-align: left; }}
-figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }}
-figcaption {{ font-size: .85rem; max-width: {FIGURE_WIDTH:.0f}px; }}
-.advice {{ color: {ACCENT_HEX}; }}
-svg {{ max-width: 100%; height: auto; }}
-@media (max-width: 30rem) {{ td, th {{ padding-right: .5rem; font-size: .85rem; }}
-  td > svg {{ display: none; }} }}
-"""
 
 
 def write_calibration_report(calibration: Calibration, advice: list[str], path: str) -> None:
@@ -55,83 +46,30 @@ def write_calibration_report(calibration: Calibration, advice: list[str], path: 
     Raises:
         InvalidInputError: the place cannot be written to.
     """
-    k = calibration.intrinsics
-    body = join(
-        element("h1", "Calibration of a camera"),
-        element(
-            "p",
-            f"{k.width} x {k.height} pixels; {len(calibration.views)} views; lens model"
-            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square);"
-            f" the target bulges by {1e3 * calibration.bulge:.2f} mm",
-        ),
-        element("p", f"In 19 of 20 cases the camera is {calibration.promise}."),
-        *(element("p", line, class_="advice") for line in advice),
-        element("h2", "Camera"),
-        _parameter_table(calibration),
-        element("h2", "Over the image"),
-        _residual_figure(calibration),
-        _coverage_figure(calibration),
-        _uncertainty_figure(calibration),
-        _distortion_figure(calibration),
-        element("h2", "Views"),
-        _view_table(calibration),
-        _rejected_views(calibration),
+    page = render_page(
+        "visualization/calibration_report.html.jinja",
+        calibration=calibration,
+        advice=advice,
+        figures=[
+            _residual_figure(calibration),
+            _coverage_figure(calibration),
+            _uncertainty_figure(calibration),
+            _distortion_figure(calibration),
+        ],
     )
-    page = html_document("Calibration of a camera", CALIBRATION_STYLE, body)
-    atomic_write(path, f"{page}\n")
+    atomic_write(path, page)
 
 
-def _parameter_table(calibration: Calibration) -> Html:
-    rows = [
-        (name, f"{value:.6g}", f"{deviation:.2g}")
-        for name, (value, deviation) in calibration.parameters.items()
-    ]
-    return _table(("parameter", "value", "standard deviation"), rows)
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[Child]]) -> Html:
-    lines = [element("tr", *(element("td", cell) for cell in row)) for row in rows]
-    return element("table", element("tr", *(element("th", head) for head in heads)), *lines)
-
-
-def _view_table(calibration: Calibration) -> Html:
-    largest = max(used.rms for used in calibration.views)
-    rows: list[Sequence[Child]] = []
-    for used in calibration.views:
-        length = f"{120.0 * used.rms / largest:.1f}"
-        bar = element("rect", x=0, y=4, width=length, height=9, fill=BAR_HEX)
-        rows.append(
-            (
-                used.view.name,
-                len(used.view.ids),
-                f"{math.degrees(used.tilt):.0f}",
-                f"{used.view.blur:.2f}",
-                f"{used.rms:.3f}",
-                element("svg", bar, width=122, height=16),
-            )
-        )
-    heads = ("image", "corners", "tilt (degrees)", "blur (pixels)", "residual (pixels)", "")
-    return _table(heads, rows)
-
-
-def _rejected_views(calibration: Calibration) -> Html:
-    if not calibration.rejected:
-        return Html()
-    lines = (element("li", f"{name} {why}".strip()) for name, why in calibration.rejected)
-    return join(element("h2", "Left out"), element("ul", *lines))
-
-
-def _figure(drawing: Html, caption: str) -> Html:
-    return element("figure", drawing, element("figcaption", caption))
+CaptionedDrawing = tuple[Html, str]
+"""A drawing and its caption."""
 
 
 def _image_svg(calibration: Calibration, *shapes: Html) -> Html:
     """An SVG in pixels of the image, with its frame."""
     k = calibration.intrinsics
-    size = {"width": k.width, "height": k.height}
     line = _line_width(calibration)
-    frame = element(
-        "rect", x=-0.5, y=-0.5, **size, fill="none", stroke="#c4cad4", stroke_width=line
+    frame = svg_rectangle(
+        -0.5, -0.5, k.width, k.height, fill="none", stroke="#c4cad4", stroke_width=line
     )
     height = FIGURE_WIDTH * k.height / k.width
     view = f"-0.5 -0.5 {k.width} {k.height}"
@@ -155,12 +93,12 @@ def _draw_arrows(calibration: Calibration, start: Array, vectors: Array, color: 
     ]
 
 
-def _residual_figure(calibration: Calibration) -> Html:
+def _residual_figure(calibration: Calibration) -> CaptionedDrawing:
     corners = np.concatenate([used.view.corners for used in calibration.views])
     residuals = np.concatenate([used.residuals for used in calibration.views])
     scale = _floor_to_one_digit(0.03 * calibration.intrinsics.width / max(calibration.rms, 1e-6))
     arrows = _draw_arrows(calibration, corners, scale * residuals, ACCENT_HEX)
-    return _figure(
+    return (
         _image_svg(calibration, *arrows),
         f"Residuals of all corners, {scale:g} times as long. Where neighbours agree, the lens model"
         " is too simple or the target is bent.",
@@ -177,27 +115,25 @@ def _draw_cells(calibration: Calibration, shades: Array, words: list[str], color
         row, column = divmod(index, columns)
         x, y = column * width - 0.5, row * height - 0.5
         opacity = round(float(0.85 * shades[row, column]), 3)
-        shapes.append(
-            element("rect", x=x, y=y, width=width, height=height, fill=color, fill_opacity=opacity)
-        )
-        place = {"x": x + width / 2, "y": y + 0.6 * height, "text_anchor": "middle"}
+        shapes.append(svg_rectangle(x, y, width, height, fill=color, fill_opacity=opacity))
         ink = "#ffffff" if opacity > 0.5 else TEXT_HEX
-        shapes.append(element("text", word, **place, font_size=0.026 * k.width, fill=ink))
+        x, y, size = x + width / 2, y + 0.6 * height, 0.026 * k.width
+        shapes.append(svg_text(word, x, y, text_anchor="middle", font_size=size, fill=ink))
     return _image_svg(calibration, *shapes)
 
 
-def _coverage_figure(calibration: Calibration) -> Html:
+def _coverage_figure(calibration: Calibration) -> CaptionedDrawing:
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     counts = corner_coverage([used.view for used in calibration.views], size)
     shades = np.sqrt(counts / max(1, counts.max()))
     words = [str(n) for n in counts.ravel().tolist()]
-    return _figure(
+    return (
         _draw_cells(calibration, shades, words, BAR_HEX),
         "Corners seen in each part of the image. Where there are none, the lens is a guess.",
     )
 
 
-def _uncertainty_figure(calibration: Calibration) -> Html:
+def _uncertainty_figure(calibration: Calibration) -> CaptionedDrawing:
     max_error = 10.0  # Pixels. Larger errors have the same shade.
     rows, columns = COVERAGE_GRID
     k = calibration.intrinsics
@@ -210,7 +146,7 @@ def _uncertainty_figure(calibration: Calibration) -> Html:
     bounds = np.nan_to_num(bounds, posinf=1e9, nan=1e9)
     shades = np.clip(bounds / max(1.0, min(bounds.max(), max_error)), 0.0, 1.0)
     words = [f"{b:.2f}" if b < max_error else f">{max_error:g}" for b in bounds.tolist()]
-    return _figure(
+    return (
         _draw_cells(calibration, shades.reshape(COVERAGE_GRID), words, ACCENT_HEX),
         "How far the camera model may be off in the middle of each part, in 19 of 20 cases"
         " [pixels]; towards the corners of the image it is more. It counts the scatter of the"
@@ -219,7 +155,7 @@ def _uncertainty_figure(calibration: Calibration) -> Html:
     )
 
 
-def _distortion_figure(calibration: Calibration) -> Html:
+def _distortion_figure(calibration: Calibration) -> CaptionedDrawing:
     k = calibration.intrinsics
     seen = image_grid(k, 17, 13)
     moved, straight = seen - k.undistort(seen), "a straight image"
@@ -231,7 +167,7 @@ def _distortion_figure(calibration: Calibration) -> Html:
     longest = float(np.linalg.norm(moved, axis=1).max())
     scale = _floor_to_one_digit(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
     arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, BAR_HEX)
-    return _figure(
+    return (
         _image_svg(calibration, *arrows),
         f"Where the lens moves points of {straight} to (dots: from), {scale:g} times as long;"
         f" {longest:.1f} pixels at most.",

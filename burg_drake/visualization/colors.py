@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core import Array, InvalidInputError, Outcome, Rgba as Rgba
+from burg_drake.visualization.charts import nice_step
 
 VIRIDIS_COLORS = (
     *("#440154", "#481a6c", "#472f7d", "#414487", "#39568c", "#31688e", "#2a788e", "#23888e"),
@@ -97,7 +98,7 @@ class ColorScale:
 
     def ticks(self) -> tuple[float, ...]:
         """Round numbers in the range, rising."""
-        step = _round_step(self.upper - self.lower)
+        step = _axis_step(self.upper - self.lower)
         slack = 1e-9 * step
         first, last = np.ceil((self.lower - slack) / step), np.floor((self.upper + slack) / step)
         return tuple(float(k) * step for k in np.arange(first, last + 1.0))
@@ -131,7 +132,7 @@ def color_scale(values: ArrayLike, limits: tuple[float, float] | None = None) ->
     if not upper - lower > max(min_span, 1e-9 * max(abs(lower), abs(upper))):
         half = 0.5 * abs(lower) or 0.5
         return ColorScale(lower - half, upper + half)
-    step = _round_step(upper - lower)
+    step = _axis_step(upper - lower)
     return ColorScale(
         float(np.floor(lower / step + 1e-9)) * step, float(np.ceil(upper / step - 1e-9)) * step
     )
@@ -152,13 +153,9 @@ def range_without_outliers(numbers: Array) -> tuple[float, float]:
     )
 
 
-def _round_step(span: float) -> float:
-    """The smallest of 1, 2, 5, 10, 20 ... that divides a span in few parts."""
-    max_intervals = 6
-    power = 10.0 ** np.floor(np.log10(span / max_intervals))
-    return float(
-        next(m * power for m in (1.0, 2.0, 5.0, 10.0) if span <= max_intervals * m * power * 1.001)
-    )
+def _axis_step(span: float) -> float:
+    """The smallest of 1, 2, 5, 10, 20 ... that divides a span in at most six parts."""
+    return nice_step(span / (6 * 1.001))
 
 
 @dataclass(frozen=True)

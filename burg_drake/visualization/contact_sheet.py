@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import burg_drake
 from burg_drake.core import atomic_write
 from burg_drake.objects import ContactGeometry, ObjectEntry, ObjectLibrary, StablePose
-from burg_drake.visualization.html_page import Child, Html, element, html_document, page_style
-from burg_drake.visualization.thumbnails import ObjectRenderer, Thumbnail
+from burg_drake.visualization.html_page import render_page
+from burg_drake.visualization.thumbnails import ObjectRenderer
 
 CONTACT_KIND_NAMES = {
     "surface": "surface to pads, convex pieces to others",
@@ -45,44 +45,42 @@ def write_contact_sheet(
     """
     chosen = list(library.objects if names is None else names)
     renderer = ObjectRenderer(library, chosen)
-    cards = [object_card(library, name, renderer, (remarks or {}).get(name, ())) for name in chosen]
-    atomic_write(path, _sheet_page(library, chosen, cards))
+    cards = [_object_card(library, name, renderer) for name in chosen]
+    poses = sum(len(library.entry(name).stable_poses) for name in chosen)
+    page = render_page(
+        "visualization/contact_sheet.html.jinja",
+        library=library,
+        about=f"{_count_text(len(chosen), 'object')}, {_count_text(poses, 'stable pose')}",
+        cards=cards,
+        remarks=remarks or {},
+        version=burg_drake.__version__,
+    )
+    atomic_write(path, page)
 
 
-def object_card(
-    library: ObjectLibrary, name: str, renderer: ObjectRenderer, remarks: Sequence[str] = ()
-) -> Html:
-    """The card of one object."""
+def _object_card(library: ObjectLibrary, name: str, renderer: ObjectRenderer) -> dict[str, Any]:
+    """What the card of an object shows."""
     pose_size = (160, 120)  # Pixels.
     entry = library.entry(name)
-    pieces = _count_text(len(entry.pieces), "piece")
     poses = [
-        _picture_figure(
+        (
             renderer.portrait(name, pose_size, stable_pose=k),
-            f"{name} in stable pose {k}",
-            element("b", percent_text(pose.probability)),
-            element("small", note) if (note := pose_note(pose)) else None,
+            percent_text(pose.probability),
+            pose_note(pose),
         )
         for k, pose in enumerate(entry.stable_poses)
     ]
-    description = element("p", entry.description) if entry.description else None
-    notes = [element("li", text, class_="remark") for text in remarks]
-    notes += [element("li", text) for text in surface_notes(library, name)]
-    return element(
-        "article",
-        element(
-            "div",
-            _picture_figure(renderer.portrait(name), f"{name} as it looks"),
-            _picture_figure(renderer.pieces(name), f"convex pieces of {name}", pieces),
-            class_="views",
-        ),
-        element("div", element("h2", name), description, class_="text"),
-        element("dl", *_object_figures(entry)),
-        element("div", *poses, class_="poses") if poses else None,
-        element("ul", *notes),
-        element("div", source_line(entry), class_="file"),
-        id=f"object-{name}",
-    )
+    return {
+        "name": name,
+        "description": entry.description,
+        "portrait": renderer.portrait(name),
+        "pieces": renderer.pieces(name),
+        "piece_count": _count_text(len(entry.pieces), "piece"),
+        "figures": _object_figures(entry),
+        "poses": poses,
+        "notes": surface_notes(library, name),
+        "source": _source_line(entry),
+    }
 
 
 def surface_notes(library: ObjectLibrary, name: str) -> list[str]:
@@ -117,39 +115,36 @@ def contact_name(contact: ContactGeometry) -> str:
     return f"{contact.primitive.shape} {lengths} mm"
 
 
-def source_line(entry: ObjectEntry) -> str:
+def _source_line(entry: ObjectEntry) -> str:
     """Where the object came from."""
     file = entry.source.file or "made by code"
     scaled = "" if entry.source.scale == 1.0 else f", times {entry.source.scale:g}"
     return file + scaled
 
 
-def _object_figures(entry: ObjectEntry) -> list[Html]:
+def _object_figures(entry: ObjectEntry) -> dict[str, str]:
+    """Properties of an object by name."""
     mass = entry.mass_properties
     size = [b - a for a, b in zip(entry.lower, entry.upper, strict=True)]
     pieces = entry.contact.kind in ("surface", "pieces", "compliant_pieces")
     fit = entry.fit if pieces else entry.contact.fit
     about = "" if mass.source == "given" else "~"
     wall = mass.wall_thickness
-    rows = [
-        ("Size [mm]", " × ".join(_length_text(s) for s in size)),
-        ("Mass", about + mass_text(mass.mass)),
-        ("Density", f"{_three_digits(mass.mass / mass.volume)} kg/m³"),
-        ("Contact", contact_name(entry.contact)),
-        ("Volume ratio", f"{fit.volume_ratio:.2f}" if fit else "not measured"),
-        ("Hausdorff distance", f"{1e3 * fit.hausdorff:.1f} mm" if fit else "not measured"),
-        ("Friction", f"{entry.friction:g}"),
-        ("Volume", f"{_three_digits(1e6 * mass.volume)} cm³"),
-        ("Body", "solid" if wall is None else f"hollow, wall {1e3 * wall:.1f} mm"),
-    ]
+    figures = {
+        "Size [mm]": " × ".join(_length_text(s) for s in size),
+        "Mass": about + mass_text(mass.mass),
+        "Density": f"{_three_digits(mass.mass / mass.volume)} kg/m³",
+        "Contact": contact_name(entry.contact),
+        "Volume ratio": f"{fit.volume_ratio:.2f}" if fit else "not measured",
+        "Hausdorff distance": f"{1e3 * fit.hausdorff:.1f} mm" if fit else "not measured",
+        "Friction": f"{entry.friction:g}",
+        "Volume": f"{_three_digits(1e6 * mass.volume)} cm³",
+        "Body": "solid" if wall is None else f"hollow, wall {1e3 * wall:.1f} mm",
+    }
     if mass.overridden:
         given = " and ".join(what.replace("_", " ") for what in mass.overridden)
-        rows.append(("Given by the user", given))
-    wide = {"Given by the user": "wide"}
-    return [
-        element("div", element("dt", name), element("dd", value), class_=wide.get(name))
-        for name, value in rows
-    ]
+        figures["Given by the user"] = given
+    return figures
 
 
 def mass_text(mass: float) -> str:
@@ -169,41 +164,3 @@ def _length_text(length: float) -> str:
 
 def _count_text(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _picture_figure(picture: Thumbnail, alt: str, *caption: Child) -> Html:
-    height, width = picture.pixels.shape[:2]
-    data = base64.b64encode(picture.png()).decode()
-    image = element("img", src=f"data:image/png;base64,{data}", alt=alt, width=width, height=height)
-    given = [child for child in caption if child is not None]
-    return element("figure", image, element("figcaption", *given) if given else None)
-
-
-def _sheet_page(library: ObjectLibrary, names: Sequence[str], cards: Sequence[Html]) -> str:
-    footnote = (
-        "Sizes are those of the box around the mesh, along its axes. A ~ marks a mass that"
-        " follows from a density. Volume ratio and Hausdorff distance say how well the shape"
-        " that touches others stands for the surface: its volume over that inside the surface,"
-        " and the largest distance between the two. The share below a pose is that of drops"
-        " from random orientations that end in it; the tilt, that at which it came to rest at"
-        " most, having been dropped and pushed."
-    )
-    sheet = page_style("burg_drake.visualization", "contact_sheet.css")
-    poses = sum(len(library.entry(name).stable_poses) for name in names)
-    about = f"{_count_text(len(names), 'object')}, {_count_text(poses, 'stable pose')}"
-    if library.document.description:
-        about = f"{library.document.description} {about}."
-    links = [element("a", name, href=f"#object-{name}") for name in names]
-    return html_document(
-        f"Object library {library.name}",
-        sheet,
-        element(
-            "header",
-            element("p", "Object library", class_="kind"),
-            element("h1", library.name),
-            element("p", about, class_="about"),
-            element("nav", *links) if len(names) > 6 else None,
-        ),
-        element("main", *cards),
-        element("footer", f"{footnote} Written by burg_drake {burg_drake.__version__}."),
-    )

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from burg_drake.core import Array, make_pose, rot_z, transform_points
 from burg_drake.formats import GraspFormat, Gripper, convention_of, group_by_convention
 from burg_drake.station import Hand
-from burg_drake.visualization.gltf import label_mesh
+from burg_drake.visualization.gltf import draw_label, label_mesh
 from burg_drake.visualization.hand_visual import HandVisual, hand_visuals
 from burg_drake.visualization.legend import LegendEntry
 from burg_drake.visualization.library_gallery import GALLERY_FIELD_OF_VIEW_DEG
@@ -23,6 +23,8 @@ from burg_drake.visualization.object_drawing import camera_rotation
 FRAMES_PATH = "/drake/frames"  # Path of the grasp frames in Meshcat's tree.
 R_WC = camera_rotation(np.deg2rad(22.0))
 """(3, 3) the camera."""
+X_LT = make_pose(R_WC @ np.diag([1.0, -1.0, -1.0]))
+"""(4, 4) text that faces the camera, where the axes of L are those of the world."""
 OWN_TRIAD = TriadStyle(length=0.066, radius=0.0009, head=0.007)
 """Style of our grasp frame G: thin and long."""
 FORMAT_TRIAD = TriadStyle(length=0.044, radius=0.0026, head=0.013)
@@ -99,7 +101,7 @@ def show_frames(
         draw_triad(meshcat, f"{FRAMES_PATH}/F/{name}", X_WF, FORMAT_TRIAD)
         _write_letters(meshcat, f"{FRAMES_PATH}/labels/{name}", X_WF)
         foot = pose_in_picture_plane(u, v + sheet.foot)
-        _write_label_facing_camera(meshcat, f"{FRAMES_PATH}/labels/{name}/caption", caption, foot)
+        draw_label(meshcat, f"{FRAMES_PATH}/labels/{name}/caption", caption, foot @ X_LT)
     _aim_at_bounds(meshcat, sheet.bounds())
     entries = (
         ("F, the frame of the format: thick, with letters", "#1f52cc", "F"),
@@ -179,18 +181,7 @@ def _write_letters(meshcat: Meshcat, path: str, X_WF: Array) -> None:
     for k, letter in enumerate("xyz"):
         middle = X_WF[:3, 3] + (FORMAT_TRIAD.length + 0.5 * LETTER_HEIGHT) * X_WF[:3, k]
         foot = make_pose(p_AB=middle + 0.4 * LETTER_HEIGHT * R_WC[:, 1])
-        label = label_mesh((letter,), LETTER_HEIGHT)
-        _write_label_facing_camera(meshcat, f"{path}/{letter}", label, foot)
-
-
-def _write_label_facing_camera(
-    meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WL: Array
-) -> None:
-    """Puts the middle of a text's foot at a place (4, 4), to be read by the camera."""
-    text, width = label
-    X_LT = make_pose(R_WC @ np.diag([1.0, -1.0, -1.0]), -0.5 * width * R_WC[:, 0])
-    meshcat.SetObject(path, text)
-    meshcat.SetTransform(path, RigidTransform(X_WL @ X_LT))
+        draw_label(meshcat, f"{path}/{letter}", label_mesh((letter,), LETTER_HEIGHT), foot @ X_LT)
 
 
 def _aim_at_bounds(meshcat: Meshcat, bounds: Array) -> None:

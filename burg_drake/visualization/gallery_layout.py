@@ -9,6 +9,7 @@ import numpy as np
 
 from burg_drake.core import Array
 from burg_drake.visualization.meshcat_drawing import VIEW_ASPECT
+from burg_drake.visualization.object_drawing import box_corners
 
 GALLERY_ELEVATION = np.deg2rad(42.0)
 """Angle by which the camera looks down on the gallery, in radians."""
@@ -79,15 +80,9 @@ class GalleryLayout:
 
     def corners(self) -> Array:
         """(8 B, 3) corners of the banks' boxes [m]."""
-        return np.array(
-            [
-                (x, y, z)
-                for bank in self.banks
-                for x in bank[:, 0]
-                for y in bank[:, 1]
-                for z in (0.0, self.height)
-            ]
-        )
+        height = self.height
+        boxes = (box_corners([*lower, 0.0], [*upper, height]) for lower, upper in self.banks)
+        return np.vstack(list(boxes))
 
     def distance(self) -> float:
         """How far away, up to a factor, a camera has to be that sees all of it [m]."""

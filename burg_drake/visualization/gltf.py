@@ -13,12 +13,15 @@ import trimesh
 from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw, ImageFont
 from pydrake.common import MemoryFile
-from pydrake.geometry import InMemoryMesh, Mesh
+from pydrake.geometry import InMemoryMesh, Mesh, Meshcat
+from pydrake.math import RigidTransform
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
-from burg_drake.core import Array, Bytes, MeshError
+from burg_drake.core import Array, Bytes, MeshError, Rgb, make_pose
 from burg_drake.visualization.colors import linear_light
 
-LABEL_LINE_PIXELS = 44
+LABEL_LINE_PIXELS = 32
 """Height of a line of a label in its texture, in pixels."""
 
 
@@ -52,32 +55,43 @@ def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
     for material in document.get("materials", ()):
         surface = material.setdefault("pbrMetallicRoughness", {})
         surface |= {"metallicFactor": 0.0, "roughnessFactor": roughness}
-        r, g, b, a = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-        linear = (float(linear_light(c)) for c in (r, g, b))
-        surface["baseColorFactor"] = [*(albedo * c for c in linear), opacity * a]
+        *rgb, a = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        surface["baseColorFactor"] = [*(albedo * linear_light(rgb)).tolist(), opacity * a]
         material["doubleSided"] = opacity == 1.0  # else backs would shine through
         if opacity < 1.0:
             material["alphaMode"] = "BLEND"
-    buffers = [files[buffer["uri"]] for buffer in document["buffers"]]
-    return _in_memory_shape(document, buffers, path.name)
+    return _in_memory_shape(document, files, path.name)
 
 
-def label_mesh(lines: tuple[str, ...], height: float, stretch: float = 1.0) -> tuple[Mesh, float]:
+def label_mesh(
+    lines: tuple[str, ...],
+    height: float,
+    stretch: float = 1.0,
+    color: Rgb = (0.227, 0.227, 0.227),
+) -> tuple[Mesh, float]:
     """Text as a picture in the plane z = 0 that reads along +x from the origin, top line first.
 
     Args:
         lines: of text; the first is bold.
         height: from line to line, before stretching [m]; the last line's foot is at y = 0.
         stretch: of the letters along y.
+        color: red, green, blue in [0, 1] (sRGB).
 
     Returns:
         Drake's shape, seen from +z, and its width [m].
     """
-    image = _text_image(lines)
+    image = _text_image(lines, color)
     width = height * image.width / LABEL_LINE_PIXELS
     top = stretch * height * len(lines)
     corners = np.array([[0, top, 0], [width, top, 0], [width, 0, 0], [0, 0, 0]], dtype=float)
     return _textured_quadrangle(image, corners, "label"), width
+
+
+def draw_label(meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WT: Array) -> None:
+    """Draws a text of `label_mesh`; the middle of its foot is at the origin of T (4, 4)."""
+    text, width = label
+    meshcat.SetObject(path, text)
+    meshcat.SetTransform(path, RigidTransform(X_WT @ make_pose(p_AB=(-0.5 * width, 0.0, 0.0))))
 
 
 def picture_mesh(image: Bytes, corners: ArrayLike) -> Mesh:
@@ -95,60 +109,32 @@ def picture_mesh(image: Bytes, corners: ArrayLike) -> Mesh:
 
 
 def _textured_quadrangle(image: Image.Image, corners: Array, name: str) -> Mesh:
-    """A picture on a quadrangle (4, 3), without shading."""
-    data = io.BytesIO()
-    image.save(data, format="PNG", optimize=True)
-    vertices = corners[[3, 2, 1, 0]].astype("<f4")
-    uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype="<f4")
-    faces = np.array([0, 1, 2, 0, 2, 3], dtype="<u2")
-    buffers = [a.tobytes() for a in (vertices, uv, faces)]
-    transparent = image.mode == "LA"
-    document: dict[str, Any] = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [
-            {
-                "primitives": [
-                    {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}
-                ]
-            }
-        ],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,
-                "count": 4,
-                "type": "VEC3",
-                "min": vertices.min(axis=0).tolist(),
-                "max": vertices.max(axis=0).tolist(),
-            },
-            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
-        ],
-        "bufferViews": [{"buffer": i, "byteLength": len(b)} for i, b in enumerate(buffers)],
-        "buffers": [{"byteLength": len(b)} for b in buffers],
-        "extensionsUsed": ["KHR_materials_unlit"],
-        "materials": [
-            {
-                "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
-                "alphaMode": "BLEND" if transparent else "OPAQUE",
-                "doubleSided": not transparent,
-                "extensions": {"KHR_materials_unlit": {}},
-            }
-        ],
-        "textures": [{"source": 0}],
-        "images": [{"uri": _data_uri("image/png", data.getvalue())}],
-    }
-    return _in_memory_shape(document, buffers, name)
+    """A picture on a quadrangle (4, 3), without shading; seen from the front if transparent."""
+    transparent = "A" in image.mode
+    material = PBRMaterial(
+        baseColorTexture=image,
+        alphaMode="BLEND" if transparent else "OPAQUE",
+        doubleSided=not transparent,
+    )
+    visual = TextureVisuals(uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]]), material=material)
+    faces = [[3, 2, 1], [3, 1, 0]]
+    mesh = trimesh.Trimesh(corners, faces, visual=visual, process=False)
+    files = mesh.scene().export(file_type="gltf", include_normals=False)
+    document = json.loads(files["model.gltf"])
+    document["samplers"] = [{"minFilter": 9729}]  # linear: sharp where seen at a slant
+    document["textures"][0]["sampler"] = 0
+    document["extensionsUsed"] = ["KHR_materials_unlit"]
+    document["materials"][0]["extensions"] = {"KHR_materials_unlit": {}}
+    return _in_memory_shape(document, files, name)
 
 
-def _in_memory_shape(document: dict[str, Any], buffers: list[bytes], name: str) -> Mesh:
+def _in_memory_shape(document: dict[str, Any], files: dict[str, bytes], name: str) -> Mesh:
+    """Drake's shape of a glTF document of trimesh and its buffers, which become part of it."""
+    for buffer in document["buffers"]:
+        data = base64.b64encode(files[buffer["uri"]]).decode()
+        buffer["uri"] = f"data:application/octet-stream;base64,{data}"
     # From y up to z up, to undo Drake's turn of glTF.
     turn = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=float)
-    for buffer, data in zip(document["buffers"], buffers, strict=True):
-        buffer["uri"] = _data_uri("application/octet-stream", data)
     root = {"matrix": turn.T.reshape(-1).tolist(), "children": document["scenes"][0]["nodes"]}
     document["scenes"][0]["nodes"] = [len(document["nodes"])]
     document["nodes"].append(root)
@@ -167,21 +153,15 @@ def _reduce_texture(image: Image.Image) -> Image.Image:
     return Image.open(data)
 
 
-def _data_uri(kind: str, data: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
-
-
-def _text_image(lines: tuple[str, ...]) -> Image.Image:
-    grey = 58  # Of labels, as an sRGB byte.
+def _text_image(lines: tuple[str, ...], color: Rgb) -> Image.Image:
+    """Lines of text in a colour, with the ink as opacity."""
     font = ImageFont.load_default(0.76 * LABEL_LINE_PIXELS)
     width = max(2, *(int(np.ceil(font.getlength(line))) + 4 for line in lines))
     ink = Image.new("L", (width, LABEL_LINE_PIXELS * len(lines)))
     draw = ImageDraw.Draw(ink)
     for row, line in enumerate(lines):
-        bold = int(row == 0)
-        draw.text(
-            (2, LABEL_LINE_PIXELS * (row + 0.8)), line, 255, font, anchor="ls", stroke_width=bold
-        )
-    image = Image.new("LA", ink.size, grey)
-    image.putalpha(ink)
+        foot = (2, LABEL_LINE_PIXELS * (row + 0.8))
+        draw.text(foot, line, 255, font, anchor="ls", stroke_width=int(row == 0))
+    image = Image.new("RGB", ink.size, tuple(round(255 * c) for c in color))
+    image.putalpha(ink.point(lambda opacity: opacity // 51 * 51))  # for a small file
     return image

@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydrake.geometry import (
-    Box,
-    Capsule,
-    Convex,
-    Cylinder,
-    Ellipsoid,
-    Mesh,
-    Meshcat,
-    Rgba,
-    Shape,
-    Sphere,
-)
+from pydrake.geometry import CalcObb, Convex, Mesh, Meshcat, Rgba, Shape
 from pydrake.math import RigidTransform
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core import NO_PACKAGES, Array, Packages, make_pose
+from burg_drake.core import NO_PACKAGES, Array, Packages, make_pose, transform_points
 from burg_drake.station import Hand, add_hand
 from burg_drake.visualization.gltf import gltf_mesh
+from burg_drake.visualization.object_drawing import box_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,16 +99,11 @@ def _shape_corners(shape: Shape) -> Array:
     if isinstance(shape, Mesh | Convex):
         hull = shape.GetConvexHull()
         return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
-    sizes: dict[type[Shape], Callable[[Any], tuple[float, ...]]] = {
-        Box: lambda s: (s.width(), s.depth(), s.height()),
-        Sphere: lambda s: 3 * (2 * s.radius(),),
-        Cylinder: lambda s: (2 * s.radius(), 2 * s.radius(), s.length()),
-        Capsule: lambda s: (2 * s.radius(), 2 * s.radius(), s.length() + 2 * s.radius()),
-        Ellipsoid: lambda s: (2 * s.a(), 2 * s.b(), 2 * s.c()),
-    }
-    size = sizes[type(shape)](shape) if type(shape) in sizes else (0.0, 0.0, 0.0)
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    return signs * np.array(size) / 2.0
+    box = CalcObb(shape)
+    if box is None:  # a half space
+        return np.zeros((1, 3))
+    half = np.asarray(box.half_width())
+    return transform_points(box.pose().GetAsMatrix4(), box_corners(-half, half))
 
 
 GRIPPER_PATH = "/drake/gripper"

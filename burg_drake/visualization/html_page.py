@@ -1,19 +1,37 @@
-"""HTML elements in which every text is escaped, and whole pages in one HTML file."""
+"""HTML and SVG in which every text is escaped: single elements, and pages made of templates."""
 
 from __future__ import annotations
 
+import base64
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import burg_drake
+from burg_drake.core import format_count, format_duration, format_number, format_percent
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 class Html(str):
     """Markup that is complete and needs no escaping any more."""
 
+    def __html__(self) -> Html:
+        """Itself; this tells templates not to escape it."""
+        return self
+
 
 Child = Html | str | int | float | None
+Attribute = str | float | None
 
 
-def element(name: str, /, *children: Child, **attributes: str | float | None) -> Html:
+def element(name: str, /, *children: Child, **attributes: Attribute) -> Html:
     """An element.
 
     Args:
@@ -33,6 +51,38 @@ def element(name: str, /, *children: Child, **attributes: str | float | None) ->
         closing = "/" if name in ("rect", "line", "path", "circle") else ""
         return Html(f"<{name}{written}{closing}>")
     return Html(f"<{name}{written}>{join(*children)}</{name}>")
+
+
+def svg_line(
+    x1: float,
+    y1: float,
+    x2: float,
+    y2: float,
+    css_class: str | None = None,
+    **attributes: Attribute,
+) -> Html:
+    """A line of an SVG picture, in its units; `css_class` has its look."""
+    ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
+    return element("line", **_rounded(ends), class_=css_class, **attributes)
+
+
+def svg_rectangle(
+    x: float, y: float, width: float, height: float, *children: Child, **attributes: Attribute
+) -> Html:
+    """A rectangle of an SVG picture, in its units."""
+    box = {"x": x, "y": y, "width": width, "height": height}
+    return element("rect", *children, **_rounded(box), **attributes)
+
+
+def svg_text(
+    text: Child, x: float, y: float, css_class: str | None = None, **attributes: Attribute
+) -> Html:
+    """A text of an SVG picture, at a place in its units; `css_class` has its look."""
+    return element("text", text, **_rounded({"x": x, "y": y}), class_=css_class, **attributes)
+
+
+def _rounded(lengths: dict[str, float]) -> dict[str, float]:
+    return {name: round(length, 2) for name, length in lengths.items()}
 
 
 def join(*children: Child) -> Html:
@@ -60,15 +110,66 @@ def html_document(title: str, style: str, *content: Child) -> str:
         style: its style sheet.
         content: of the body.
     """
-    return "<!DOCTYPE html>\n" + element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", title),
-            element("style", Html(style)),
-        ),
-        element("body", *content),
-        lang="en",
+    values = {"title": title, "style": Html(style), "content": join(*content)}
+    return render_page("visualization/document.html.jinja", **values)
+
+
+@dataclass(frozen=True)
+class PageTable:
+    """A table of a page.
+
+    Attributes:
+        head: names of the columns.
+        rows: cells of each row; the first one names the row. "·" stands for no value.
+        numbers: indices of the columns that are aligned to the right.
+        style: CSS class.
+        total: whether the last row is the sum of the others.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    numbers: Sequence[int] = ()
+    style: str = ""
+    total: bool = False
+
+
+def render_page(template: str, **values: object) -> str:
+    """A page as HTML.
+
+    Args:
+        template: its path in the package, such as `evaluation/report/report.html.jinja`. A whole
+            page starts with `{% extends "visualization/page.html.jinja" %}`, and can import the
+            tables of `visualization/blocks.html.jinja`.
+        values: what the template shows, by name. They are escaped, except those that are `Html`.
+    """
+    return _environment().get_template(template).render(values)
+
+
+@functools.cache
+def _environment() -> Environment:
+    """The templates of the package; they are compiled once a process."""
+    # Imported here, as processes that write no page need none of its 80 ms.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(burg_drake.__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    environment.filters |= {
+        "count": format_count,
+        "degrees": math.degrees,
+        "duration": format_duration,
+        "number": format_number,
+        "percent": format_percent,
+        "png_uri": _png_uri,
+    }
+    return environment
+
+
+def _png_uri(data: bytes) -> str:
+    """A PNG file as the source of a picture."""
+    return f"data:image/png;base64,{base64.b64encode(data).decode()}"

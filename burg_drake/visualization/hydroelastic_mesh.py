@@ -11,6 +11,7 @@ from pydrake.geometry import GeometryId, SceneGraph, TriangleSurfaceMesh
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
+from scipy.spatial import ConvexHull
 
 from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.objects import ObjectLibrary
@@ -113,13 +114,8 @@ def convex_depth(vertices: Array, faces: NDArray[np.int64]) -> Array:
     Returns:
         (V,) in [0, 1].
     """
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    sound = length[:, 0] > 0.0
-    normal = normal[sound] / length[sound]
-    normal *= np.sign((normal * (a[sound] - vertices.mean(axis=0))).sum(axis=1, keepdims=True))
-    depth = ((normal * a[sound]).sum(axis=1) - vertices @ normal.T).min(axis=1)
+    planes = ConvexHull(vertices).equations  # outward normals and offsets
+    depth = -(vertices @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     depth = np.maximum(depth, 0.0)
     depth[np.unique(faces)] = 0.0
     return depth / max(depth.max(), np.finfo(float).tiny)

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from burg_drake.visualization.html_page import Html, element, join
+from burg_drake.visualization.html_page import (
+    Html,
+    element,
+    svg_line,
+    svg_rectangle,
+    svg_text,
+)
 
 BAR_WIDTH = 256  # Width of a colour bar, in pixels.
 HISTOGRAM_HEIGHT = 34  # Height of the histogram above a colour bar, in pixels.
@@ -29,16 +35,6 @@ class LegendEntry:
     paths: tuple[str, ...] = ()
     shown: bool = True
 
-    def html(self) -> Html:
-        """The line."""
-        checked = "" if self.shown else None
-        return element(
-            "label",
-            element("input", type="checkbox", checked=checked, data_paths=" ".join(self.paths)),
-            element("i", style=f"background:{self.color}"),
-            self.label,
-        )
-
 
 @dataclass(frozen=True)
 class ColorBar:
@@ -61,24 +57,11 @@ class ColorBar:
     paths: tuple[str, ...]
     note: str = ""
 
-    def html(self) -> Html:
-        """The bar, with two sliders that hide what is below and above them."""
-        n = len(self.colors)
-        limits = [
-            element("input", type="range", min=0, max=n, value=value, aria_label=f"{end} shown")
-            for end, value in (("lowest", 0), ("highest", n))
-        ]
-        return element(
-            "div",
-            element("p", self.title, class_="title"),
-            self._picture(),
-            element("div", *limits, class_="limits"),
-            element("p", self.note) if self.note else None,
-            class_="bar",
-            data_paths=" ".join(self.paths),
-        )
+    width = BAR_WIDTH
+    margin = BAR_MARGIN
 
-    def _picture(self) -> Html:
+    def picture(self) -> Html:
+        """The bar, below the histogram, with its ticks, as SVG."""
         bar_height = 12  # Pixels.
         step = BAR_WIDTH / len(self.colors)
         most = max(1, *self.counts)
@@ -87,15 +70,15 @@ class ColorBar:
             high = HISTOGRAM_HEIGHT * count / most
             x = BAR_MARGIN + k * step
             shapes += [
-                _rectangle(x, HISTOGRAM_HEIGHT - high, step, high, color),
-                _rectangle(x, HISTOGRAM_HEIGHT + 2, step, bar_height, color),
+                svg_rectangle(x, HISTOGRAM_HEIGHT - high, step, high, fill=color),
+                svg_rectangle(x, HISTOGRAM_HEIGHT + 2, step, bar_height, fill=color),
             ]
         foot = HISTOGRAM_HEIGHT + 2 + bar_height
         for place, text in _ticks_with_room(self.ticks):
-            at = f"{BAR_MARGIN + place * BAR_WIDTH:.1f}"
-            shapes.append(element("line", x1=at, x2=at, y1=foot, y2=foot + 4))
+            x = round(BAR_MARGIN + place * BAR_WIDTH, 1)
+            shapes.append(svg_line(x, foot, x, foot + 4))
             anchor = {0.0: "text-anchor: start", 1.0: "text-anchor: end"}.get(place)
-            shapes.append(element("text", text, x=at, y=foot + 15, style=anchor))
+            shapes.append(svg_text(text, x, foot + 15, style=anchor))
         width, rendering = BAR_WIDTH + 2 * BAR_MARGIN, "crispEdges"
         view = f"0 0 {width} {foot + 19}"
         return element("svg", *shapes, viewBox=view, width=width, shape_rendering=rendering)
@@ -114,50 +97,3 @@ def _ticks_with_room(ticks: Sequence[tuple[float, str]]) -> list[tuple[float, st
             kept.append((place, text))
             end = middle + half
     return [*kept, last]
-
-
-def legend_html(legend: Sequence[LegendEntry | ColorBar]) -> Html:
-    """All entries, one below the other."""
-    return join(*(entry.html() for entry in legend))
-
-
-def _rectangle(x: float, y: float, width: float, height: float, color: str) -> Html:
-    place = {"x": f"{x:.2f}", "y": f"{y:.2f}"}
-    size = {"width": f"{width:.2f}", "height": f"{height:.2f}"}
-    return element("rect", **place, **size, fill=color)
-
-
-LEGEND_STYLE = f"""
-#burg .bar .title {{ margin-top: 6px; }}
-#burg .bar svg {{ display: block; margin: 4px 0 0 -{BAR_MARGIN}px; overflow: visible; }}
-#burg .bar text {{ font-size: 11px; text-anchor: middle; fill: #444; }}
-#burg .bar line {{ stroke: #777; }}
-#burg .bar .limits {{ position: relative; width: {BAR_WIDTH}px; height: 18px; }}
-#burg .bar .limits input {{ position: absolute; left: -6px; top: 0; width: {BAR_WIDTH + 11}px;
-  margin: 0; background: none; appearance: none; pointer-events: none; height: 18px; }}
-#burg .bar .limits input::-webkit-slider-thumb {{ pointer-events: auto; appearance: none;
-  width: 9px; height: 16px; border: 1px solid #777; border-radius: 3px; background: #fff; }}
-#burg .bar .limits input::-moz-range-thumb {{ pointer-events: auto;
-  width: 9px; height: 16px; border: 1px solid #777; border-radius: 3px; background: #fff; }}
-"""
-
-LEGEND_SCRIPT = """
-function show(path, visible) {
-  viewer.set_property(path.split("/").filter(Boolean), "visible", visible);
-}
-for (const box of document.querySelectorAll("#burg label input")) {
-  box.addEventListener("change", () => {
-    for (const path of box.dataset.paths.split(" ").filter(Boolean)) show(path, box.checked);
-  });
-}
-for (const bar of document.querySelectorAll("#burg .bar")) {
-  const paths = bar.dataset.paths.split(" ");
-  const [low, high] = bar.querySelectorAll(".limits input");
-  for (const end of [low, high]) {
-    end.addEventListener("input", () => {
-      if (+low.value >= +high.value) end.value = end === low ? +high.value - 1 : +low.value + 1;
-      paths.forEach((path, k) => show(path, k >= +low.value && k < +high.value));
-    });
-  }
-}
-"""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Box, Mesh, Meshcat, Rgba
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from burg_drake.core import Array, GraspSet, InvalidInputError, distinct_colors, make_pose, rot_z
 from burg_drake.geometry import hull_mesh
@@ -21,10 +22,9 @@ from burg_drake.visualization.gallery_layout import (
     GalleryItem,
     GalleryLayout,
     GalleryRow,
-    PlacedGalleryRow,
     layout_gallery,
 )
-from burg_drake.visualization.gltf import gltf_mesh, label_mesh
+from burg_drake.visualization.gltf import draw_label, gltf_mesh, label_mesh
 from burg_drake.visualization.grasp_view import grasp_triangles
 from burg_drake.visualization.hydroelastic_mesh import (
     HIGH_PRESSURE_COLOR,
@@ -39,8 +39,8 @@ from burg_drake.visualization.object_drawing import best_yaw, camera_rotation, u
 from burg_drake.visualization.thumbnails import explosion_offsets
 
 GALLERY_PATH = "/drake/library"  # Path of the gallery in Meshcat's tree.
-GALLERY_COLUMNS = ("visual", "pieces", "contact")
-"""Columns of the gallery, as they are called in Meshcat's tree."""
+COLUMNS = 3
+"""Number of columns of the gallery: visual mesh, pieces, contact geometry."""
 
 
 LINE_HEIGHT = 0.22
@@ -82,13 +82,21 @@ def show_library(
     meshcat.Delete(GALLERY_PATH)
     unit = _usual_size(map(library.entry, chosen))
     contact = hydroelastic_meshes(library, chosen)
-    objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
-    line = TEXT_STRETCH * LINE_HEIGHT * unit
-    layout = layout_gallery([item.row for item in objects], unit, line)
-    for item, placed in zip(objects, layout.rows, strict=True):
-        draw_object(meshcat, item, placed, unit)
+    objects = {name: _object_things(library, name, contact[name], unit) for name in chosen}
+    labels = [_object_label(library, name, unit) for name in chosen]
+    rows = [
+        GalleryRow(label[1], [t.item for t in things[:COLUMNS]], [t.item for t in things[COLUMNS:]])
+        for label, things in zip(labels, objects.values(), strict=True)
+    ]
+    layout = layout_gallery(rows, unit, TEXT_STRETCH * LINE_HEIGHT * unit)
+    for name, label, row in zip(chosen, labels, layout.rows, strict=True):
+        left = row.p_WL + np.array([0.5 * label[1], 0.0, 0.0])
+        write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", label, left)
+        for thing, p_WI, p_WL in zip(objects[name], row.p_WI, row.captions, strict=True):
+            _draw_thing(meshcat, thing, p_WI, unit)
+            write_label(meshcat, f"{thing.path}/caption", thing.caption, p_WL)
     _show_floor(meshcat, layout)
-    return _gallery_legend(objects)
+    return _gallery_legend(any(m.compliant for meshes in contact.values() for m in meshes))
 
 
 def _usual_size(entries: Iterable[ObjectEntry]) -> float:
@@ -130,8 +138,8 @@ def aim_at_gallery(meshcat: Meshcat, layout: GalleryLayout) -> None:
     meshcat.SetProperty(lamp, "angle", cone_angle)
 
 
-def _gallery_legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
-    compliant = any(mesh.compliant for e in objects for mesh in e.contact)
+def _gallery_legend(compliant: bool) -> tuple[LegendEntry, ...]:
+    """Switches for the columns; `compliant` if any object has a pressure field."""
     contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
     contact_color = hex_color(HIGH_PRESSURE_COLOR) if compliant else "#9eadba"
     entries = (
@@ -145,70 +153,81 @@ def _gallery_legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]
 
 
 @dataclass(frozen=True)
-class GalleryObject:
-    """One object, ready to be placed.
+class GalleryThing:
+    """Something that stands in the gallery.
 
     Attributes:
-        name: of the object.
-        R_WO: (3, 3) how it stands in the columns.
-        R_WO_poses: the same for each stable pose.
-        visual: as it looks, in O.
-        pieces: vertices (N, 3), moved apart, and faces (F, 3) of each piece, in O [m].
-        contact: what hydroelastic contact sees, in O.
-        label: the text at its row's start.
-        captions: the texts in front of its things.
-        row: sizes of all that.
+        path: in Meshcat's tree.
+        R_WO: (3, 3) how it stands.
+        item: room for it and its caption.
+        caption: what is written in front of it, and how wide that is [m].
+        draw: draws it in its frame O, at a path of Meshcat.
+        has_tile: whether it stands on a tile.
     """
 
-    name: str
+    path: str
     R_WO: Array
-    R_WO_poses: tuple[Array, ...]
-    visual: Mesh
-    pieces: tuple[tuple[Array, NDArray[np.int64]], ...]
-    contact: tuple[HydroelasticMesh, ...]
-    label: Mesh
-    captions: tuple[tuple[Mesh, float], ...]
-    row: GalleryRow
+    item: GalleryItem
+    caption: tuple[Mesh, float]
+    draw: Callable[[Meshcat, str], None]
+    has_tile: bool = False
 
 
-def prepare_object(
+def _object_things(
     library: ObjectLibrary, name: str, contact: tuple[HydroelasticMesh, ...], unit: float
-) -> GalleryObject:
-    """An object, ready to be placed; `unit` is the size of a usual object [m]."""
+) -> list[GalleryThing]:
+    """The columns of an object, then its stable poses; `unit` is the size of a usual object [m]."""
     explosion = 0.25  # Share of each piece's distance from the middle by which it is moved outward.
     entry = library.entry(name)
-    camera = camera_rotation(GALLERY_ELEVATION)
     meshes = [library.mesh(piece) for piece in entry.pieces]
     hulls = [np.asarray(mesh.vertices) for mesh in meshes]
-    corners = np.vstack([*hulls, hull_mesh(library.surface(name).vertices).vertices])
-
-    def turned(R: Array) -> Array:
-        return rot_z(best_yaw(corners @ R.T, camera)) @ R
-
-    R_WO = turned(upright_rotation(entry))
-    poses = [turned(pose.X_SO.matrix()[:3, :3]) for pose in entry.stable_poses]
+    corners = np.vstack([*hulls, _hull_corners(library, name)])
     apart = [h + o for h, o in zip(hulls, explosion_offsets(hulls, explosion), strict=True)]
+    pieces = [(v, np.asarray(m.faces)) for v, m in zip(apart, meshes, strict=True)]
     touching = np.vstack([m.vertices for m in contact]) if contact else corners
-    things = [corners @ R_WO.T, np.vstack(apart) @ R_WO.T, touching @ R_WO.T]
-    things += [corners @ R.T for R in poses]
-    text = _object_description(name, entry)
-    label, label_width = label_mesh(text, LINE_HEIGHT * unit, TEXT_STRETCH)
-    captions = [_caption_mesh((text,), unit) for text in _object_captions(entry, contact)]
-    items = [
-        GalleryItem(points.min(axis=0), points.max(axis=0), width)
-        for points, (_, width) in zip(things, captions, strict=True)
-    ]
-    return GalleryObject(
-        name=name,
-        R_WO=R_WO,
-        R_WO_poses=tuple(poses),
-        visual=gltf_mesh(library.path(entry.mesh)),
-        pieces=tuple((v, np.asarray(m.faces)) for v, m in zip(apart, meshes, strict=True)),
-        contact=contact,
-        label=label,
-        captions=tuple(captions),
-        row=GalleryRow(label_width, items[: len(GALLERY_COLUMNS)], items[len(GALLERY_COLUMNS) :]),
+    visual = gltf_mesh(library.path(entry.mesh))
+
+    def draw_visual(meshcat: Meshcat, path: str) -> None:
+        meshcat.SetObject(path, visual)
+
+    count = len(pieces)
+    kind = _contact_caption(entry) if contact else "point contact"
+    R_WO = _turn_to_camera(corners, upright_rotation(entry))
+    draw_pieces = partial(_draw_pieces, pieces=pieces)
+    draw_contact = partial(_draw_contact, meshes=contact, R_WO=R_WO)
+    columns = (
+        ("visual", "visual", corners, draw_visual),
+        ("pieces", f"{count} piece{'' if count == 1 else 's'}", np.vstack(apart), draw_pieces),
+        ("contact", kind, touching, draw_contact),
     )
+    things = []
+    for column, text, points, draw in columns:
+        caption = _caption_mesh((text,), unit)
+        item = _room_for(points @ R_WO.T, caption)
+        things.append(GalleryThing(f"{GALLERY_PATH}/{column}/{name}", R_WO, item, caption, draw))
+    for k, pose in enumerate(entry.stable_poses):
+        path = f"{GALLERY_PATH}/poses/{name}/{k}"
+        R_WO = _turn_to_camera(corners, pose.X_SO.matrix()[:3, :3])
+        text = percent_text(pose.probability) + (", rolls" if pose.rolls else "")
+        caption = _caption_mesh((text,), unit)
+        item = _room_for(corners @ R_WO.T, caption)
+        things.append(GalleryThing(path, R_WO, item, caption, draw_visual, has_tile=True))
+    return things
+
+
+def _hull_corners(library: ObjectLibrary, name: str) -> Array:
+    """Corners (N, 3) of the convex hull of an object in O [m]."""
+    return np.asarray(hull_mesh(library.surface(name).vertices).vertices)
+
+
+def _turn_to_camera(corners: Array, R_SO: Array) -> Array:
+    """(3, 3) a standing object, turned so that the camera sees most of its corners (N, 3)."""
+    return rot_z(best_yaw(corners @ R_SO.T, camera_rotation(GALLERY_ELEVATION))) @ R_SO
+
+
+def _room_for(points: Array, caption: tuple[Mesh, float]) -> GalleryItem:
+    """The room for points (N, 3) around O with the axes of the world [m]."""
+    return GalleryItem(points.min(axis=0), points.max(axis=0), caption[1])
 
 
 def _caption_mesh(lines: tuple[str, ...], unit: float) -> tuple[Mesh, float]:
@@ -216,19 +235,13 @@ def _caption_mesh(lines: tuple[str, ...], unit: float) -> tuple[Mesh, float]:
     return label_mesh(lines, 0.85 * LINE_HEIGHT * unit, TEXT_STRETCH)
 
 
-def _object_description(name: str, entry: ObjectEntry) -> tuple[str, ...]:
+def _object_label(library: ObjectLibrary, name: str, unit: float) -> tuple[Mesh, float]:
+    """Name, size, mass and friction of an object, and the width of the text [m]."""
+    entry = library.entry(name)
     size = " x ".join(f"{1e3 * (b - a):.0f}" for a, b in zip(entry.lower, entry.upper, strict=True))
     about = "" if entry.mass_properties.source == "given" else "~"
-    return name, f"{size} mm", f"{about}{mass_text(entry.mass)}, friction {entry.friction:g}"
-
-
-def _object_captions(entry: ObjectEntry, contact: tuple[HydroelasticMesh, ...]) -> list[str]:
-    count = len(entry.pieces)
-    texts = ["visual", f"{count} piece{'' if count == 1 else 's'}"]
-    texts.append(_contact_caption(entry) if contact else "point contact")
-    for pose in entry.stable_poses:
-        texts.append(percent_text(pose.probability) + (", rolls" if pose.rolls else ""))
-    return texts
+    mass = f"{about}{mass_text(entry.mass)}, friction {entry.friction:g}"
+    return label_mesh((name, f"{size} mm", mass), LINE_HEIGHT * unit, TEXT_STRETCH)
 
 
 def _contact_caption(entry: ObjectEntry) -> str:
@@ -242,42 +255,26 @@ def _contact_caption(entry: ObjectEntry) -> str:
     }.get(entry.contact.kind, entry.contact.kind)
 
 
-def draw_object(
-    meshcat: Meshcat, shown: GalleryObject, placed: PlacedGalleryRow, unit: float
-) -> None:
-    """Draws an object in its row: visual mesh, pieces, contact geometry, and stable poses."""
+def _draw_thing(meshcat: Meshcat, thing: GalleryThing, p_WI: Array, unit: float) -> None:
+    """Draws a thing with its origin at `p_WI` (3,), higher if it stands on a tile [m]."""
     tile_color = Rgba(0.70, 0.75, 0.79, 1.0)
     margin_share = 0.04  # Of the gallery's unit.
-    name = shown.name
-    write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", shown.label, placed.p_WL)
-    poses = [f"poses/{name}/{k}" for k in range(len(shown.R_WO_poses))]
-    places = [*(f"{column}/{name}" for column in GALLERY_COLUMNS), *poses]
-    for k, (place, p_WI) in enumerate(zip(places, placed.p_WI, strict=True)):
-        home = f"{GALLERY_PATH}/{place}"
-        resting = k - len(GALLERY_COLUMNS)
-        R_WO = shown.R_WO if resting < 0 else shown.R_WO_poses[resting]
-        lift = np.zeros(3)
-        if place == f"pieces/{name}":
-            _draw_pieces(meshcat, f"{home}/object", shown.pieces)
-        elif place == f"contact/{name}":
-            _draw_contact(meshcat, f"{home}/object", shown.contact, R_WO)
-        else:
-            meshcat.SetObject(f"{home}/object", shown.visual)
-        if resting >= 0:
-            item, margin = shown.row.rest[resting], margin_share * unit
-            bounds = np.array([item.lower[:2] - margin, item.upper[:2] + margin]) + p_WI[:2]
-            draw_slab(meshcat, f"{home}/ground", bounds, 0.0, tile_color)
-            lift[2] = SLAB_HEIGHT
-        X_WO = RigidTransform(RotationMatrix(R_WO), p_WI + lift)
-        meshcat.SetTransform(f"{home}/object", X_WO)
-        caption, width = shown.captions[k]
-        left = placed.captions[k] - (width / 2.0, 0.0, 0.0)
-        write_label(meshcat, f"{home}/caption", caption, left)
+    thing.draw(meshcat, f"{thing.path}/object")
+    p_WO = p_WI
+    if thing.has_tile:
+        margin = margin_share * unit
+        lower, upper = thing.item.lower[:2] - margin, thing.item.upper[:2] + margin
+        bounds = np.array([lower, upper]) + p_WI[:2]
+        draw_slab(meshcat, f"{thing.path}/ground", bounds, 0.0, tile_color)
+        p_WO = p_WI + np.array([0.0, 0.0, SLAB_HEIGHT])
+    X_WO = RigidTransform(make_pose(thing.R_WO, p_WO))
+    meshcat.SetTransform(f"{thing.path}/object", X_WO)
 
 
 def _draw_pieces(
-    meshcat: Meshcat, path: str, pieces: tuple[tuple[Array, NDArray[np.int64]], ...]
+    meshcat: Meshcat, path: str, pieces: Sequence[tuple[Array, NDArray[np.int64]]]
 ) -> None:
+    """Vertices (N, 3) and faces (F, 3) of convex pieces, each in its own colour."""
     colors = distinct_colors(len(pieces))
     for i, ((vertices, faces), color) in enumerate(zip(pieces, colors, strict=True)):
         meshcat.SetTriangleMesh(
@@ -330,11 +327,10 @@ def _join_meshes(
     )
 
 
-def write_label(meshcat: Meshcat, path: str, text: Mesh, p_WL: Array) -> None:
-    """Puts a text's left foot at `p_WL` (3,) on the floor [m]."""
+def write_label(meshcat: Meshcat, path: str, label: tuple[Mesh, float], p_WL: Array) -> None:
+    """Puts the middle of a text's foot at `p_WL` (3,) on the floor [m]."""
     text_lift = 1e-3  # Metres above the floor, against flicker.
-    meshcat.SetObject(path, text)
-    meshcat.SetTransform(path, RigidTransform(p_WL + np.array([0.0, 0.0, text_lift])))
+    draw_label(meshcat, path, label, make_pose(p_AB=p_WL + np.array([0.0, 0.0, text_lift])))
 
 
 def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: Rgba) -> None:
@@ -343,23 +339,6 @@ def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: 
     meshcat.SetObject(path, Box(x1 - x0, y1 - y0, SLAB_HEIGHT), color)
     middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, bottom + SLAB_HEIGHT / 2.0]
     meshcat.SetTransform(path, RigidTransform(middle))
-
-
-@dataclass(frozen=True)
-class ObjectWithGrasps:
-    """An object that is to be placed.
-
-    Attributes:
-        name: of the object.
-        R_WO: (3, 3) how it stands.
-        item: room for it and its grasps.
-        caption: what is written in front of it, and how wide that is [m].
-    """
-
-    name: str
-    R_WO: Array
-    item: GalleryItem
-    caption: tuple[Mesh, float]
 
 
 def show_objects_for_grasps(
@@ -382,45 +361,43 @@ def show_objects_for_grasps(
     meshcat.Delete(GALLERY_PATH)
     counts = Counter(grasps.object.tolist())
     unit = _usual_size(map(library.entry, counts))
-    stands = [_prepare_object_with_grasps(library, name, grasps, width, unit) for name in counts]
-    layout, rows = _layout_rows(stands, unit)
+    things = [_object_with_grasps(library, name, grasps, width, unit) for name in counts]
+    layout, rows = _layout_rows(things, unit)
     X_WO = {}
     for members, row in zip(rows, layout.rows, strict=True):
-        for stand, p_WO, p_WL in zip(members, row.p_WI, row.captions, strict=True):
-            X_WO[stand.name] = make_pose(stand.R_WO, p_WO)
-            path, (label, label_width) = f"{GALLERY_PATH}/visual/{stand.name}", stand.caption
-            meshcat.SetObject(path, gltf_mesh(library.path(library.entry(stand.name).mesh)))
-            meshcat.SetTransform(path, RigidTransform(X_WO[stand.name]))
-            left = p_WL - (label_width / 2.0, 0.0, 0.0)
-            write_label(meshcat, f"{GALLERY_PATH}/labels/{stand.name}", label, left)
+        for (name, thing), p_WI, p_WL in zip(members, row.p_WI, row.captions, strict=True):
+            X_WO[name] = make_pose(thing.R_WO, p_WI)
+            thing.draw(meshcat, thing.path)
+            meshcat.SetTransform(thing.path, RigidTransform(X_WO[name]))
+            write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", thing.caption, p_WL)
     _show_floor(meshcat, layout)
     return np.stack([X_WO[name] for name in grasps.object.tolist()]) @ grasps.X_OG
 
 
-def _prepare_object_with_grasps(
+def _object_with_grasps(
     library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float
-) -> ObjectWithGrasps:
-    corners = np.asarray(hull_mesh(library.surface(name).vertices).vertices)
-    R_WO = upright_rotation(library.entry(name))
-    R_WO = rot_z(best_yaw(corners @ R_WO.T, camera_rotation(GALLERY_ELEVATION))) @ R_WO
+) -> tuple[str, GalleryThing]:
+    """The name of an object, and the object with room for its grasps."""
+    corners = _hull_corners(library, name)
+    R_WO = _turn_to_camera(corners, upright_rotation(library.entry(name)))
     own = grasps.object == name
     drawn, _ = grasp_triangles(grasps.X_OG[own], width[own])
-    points = np.vstack([corners, drawn.T]) @ R_WO.T
     count = int(own.sum())
-    text = (name, f"{count} grasp{'' if count == 1 else 's'}")
-    caption = _caption_mesh(text, unit)
-    item = GalleryItem(points.min(axis=0), points.max(axis=0), caption[1])
-    return ObjectWithGrasps(name, R_WO, item, caption)
+    caption = _caption_mesh((name, f"{count} grasp{'' if count == 1 else 's'}"), unit)
+    item = _room_for(np.vstack([corners, drawn.T]) @ R_WO.T, caption)
+    visual = gltf_mesh(library.path(library.entry(name).mesh))
+    path = f"{GALLERY_PATH}/visual/{name}"
+    return name, GalleryThing(path, R_WO, item, caption, lambda m, p: m.SetObject(p, visual))
 
 
 def _layout_rows(
-    stands: list[ObjectWithGrasps], unit: float
-) -> tuple[GalleryLayout, list[list[ObjectWithGrasps]]]:
+    things: list[tuple[str, GalleryThing]], unit: float
+) -> tuple[GalleryLayout, list[list[tuple[str, GalleryThing]]]]:
     """As many rows, one behind the other, as let the camera come nearest."""
     layouts = []
-    for count in range(1, len(stands) + 1):
-        size = -(-len(stands) // count)
-        rows = [stands[k : k + size] for k in range(0, len(stands), size)]
-        items = [GalleryRow(0.0, (), [stand.item for stand in row]) for row in rows]
+    for count in range(1, len(things) + 1):
+        size = -(-len(things) // count)
+        rows = [things[k : k + size] for k in range(0, len(things), size)]
+        items = [GalleryRow(0.0, (), [thing.item for _, thing in row]) for row in rows]
         layouts.append((layout_gallery(items, unit, TEXT_STRETCH * LINE_HEIGHT * unit, 1), rows))
     return min(layouts, key=lambda layout: layout[0].distance())

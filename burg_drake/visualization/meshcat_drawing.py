@@ -1,10 +1,9 @@
-"""Drawing in Meshcat: the camera's aim, flat triangles, text, and frames as three arrows."""
+"""Drawing in Meshcat: the camera's aim, flat triangles, and frames as three arrows."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
@@ -79,59 +78,6 @@ def draw_flat_triangles(
         meshcat.SetProperty(object_path, f"material.specular.{channel}", 0.0)
     meshcat.SetProperty(object_path, "material.toneMapped", False)
     meshcat.SetProperty(object_path, "castShadow", False)
-
-
-def text_triangles(text: str, height: float) -> tuple[Array, NDArray[np.int32]]:
-    """Text in the plane z = 0, reading along +x, with the baseline's middle at the origin.
-
-    Args:
-        text: one line; characters outside ASCII become question marks.
-        height: of a capital letter [m].
-
-    Returns:
-        Vertices (3, N) [m] and triangles (3, M), seen from +z.
-    """
-    capital = np.flatnonzero(_render_text("H").any(axis=1))
-    baseline, pixel = capital[-1] + 1, height / len(capital)
-    image = _render_text(text)
-    rows, starts, ends = _pixel_runs(image)
-    x0, x1 = (pixel * (edge - image.shape[1] / 2) for edge in (starts, ends))
-    y1 = pixel * (baseline - rows)
-    y0 = y1 - pixel
-    corners = np.stack([np.stack(c) for c in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=-1)
-    vertices = np.zeros((3, corners.shape[1] * 4))
-    vertices[:2] = corners.reshape(2, -1)
-    return vertices, quadrangle_faces(corners.shape[1])
-
-
-def quadrangle_faces(count: int) -> NDArray[np.int32]:
-    """Triangles (3, 2 N) of quadrangles whose corners follow each other."""
-    first = 4 * np.arange(count, dtype=np.int32)
-    faces = np.stack([[first, first + 1, first + 2], [first, first + 2, first + 3]], axis=-1)
-    return np.asfortranarray(faces.reshape(3, -1))
-
-
-def _render_text(text: str) -> NDArray[np.bool_]:
-    """The ink of a line of text; the baseline is in the same row whatever the text."""
-    font = cv2.FONT_HERSHEY_DUPLEX
-    font_scale = 1.6
-    stroke = 2  # Pixels.
-    margin = 8  # Pixels.
-    (width, _), _ = cv2.getTextSize(text, font, font_scale, stroke)
-    (_, ascent), descent = cv2.getTextSize("Hgy", font, font_scale, stroke)
-    image = np.zeros((ascent + descent + 2 * margin, width + 2 * margin), dtype=np.uint8)
-    cv2.putText(image, text, (margin, margin + ascent), font, font_scale, 255, stroke)
-    return image > 127
-
-
-def _pixel_runs(image: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
-    """Row, first column and end column of each horizontal run of set pixels."""
-    padded = np.zeros((image.shape[0], image.shape[1] + 2), dtype=np.int8)
-    padded[:, 1:-1] = image
-    change = np.diff(padded, axis=1)
-    rows, starts = np.nonzero(change == 1)
-    _, ends = np.nonzero(change == -1)
-    return rows, starts, ends
 
 
 AXIS_COLORS = (Rgba(0.84, 0.15, 0.12), Rgba(0.13, 0.60, 0.20), Rgba(0.12, 0.32, 0.80))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core import Array, rot_z
 from burg_drake.objects import UPRIGHT_TOLERANCE, ObjectEntry, ObjectLibrary
@@ -71,6 +71,12 @@ def fit_camera(points: Array, R_WC: Array, half_view: Array) -> Array:
             slope = (u - center[k]) / (z + distance)
             low, high = (center[k], high) if slope.max() > -slope.min() else (low, center[k])
     return R_WC @ np.array([*center, -distance])
+
+
+def box_corners(lower: ArrayLike, upper: ArrayLike) -> Array:
+    """(8, 3) corners of the box between two points (3,)."""
+    sides = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=1)
+    return np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)

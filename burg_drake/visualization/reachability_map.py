@@ -12,7 +12,13 @@ from burg_drake.core import Array
 from burg_drake.motion import ReachabilityMap, ReachLayer
 from burg_drake.scene import Scene, placed_vertices
 from burg_drake.visualization.colors import hex_color, map_colors
-from burg_drake.visualization.html_page import Html, element, join
+from burg_drake.visualization.html_page import (
+    Html,
+    element,
+    join,
+    svg_rectangle,
+    svg_text,
+)
 
 CHART_WIDTH = 320  # Width of the chart, in SVG units.
 CHART_TITLE_HEIGHT = 18
@@ -40,27 +46,19 @@ def reachability_chart(
     cells, shapes = [], []
     for (j, i), share in np.ndenumerate(reachability.share[height]):
         tip = f"x {reachability.x[i]:.2f} m, y {reachability.y[j]:.2f} m: {100 * share:.0f} %"
-        cells.append(
-            element(
-                "rect",
-                element("title", tip),
-                x=f"{scale * i * dx:.2f}",
-                y=f"{CHART_TITLE_HEIGHT + scale * (depth - (j + 1) * dy):.2f}",
-                width=f"{scale * dx:.2f}",
-                height=f"{scale * dy:.2f}",
-                fill=hex_color(map_colors(share)),
-            )
-        )
+        x, y = scale * i * dx, CHART_TITLE_HEIGHT + scale * (depth - (j + 1) * dy)
+        color = hex_color(map_colors(share))
+        cells.append(svg_rectangle(x, y, scale * dx, scale * dy, element("title", tip), fill=color))
     for name, corners in outlines.items():
         u, v = scale * corners[:, 0], CHART_TITLE_HEIGHT + scale * (depth - corners[:, 1])
         d = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(u, v, strict=True)) + "Z"
-        x, y = f"{(u.min() + u.max()) / 2:.1f}", f"{(v.min() + v.max()) / 2 + 3.5:.1f}"
         shapes.append(element("path", d=d, style=outline_style))
-        shapes.append(element("text", name, x=x, y=y, style=name_style))
+        x, y = (u.min() + u.max()) / 2, (v.min() + v.max()) / 2 + 3.5
+        shapes.append(svg_text(name, float(x), float(y), style=name_style))
     title = f"{100 * reachability.heights[height]:g} cm above the board"
     return element(
         "svg",
-        element("text", title, x=0, y=12, class_="title"),
+        svg_text(title, 0, 12, "title"),
         element("g", *cells, shape_rendering="crispEdges"),
         *shapes,
         viewBox=f"0 0 {CHART_WIDTH} {CHART_TITLE_HEIGHT + scale * depth:.1f}",
@@ -74,8 +72,7 @@ def reachability_key() -> Html:
     """What the colours stand for, from none to all orientations."""
     colors = map_colors((np.arange(10) + 0.5) / 10)
     bars = [
-        element("rect", x=16 * k, y=0, width=16, height=10, fill=hex_color(color))
-        for k, color in enumerate(colors)
+        svg_rectangle(16 * k, 0, 16, 10, fill=hex_color(color)) for k, color in enumerate(colors)
     ]
     picture = element("svg", *bars, viewBox="0 0 160 10", width=160, height=10)
     return element("p", join("none ", picture, " all orientations"), class_="legend")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydrake.geometry import Meshcat, MeshcatParams, Rgba
-from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
-from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.core import Array, InvalidInputError, make_pose, rot_z, transform_points
 from burg_drake.scene import Scene, placed_vertices
 from burg_drake.station import Robot, Station, StationDiagram, build_station_diagram
-from burg_drake.visualization.meshcat_drawing import aim_at, text_triangles
+from burg_drake.visualization.gltf import draw_label, label_mesh
+from burg_drake.visualization.meshcat_drawing import aim_at
+from burg_drake.visualization.object_drawing import box_corners
 
 
 def open_meshcat(port: int | None = None) -> Meshcat:
@@ -88,29 +88,26 @@ def draw_board(scene: Scene, station: Station, meshcat: Meshcat, *, labels: bool
     With an arm the names read from the side across from it, where the camera is; without one
     they read from the board's lower edge.
     """
-    line_color = Rgba(0.25, 0.27, 0.30, 1.0)
-    label_height = 0.011  # Metres, of capital letters.
-    label_gap = 0.012  # Metres between an object's footprint and its name.
+    color = (0.25, 0.27, 0.30)
+    label_height = 0.022  # Metres, of a line of text.
+    label_offset = 0.028  # Metres from an object's footprint to the foot of its name.
     label_lift = 1e-3  # Metres above the board, against flicker.
     labels_path = "/drake/labels"
     X_WS = station.document.X_WS.matrix()
     (x, y), z = scene.board.size, label_lift
     corners = transform_points(X_WS, [[0, 0, z], [x, 0, z], [x, y, z], [0, y, z], [0, 0, z]]).T
-    meshcat.SetLine("/drake/board", np.asfortranarray(corners), 2.0, line_color)
+    meshcat.SetLine("/drake/board", np.asfortranarray(corners), 2.0, Rgba(*color))
     meshcat.Delete(labels_path)
     across = station.document.arm is not None
     for name in scene.instances if labels else ():
         points = placed_vertices(scene, name)
         lower, upper = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        below = label_gap + label_height
-        p_SL = np.array([(lower[0] + upper[0]) / 2, lower[1] - below, label_lift])
+        p_SL = np.array([(lower[0] + upper[0]) / 2, lower[1] - label_offset, label_lift])
         if across:
-            p_SL[1] = upper[1] + below
-        X_SL = RigidTransform(RotationMatrix.MakeZRotation(np.pi if across else 0.0), p_SL)
-        vertices, faces = text_triangles(name, label_height)
-        path = f"{labels_path}/{name}"
-        meshcat.SetTriangleMesh(path, vertices, faces, line_color)
-        meshcat.SetTransform(path, RigidTransform(X_WS) @ X_SL)
+            p_SL[1] = upper[1] + label_offset
+        X_SL = make_pose(rot_z(np.pi if across else 0.0), p_SL)
+        label = label_mesh((name,), label_height, color=color)
+        draw_label(meshcat, f"{labels_path}/{name}", label, X_WS @ X_SL)
 
 
 def aim_camera(
@@ -152,12 +149,6 @@ def scene_points(scene: Scene, station: Station) -> Array:
         vertices = placed_vertices(scene, name)
         points.append(box_corners(vertices.min(axis=0), vertices.max(axis=0)))
     return transform_points(station.document.X_WS.matrix(), np.vstack(points))
-
-
-def box_corners(lower: ArrayLike, upper: ArrayLike) -> Array:
-    """(8, 3) corners of the box between two points (3,)."""
-    sides = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=1)
-    return np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
 
 
 def robot_points(built: StationDiagram, context: Context) -> Array:

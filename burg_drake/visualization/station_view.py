@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Box, Meshcat, Rgba
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
-from burg_drake.core import Array, transform_points
+from burg_drake.core import Array, make_pose, transform_points
 from burg_drake.motion import ArmSpan, ReachabilityMap
 from burg_drake.scene import Scene
 from burg_drake.station import Camera, Robot, Station, SurroundingsProperties, frustum
 from burg_drake.visualization.colors import hex_color, map_colors, rgb_from_hex
+from burg_drake.visualization.gltf import draw_label, label_mesh
 from burg_drake.visualization.legend import ColorBar, LegendEntry
-from burg_drake.visualization.meshcat_drawing import quadrangle_faces, text_triangles
 from burg_drake.visualization.scene_view import aim_camera, robot_points, show_scene
 
 CAMERAS_PATH = "/drake/cameras"
@@ -108,7 +108,7 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[Legen
     """
     camera_color = "#b3471d"
     image_depth = 0.16  # Metres.
-    name_height = 0.022  # Metres.
+    name_height = 0.036  # Metres, of a line of text.
     drawn = []
     for name, camera in station.document.cameras.items():
         path = f"{CAMERAS_PATH}/{name}"
@@ -121,11 +121,11 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[Legen
         ends = np.repeat(p_WC[:, None], 4, axis=1)
         rays = np.asfortranarray(ends), np.asfortranarray(corners.T)
         meshcat.SetLineSegments(f"{path}/rays", *rays, 2.0, color)
-        vertices, faces = text_triangles(name, name_height)
-        X_WT = RigidTransform(RotationMatrix(R_WT), p_WC + 0.5 * name_height * R_WT[:, 1])
-        meshcat.SetTriangleMesh(f"{path}/name", vertices, faces, color)
-        meshcat.SetTransform(f"{path}/name", X_WT)
-        drawn += [corners, p_WC[None], transform_points(X_WT.GetAsMatrix4(), vertices.T)]
+        label = label_mesh((name,), name_height, color=rgb_from_hex(camera_color))
+        X_WT = make_pose(R_WT, p_WC + 0.3 * name_height * R_WT[:, 1])
+        draw_label(meshcat, f"{path}/name", label, X_WT)
+        half = 0.5 * label[1] * R_WT[:, 0]
+        drawn += [corners, p_WC + np.array([-half, half, name_height * R_WT[:, 1]])]
     entry = LegendEntry("cameras, upper edge bold", camera_color, (CAMERAS_PATH,))
     return entry, np.vstack(drawn)
 
@@ -206,7 +206,9 @@ def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, NDArray
     corner = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size
     p = np.full((len(middle), 4, 3), z)
     p[..., :2] = middle[:, None] + corner
-    return np.asfortranarray(p.reshape(-1, 3).T), quadrangle_faces(len(middle))
+    first = 4 * np.arange(len(middle), dtype=np.int32)
+    faces = np.stack([[first, first + 1, first + 2], [first, first + 2, first + 3]], axis=-1)
+    return np.asfortranarray(p.reshape(-1, 3).T), np.asfortranarray(faces.reshape(3, -1))
 
 
 def look_through(camera: Camera, meshcat: Meshcat) -> None:

@@ -59,7 +59,8 @@ def request(
         given = {key.replace("_", "-"): value for key, value in headers.items()}
         connection.request(method, path, body, given)
         answer = connection.getresponse()
-        return answer.status, dict(answer.headers), answer.read()
+        found = {name.title(): value for name, value in answer.headers.items()}
+        return answer.status, found, answer.read()
     finally:
         connection.close()
 
@@ -201,6 +202,7 @@ def test_placement_check_comes_with_the_status(server: ViewServer) -> None:
         ("GET", "/status", {"Host": "evil.example"}, 403),
         ("GET", "/frame.jpg", {"Host": "evil.example:7100"}, 403),
         ("GET", "/status", {"Host": "localhost:7100"}, 200),
+        ("GET", "/status", {"X_Forwarded_For": "192.0.2.1"}, 200),
         ("GET", "/status", {"Sec_Fetch_Site": "cross-site"}, 403),
         ("POST", "/snapshot", {"Origin": "http://evil.example"}, 403),
         ("POST", "/snapshot", {"Origin": "null"}, 403),
@@ -317,5 +319,5 @@ def test_a_taken_port(server: ViewServer) -> None:
     first = ViewServer(server.live, server.actions)
     second = ViewServer(server.live, server.actions)
     assert first.server_address[1] != second.server_address[1]
-    first.server_close()
-    second.server_close()
+    first.close()
+    second.close()

@@ -59,7 +59,8 @@ def request(
         given = {key.replace("_", "-"): value for key, value in headers.items()}
         connection.request(method, path, body, given)
         answer = connection.getresponse()
-        return answer.status, dict(answer.headers), answer.read()
+        found = {name.title(): value for name, value in answer.headers.items()}
+        return answer.status, found, answer.read()
     finally:
         connection.close()
 
@@ -141,7 +142,9 @@ def test_other_sites_and_broken_requests_are_refused(server: LabServer, trials: 
     assert trials.read_text() == before
     for path in LAB_PAGE_FILES:
         code, headers, body = request(port, "GET", path)
-        assert code == 200 and body and "default-src 'self'" in headers["Content-Security-Policy"]
+        policy = headers["Content-Security-Policy"]
+        assert code == 200 and body
+        assert "default-src 'self'" in policy and "frame-ancestors 'none'" in policy
     own = f"http://127.0.0.1:{port}"
     assert post(port, "/entry", good, Origin=own, Sec_Fetch_Site="same-origin")[0] == 200
 
@@ -235,16 +238,26 @@ def _drip(slow: socket.socket, ended: threading.Event, is_sending: bool) -> None
             slow.sendall(b"x")
 
 
-def test_an_address_has_its_share_of_the_connections(trials: Path) -> None:
+def test_an_address_has_its_share_of_the_connections(
+    trials: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Half of them, in its last connections; one of IPv6 with its network; this machine has all."""
+    came_from: dict[int, tuple[str, int]] = {}  # by port
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(served_to_all(trials))
 
+        monkeypatch.setattr(
+            "uvicorn.protocols.http.h11_impl.get_remote_addr",
+            lambda transport: came_from[transport.get_extra_info("peername")[1]],
+        )
+
         def come(address: str) -> socket.socket:
-            ours, theirs = socket.socketpair()
-            stack.callback(ours.close)
+            ours = stack.enter_context(socket.socket())
             ours.settimeout(HANG_GUARD)
-            server.process_request(theirs, (address, 1))
+            ours.bind(("127.0.0.1", 0))
+            port = ours.getsockname()[1]
+            came_from[port] = (address, port)
+            ours.connect(("127.0.0.1", server.server_address[1]))
             return ours
 
         ours = [come("192.0.2.1") for _ in range(MAX_PAGE_CONNECTIONS // 2 + 3)]
@@ -261,11 +274,12 @@ def test_an_address_has_its_share_of_the_connections(trials: Path) -> None:
 def test_a_token_that_is_no_text_is_a_wrong_one(trials: Path) -> None:
     with served_to_all(trials) as server:
         port = server.server_address[1]
-        for path, cookie in ((b"/?token=\xe4", b""), (b"/?token=%ff", b""), (b"/", b"\xe4\xff")):
+        bad = ((b"/?token=\xe4", b"", 400), (b"/?token=%ff", b"", 403), (b"/", b"\xe4\xff", 403))
+        for path, cookie, code in bad:
             head = b"GET %s HTTP/1.1\r\nHost: localhost\r\nCookie: burg_drake_%d=%s\r\n\r\n"
             with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as connection:
                 connection.sendall(head % (path, port, cookie))
-                assert connection.recv(100).startswith(b"HTTP/1.1 403")
+                assert connection.recv(100).startswith(b"HTTP/1.1 %d" % code)
     token = BrowserToken("name", "s" * 40)
     assert not token.use("\udce4") and not token.admits("name=\udce4") and not token.use("ä")
 

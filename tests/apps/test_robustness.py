@@ -208,7 +208,7 @@ def test_what_mujoco_judged_again_is_not_tugged(run: Run, tmp_path: Path) -> Non
     [
         (["--grasp", "box-nothing"], "has no judged grasp 'box-nothing'"),
         (["--grasp", "COLLIDING"], "was not lifted (collision_target); robustness tests need"),
-        (["--tests", "tug,pull"], "'pull' is not a test; tests are tug, shake, friction, noise"),
+        (["--tests", "tug,pull"], "'pull' is not a test; known: friction, noise, shake, tug"),
         (["--repeats", "0"], "'0' is not a whole number from 1"),
         (["--translation-mm", "-1"], "-1 is below 0"),
         (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),

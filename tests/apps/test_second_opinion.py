@@ -37,6 +37,7 @@ def test_all_in_one_command(
     command: list[str], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 1.1)  # every executed verdict is
+    monkeypatch.setattr(results_table, "CONTESTED_CONFIDENCE", 1.1)
     assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
     assert "settled 2 contested grasps by reference; changed 0" in capsys.readouterr().out
     run = load_run(tmp_path / "run")

@@ -61,13 +61,13 @@ def test_a_simpler_model_that_fits_as_well_is_known_to_be_off() -> None:
     assert simple.rms < 1.02 * rational.rms
     pixels, off = calibration.errors(camera, simple.intrinsics)
     part = np.array(IMAGE_PARTS)[image_part_indices(pixels, camera.size)]
-    promise = simple.promise
+    accuracy = simple.accuracy
     corners = [name for name in IMAGE_PARTS if "corner" in name]
     assert off.max() > 1.0
-    assert set(corners) <= set(promise.except_at) == set(simple.intrinsics.except_at)
+    assert set(corners) <= set(accuracy.excepted_parts) == set(simple.intrinsics.except_at)
     for name in corners:
-        assert off[part == name].max() < promise.parts[name]
-    assert off[part == "middle"].max() < promise.known_to < 1.0
+        assert off[part == name].max() < accuracy.parts[name]
+    assert off[part == "middle"].max() < accuracy.error_bound < 1.0
 
 
 def test_a_target_that_bulges_is_noticed_and_does_little_harm() -> None:

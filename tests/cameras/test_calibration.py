@@ -336,7 +336,7 @@ def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
         inside = np.linalg.norm(view.corners - [320, 240], axis=1) < 265
         views.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
     found = calibrate_views([view for view in views if len(view.ids) > 20], TARGET)
-    bounds = found.promise.parts
+    bounds = found.accuracy.parts
     worst = max(bounds, key=lambda name: bounds[name])
     assert "corner" in worst and bounds[worst] > 2.0 * bounds["middle"]
     (line,) = (text for text in wanted_views(found) if text.startswith("move the target"))
@@ -346,7 +346,7 @@ def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
     )
     assert all(f"{name} corner" in line for name in ("upper left", "lower left", "lower right"))
     assert found.intrinsics.except_at[0] == worst
-    assert f"not in the {worst} ({bounds[worst]:.2g})" in str(found.promise)
+    assert f"not in the {worst} ({bounds[worst]:.2g})" in str(found.accuracy)
 
 
 def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:

@@ -200,7 +200,14 @@ def test_a_camera_of_a_station() -> None:
         (OURS.replace("width: 640", "width: 64000"), "64000 x 480 pixels; a side may have at most"),
         ("%YAML:1.0\n---\nimage_width: 640\n", "camera_matrix with 3 x 3 numbers is missing"),
         ("%YAML:1.0\n---\n: : :\n", "K.yaml"),
-        ("<?xml version='1.0'?><opencv_storage>", "K.yaml"),
+        ("<?xml version='1.0'?><opencv_storage>", "K.yaml:1: not valid XML"),
+        (
+            "<opencv_storage>\n<a>1</b>\n</opencv_storage>",
+            "K.yaml:2: not valid XML: mismatched tag",
+        ),
+        ("<opencv_storage>\n<a/><a/></opencv_storage>", "K.yaml:2: 'a' appears twice"),
+        ("<!DOCTYPE a []>\n<opencv_storage></opencv_storage>", "K.yaml:1: document type declarat"),
+        ("<opencv_storage>" + 200 * "<a>" + 200 * "</a>" + "</opencv_storage>", "levels deep"),
     ],
 )
 def test_files_that_cannot_be_used(tmp_path: Path, text: str, message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -179,7 +180,10 @@ def test_frozen(live: Callable[..., LiveSession], image: np.ndarray) -> None:
 
 def test_a_live_source_gives_its_newest_frame(image: np.ndarray) -> None:
     reader = FrameReader(
-        Pictures(*[image] * 9, live=True), paced=True, on_change=lambda: None, events=EventLog()
+        Pictures(*[image] * 9, live=True),
+        paced=True,
+        changed=threading.Condition(),
+        events=EventLog(),
     )
     reader.start()
     until(lambda: reader.state == "ended")

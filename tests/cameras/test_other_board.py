@@ -40,18 +40,16 @@ def test_another_first_id(poses: BoardPose, X_SC: np.ndarray, first_id: int, ids
 
 
 @pytest.mark.parametrize("X_SC", [VIEW, STEEP], ids=["view", "steep"])
-@pytest.mark.parametrize(("first_id", "fit"), [(2, "6 of 10"), (3, "6 of 9")])
-def test_another_first_id_is_no_second_print(
-    poses: BoardPose, X_SC: np.ndarray, first_id: int, fit: str
+@pytest.mark.parametrize("first_id", [2, 3])
+def test_another_first_id_may_look_like_a_second_print(
+    poses: BoardPose, X_SC: np.ndarray, first_id: int
 ) -> None:
     """Ids that go on in the next row make groups of markers that each fit the document."""
     other = replace(BOARD, markers=Markers(first_id=first_id))
     estimate = poses.estimate(board_image(other, SMALL, X_SC))
     assert not estimate.valid
-    assert estimate.reason == (
-        f"another board: only {fit} markers in sight are where this one has them; are columns,"
-        " rows and first_id right?"
-    )
+    assert estimate.reason.startswith("two copies of this board in sight, or another board: 6 of ")
+    assert estimate.reason.endswith("or correct columns, rows and first_id")
 
 
 def test_more_rows_than_the_document_has() -> None:
@@ -144,8 +142,8 @@ def test_two_copies_of_the_board(covered: bool) -> None:
     side_by_side = np.hstack([images[0][:, :320], images[1][:, 320:]])
     estimate = BoardPose(BOARD, CAMERA).estimate(side_by_side)
     assert not estimate.valid
-    assert estimate.reason.startswith("two copies of this board in sight: ")
-    assert estimate.reason.endswith("; remove or cover one of them")
+    assert estimate.reason.startswith("two copies of this board in sight")
+    assert "; remove or cover one" in estimate.reason
 
 
 @pytest.mark.parametrize("axis", [0, 1])

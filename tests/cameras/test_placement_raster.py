@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras import ImageWindow, PinholeView, target_shape, window_around
+from burg_drake.cameras import ImageWindow, PinholeView, target_shape
 from burg_drake.core import make_pose, rot_z
 
 K = np.array([[500.0, 0.0, 31.5], [0.0, 480.0, 23.5], [0.0, 0.0, 1.0]])
@@ -72,14 +72,16 @@ def test_a_sphere_has_the_depth_of_a_sphere() -> None:
 def test_what_lies_behind_or_outside_is_not_drawn() -> None:
     tip = np.array([[-0.1, -0.1, -1.0], [0.1, -0.1, -1.0], [0.0, 0.1, -1.0], [0.0, 0.0, -2.0]])
     assert np.isinf(buffer(tip, np.array([[0, 1, 2], [0, 1, 3]]), ALL)).all()
-    empty = window_around(np.array([[100.0, 100.0], [120.0, 130.0]]), 2.0, (64, 48), 1.0)
+    empty = PinholeView(K, (64, 48), np.eye(4)).window_of(
+        np.array([[100.0, 100.0], [120.0, 130.0]]), 2.0
+    )
     assert empty.shape[0] * empty.shape[1] == 0
     assert buffer(np.abs(tip), np.array([[0, 1, 2], [0, 1, 3]]), empty).size == 0
 
 
-def test_windows_convert_there_and_back() -> None:
+def test_pixels_of_a_finer_raster() -> None:
+    """The first pixel is three raster pixels wide, and its middle is that of the second of them."""
     window = ImageWindow(7, 3, 20, 10, 3.0)
-    at = np.array([[7.0, 3.0], [9.25, 4.5]])
-    np.testing.assert_allclose(window.image(window.raster(at)), at)
-    # the first pixel is three raster pixels wide, and its middle is that of the second of them
-    np.testing.assert_allclose(window.raster(at[0]), [1.0, 1.0])
+    at = window.pixels()
+    np.testing.assert_allclose(at[1, 1], [7.0, 3.0])
+    np.testing.assert_allclose(at[2, 4], [8.0, 3.0 + 1.0 / 3.0])

@@ -51,7 +51,7 @@ BUILT_IN = [
     for path in sorted(data_root().glob(pattern))
 ]
 NOT_YAML = {"Appearance", "BuildRecord", "Comparison", "Nearest", "PrecisionRecall", "Matches"} | {
-    *("TopPrecision", "SetComparison", "SetSummary"),
+    *("TopPrecision", "SetComparison", "SetSummary", "RecordFields"),
 }
 """Classes with a version that are written as JSON, or within another document."""
 MUTATIONS = 12

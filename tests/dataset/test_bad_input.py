@@ -136,7 +136,7 @@ def flipped(near: bytes) -> Callable[[bytes], bytes]:
         (lambda data: data + bytes(512), "bytes, but the index says "),
         (lambda data: bytes(len(data)), "has 0 samples, but the index says 1"),
         (lambda data: b"1" + data[1:], "the checksum of a header is wrong"),
-        (flipped(b"IDAT"), "000000_000.depth.png is damaged: a checksum is wrong"),
+        (flipped(b"IDAT"), "000000_000.depth.png is damaged: its pixels"),
     ],
 )
 def test_a_damaged_shard_is_named_and_made_anew(

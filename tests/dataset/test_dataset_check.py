@@ -148,7 +148,7 @@ def test_a_sound_data_set_has_no_findings(tmp_path: Path) -> None:
         (edit("amodal_box", [0, 0, 2, 2]), "json", "does not contain the mask"),
         (edit("visibility", 0.25), "json", "visibility is 0.25, but"),
         (edit("silhouette_pixels", 1), "json", "silhouette_pixels is 1, less than the"),
-        (edit("visibility", -0.1), "json", "visibility is -0.1; expected a finite number from 0"),
+        (edit("visibility", -0.1), "json", "visibility is -0.1; it must be 0 to 1"),
         (
             record(lambda v: v["view"].update(depth_range=[0.1, 0.8])),
             "depth.png",

@@ -109,7 +109,7 @@ def look_for_it_where_people_read() -> None:
 
     assert {"wobble", "detour"} <= set(FURTHER_MARGINS)
     values = {"wobble": np.array([0.1, 0.2]), "detour": np.array([0.1, 0.2])}
-    page = str(further_margins(values, np.zeros(2, dtype=np.int8)))
+    page = "".join(further_margins(values, np.zeros(2, dtype=np.int8)).charts)
     assert "wobble [°]" in page and "detour [mm]" in page
     found = Margins(**{"slip": 0.001, "wobble": np.deg2rad(3.0)})
     told = describe_trial(TrialResult(outcome=Outcome.LIFTED, margins=found))

@@ -140,7 +140,7 @@ def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
 def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
     cluster: Cluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.members.ChunkSettings.max_losses", 2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.jobs.ChunkSettings.max_losses", 2)
     (guilty,) = executed(1)
     judge = CrashingJudge(how=((guilty, "parent"),), pause=0.01)
     answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(60))]))

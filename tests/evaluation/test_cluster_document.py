@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core import BurgError, ClusterError, DocumentError, InvalidInputError
-from burg_drake.evaluation import jobqueue_parameters, read_cluster, require_safe_address
+from burg_drake.evaluation import (
+    ClusterDocument,
+    jobqueue_parameters,
+    read_cluster,
+    require_safe_address,
+)
 
 
 def document(folder: Path, text: str) -> str:
@@ -17,9 +22,9 @@ def document(folder: Path, text: str) -> str:
 
 
 def test_short_forms() -> None:
-    assert read_cluster("local:4").local == 4
-    found = read_cluster("tls://head.example.org:8786").document
-    assert found is not None
+    assert read_cluster("local:4") == 4
+    found = read_cluster("tls://head.example.org:8786")
+    assert isinstance(found, ClusterDocument)
     assert found.address == "tls://head.example.org:8786"
     for text, message in (
         ("local:0", "local:0 has no workers; give local:1 or more"),
@@ -55,17 +60,17 @@ def test_files_are_found_beside_the_document(tmp_path: Path) -> None:
     for name in ("ca", "cert", "key"):
         (tmp_path / f"{name}.pem").touch()
     tls = "tls: {ca: ca.pem, cert: cert.pem, key: key.pem}\n"
-    found = read_cluster(document(tmp_path, f"address: tls://head:8786\n{tls}")).tls
-    assert found is not None
-    assert found.key == str(tmp_path / "key.pem")
+    found = read_cluster(document(tmp_path, f"address: tls://head:8786\n{tls}"))
+    assert isinstance(found, ClusterDocument) and found.tls is not None
+    assert found.tls.key == str(tmp_path / "key.pem")
     with pytest.raises(DocumentError, match=r"address is tcp://127.0.0.1:1, but tls files"):
         read_cluster(document(tmp_path, f"address: tcp://127.0.0.1:1\n{tls}"))
 
 
 def test_a_batch_system(tmp_path: Path) -> None:
     queue = "jobqueue: {kind: slurm, workers: 8, memory: 32GB, directives: [--qos=low]}\n"
-    found = read_cluster(document(tmp_path, f"{queue}adapt: {{maximum: 40}}\n")).document
-    assert found is not None
+    found = read_cluster(document(tmp_path, f"{queue}adapt: {{maximum: 40}}\n"))
+    assert isinstance(found, ClusterDocument)
     assert found.jobqueue is not None
     told = jobqueue_parameters(found.jobqueue)
     assert (told["cores"], told["processes"], told["memory"]) == (8, 8, "32GB")

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 from burg_drake.evaluation import (  # noqa: E402
     ClusterCall,
     LocalNodes,
-    make_call,
+    run_task,
     send_bundle,
     threads_by_address,
 )
@@ -109,7 +109,7 @@ def test_work_of_a_lost_worker_is_done_by_others(executor: DaskExecutor, tmp_pat
 def test_work_at_which_several_workers_are_lost_is_given_up(
     executor: DaskExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.ChunkSettings.max_losses", 2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.jobs.ChunkSettings.max_losses", 2)
     found = squares(executor, [Known(k, "parent" if k == 1 else "") for k in range(4)])
     assert found == {
         **{k: (k * k, "known") for k in (0, 2, 3)},
@@ -135,7 +135,7 @@ def test_children_without_work_end(
     """As when their driver was killed: nobody ends the run. The worker is a thread of this process,
     so that it sees the shorter time."""
     monkeypatch.setattr("burg_drake.evaluation.cluster.worker_tasks.CHILD_IDLE_TIMEOUT", 0.3)
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.ClusterRun.end", lambda _: None)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.Dispatch.end", lambda _: None)
     log = tmp_path / "log"
     with (
         distributed.LocalCluster(
@@ -177,7 +177,7 @@ def test_a_bundle_that_never_arrives_is_told_of(
 ) -> None:
     other = bundle("this one is unpacked, and another one is asked for")
     monkeypatch.setattr(
-        "burg_drake.evaluation.cluster.cluster_map.send_bundle",
+        "burg_drake.evaluation.cluster.dispatch.send_bundle",
         lambda client, _, *how: send_bundle(client, other, *how),
     )
     lost = r"^worker \S+ did not receive the files that its work needs: its files are not there"
@@ -207,7 +207,7 @@ def test_a_call_without_its_run_is_not_made(executor: DaskExecutor) -> None:
     assert squares(executor, [Known(1)]) == {1: (1, "known")}  # the bundle is there
     call = ClusterCall("a run that is over", bundle().name, b"")
     answers = [
-        executor.client.submit(make_call, call, pure=False, workers=[address]).result(
+        executor.client.submit(run_task, call, pure=False, workers=[address]).result(
             timeout=HANG_GUARD
         )
         for address in threads_by_address(executor.client)

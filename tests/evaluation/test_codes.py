@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from burg_drake.core import InvalidInputError, Outcome
-from burg_drake.evaluation import RANKING_CLEARANCE_STEP, best_rows, member_codes
+from burg_drake.evaluation import RANKING_CLEARANCE_STEP, best_rows, code_texts, member_codes
 
 
 def test_codes_are_places_among_the_members() -> None:
     members = tuple(Outcome)
     places = np.random.default_rng(0).integers(len(members), size=500)
     values = np.array([members[k].value for k in places])
-    assert member_codes(values, members).tolist() == places.tolist()
-    assert len(member_codes(values[:0], members)) == 0
+    assert member_codes(code_texts(values), members).tolist() == places.tolist()
+    assert len(member_codes(code_texts(values[:0]), members)) == 0
 
 
 def test_what_is_no_member_is_named() -> None:
     with pytest.raises(InvalidInputError, match="lifted_up"):
-        member_codes(np.array(["lifted", "lifted_up"]), ("lifted", "slipped"))
+        member_codes(code_texts(np.array(["lifted", "lifted_up"])), ("lifted", "slipped"))
 
 
 @pytest.mark.parametrize("count", [1, 3, 40, 1000])

@@ -56,7 +56,7 @@ def require_true(campaign: Campaign, truth: Columns | None = None) -> None:
 
 
 def refresh(campaign: Campaign) -> PartWriter:
-    writer = PartWriter(campaign.path, campaign.places, campaign.document.instances)
+    writer = PartWriter(campaign)
     writer.catch_up()
     writer.close()
     return writer

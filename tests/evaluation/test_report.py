@@ -16,16 +16,20 @@ from burg_drake.evaluation import (
     GROUP_CLASSES,
     STEP_LOSSES,
     EvaluationSettings,
-    HistogramSeries,
     Run,
     evaluate,
-    mirrored_histogram,
-    nice_step,
     report_page,
     style_sheet,
     summarize,
 )
-from burg_drake.visualization import Html, element, join
+from burg_drake.visualization import (
+    HistogramSeries,
+    Html,
+    element,
+    join,
+    mirrored_histogram,
+    nice_step,
+)
 
 
 @pytest.fixture

@@ -26,14 +26,13 @@ from burg_drake.evaluation import (
     evaluate,
     find_causes,
     load_campaign,
-    ranked_chart,
     rows_of_run,
     summarize,
     worst_first,
     write_campaign_report,
 )
 from burg_drake.scene import Scene
-from burg_drake.visualization import outcome_group
+from burg_drake.visualization import RankedShare, outcome_group, ranked_chart
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -136,7 +135,7 @@ def test_causes_are_those_of_the_runs_and_their_commands_exist(
 ) -> None:
     counts: Counter[Outcome] = Counter()
     for run in campaign.runs:
-        for cause in find_causes(rows_of_run(run.results, str(run.path))):
+        for cause in find_causes(rows_of_run(run.rows(), str(run.path))):
             counts[cause.outcome] += cause.number
     entries = part(page, "Why grasps fail").find("article")
     assert len(entries) == len(counts)
@@ -236,7 +235,8 @@ def test_scenes_without_trials_come_first_and_have_no_dot() -> None:
     groups = [group("good", 9, 1, 0), group("none", 0, 0, 7), group("bad", 1, 9, 3)]
     ranked = worst_first(groups)
     assert [g.name for g in ranked] == ["none", "bad", "good"]
-    chart = read_page(ranked_chart(ranked))
+    shares = [RankedShare(g.name, g.lifted, g.executed, g.interval) for g in ranked]
+    chart = read_page(ranked_chart(shares))
     tips = [title.text for title in chart.find("title")]
     assert tips == ["bad: 1 of 10, 10.0 %", "good: 9 of 10, 90.0 %"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -19,14 +20,12 @@ from burg_drake.evaluation import (
     GROUP_CLASSES,
     MAX_DRAWN_GRASPS,
     MAX_PICTURED_INSTANCES,
-    HistogramSeries,
-    Limit,
+    ResultRows,
     Run,
     drawn_rows,
-    mirrored_histogram,
     report_page,
 )
-from burg_drake.visualization import outcome_group
+from burg_drake.visualization import HistogramSeries, Limit, mirrored_histogram, outcome_group
 
 
 @pytest.fixture
@@ -170,8 +169,10 @@ def test_a_run_of_failures_alone(run: Run, tmp_path: Path) -> None:
         (failed, f"None of {len(failed)} grasps lifted its object."),
         ([], "No grasp is judged yet."),
     ):
-        part_run = Run(run.path, run.document)
-        part_run.__dict__["verdicts"] = _verdicts("".join(lines), tmp_path)
+        folder = tmp_path / str(len(lines))
+        shutil.copytree(run.path, folder)
+        (folder / "journal.jsonl").write_text("".join(lines))
+        part_run = Run(folder, run.document)
         root = read_page(report_page(part_run))
         assert root.find("p", "lead")[0].text.startswith(said)
         assert f"{len(lines)} of {len(journal)} grasps are judged" in root.text
@@ -180,19 +181,16 @@ def test_a_run_of_failures_alone(run: Run, tmp_path: Path) -> None:
         assert "nan" not in root.text.lower().replace("pregrasp", "")
 
 
-def _verdicts(journal: str, folder: Path) -> dict:
-    from burg_drake.evaluation import read_journal
-
-    path = folder / "journal.jsonl"
-    path.write_text(journal)
-    return read_journal(path)
-
-
 def test_many_grasps_are_drawn_in_part_and_the_page_stays_small(run: Run) -> None:
     times = 300
-    many = {name: np.tile(values, times) for name, values in run.results.items()}
+    verdicts = [run.verdicts[id] for id in run.candidates.id]
     large = Run(run.path, run.document)
-    large.__dict__["results"] = many
+    large.__dict__["_rows"] = ResultRows.of(
+        run.candidates,
+        np.tile(np.arange(len(verdicts)), times),
+        lambda rows: [verdicts[row] for row in rows],
+        **run.table_settings,
+    )
     text = report_page(large)
     grasps = [p for g in read_page(text).find("g", "grasp") for p in g.find("path")]
     assert 0.9 * MAX_DRAWN_GRASPS <= len(grasps) <= MAX_DRAWN_GRASPS + 10 * MAX_PICTURED_INSTANCES

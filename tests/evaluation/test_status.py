@@ -106,12 +106,12 @@ def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatc
         failed = encode_verdict(id, replace(verdict, outcome=Outcome.SIMULATION_FAILED))
         journal.write_bytes(b"".join([failed, *rest]))
         if journal.parent.name == "three":  # and judged again after it went to a part
-            PartWriter(campaign.path, campaign.places, ()).catch_up()
+            PartWriter(campaign).catch_up()
             journal.write_bytes(journal.read_bytes() + first)
-    writer = PartWriter(campaign.path, campaign.places, ())
+    writer = PartWriter(campaign)
     writer.catch_up(["cubes", "moved"])
     writer.flush()
-    tails = read_journal_tails(campaign.path, campaign.places)
+    tails = read_journal_tails(campaign)
     for name in ("cubes", "moved"):
         assert tails[name].place == (campaign.folder(name) / JOURNAL_FILE).stat().st_size
     told = read_status(campaign.path)

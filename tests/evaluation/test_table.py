@@ -86,7 +86,14 @@ def columns() -> Columns:
             cpu={Stage.CLEAR: 1e-4, Stage.EXECUTED: 0.2},
         ),
     }
-    return make_columns(candidates(), verdicts, ORIGIN, instances=INSTANCES, joints=7)
+    return columns_of(verdicts)
+
+
+def columns_of(verdicts: dict[str, Verdict]) -> Columns:
+    """The table of some of the candidates, by id."""
+    rows = np.sort(candidates().rows(list(verdicts)))
+    found = [verdicts[candidates().id[row]] for row in rows]
+    return make_columns(candidates(), rows, found, ORIGIN, instances=INSTANCES, joints=7)
 
 
 def test_rows_are_the_judged_grasps_in_the_order_of_the_candidates() -> None:
@@ -266,7 +273,7 @@ def test_whole_numbers_with_gaps_stay_whole(tmp_path: Path, suffix: str) -> None
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_no_rows_are_a_table_too(tmp_path: Path, suffix: str) -> None:
-    table = make_columns(candidates(), {}, ORIGIN, instances=INSTANCES)
+    table = columns_of({})
     write_table(tmp_path / f"r.{suffix}", table)
     assert [len(v) for v in read_table(tmp_path / f"r.{suffix}").values()] == [0] * len(table)
 

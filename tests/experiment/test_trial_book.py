@@ -132,7 +132,7 @@ def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
 
 def test_a_lock_that_is_kept_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     book = TrialBook(write_sheet(tmp_path))
-    monkeypatch.setattr("burg_drake.experiment.trials.journal.TRIALS_LOCK_TIMEOUT", 0.05)
+    monkeypatch.setattr("burg_drake.experiment.trials.trial_book.TRIALS_LOCK_TIMEOUT", 0.05)
     with (
         lock_trials_file(book.path),
         pytest.raises(InvalidInputError, match="locked by another process"),

@@ -53,7 +53,7 @@ def test_motions_go_by_numbers_and_are_kept(
     assert (rows[bad.number]["file"], rows[bad.number]["answer"]) == ("", "collision_table")
 
     stamp = file.stat().st_mtime_ns
-    monkeypatch.setattr("burg_drake.experiment.trials.motion_export.judge_all", _nothing_left)
+    monkeypatch.setattr("burg_drake.evaluation.feasibility.judge_all", _nothing_left)
     assert main(words) == 0 and file.stat().st_mtime_ns == stamp
     save_trials(replace(sheet, trials=(good,)), path)
     with pytest.raises(InvalidInputError, match="has plans of another evaluation"):

@@ -95,12 +95,8 @@ def test_a_file_as_burg_toolkit_writes_it(tmp_path: Path) -> None:
         "004_sugar_box", "sugar box", 0.4, 0.24, 1.0,
     )  # fmt: skip
     assert box.mesh == tmp_path / "meshes/004_sugar_box.obj"
-    assert box.urdf == tmp_path / "urdf/004_sugar_box.urdf"
-    assert box.vhacd == tmp_path / "vhacd/004_sugar_box_vhacd.obj"
-    assert box.thumbnail is None
     assert (mug.identifier, mug.mass, mug.friction, mug.scale) == ("Mug_10f6", None, 0.5, 0.0023)
     assert mug.stable_poses == ()
-    assert (mug.urdf, mug.vhacd, mug.thumbnail) == (None, None, None)
     assert [WRITTEN.splitlines()[o.line - 1] for o in library.objects] == [
         "- friction_coeff: 0.24",
         "- friction_coeff: 0.5",

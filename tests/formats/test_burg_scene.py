@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -120,8 +121,7 @@ def test_its_printed_board(tmp_path: Path) -> None:
     scene = read_burg_scene(changed(tmp_path, printout=printout))
     board = scene.printout
     assert board is not None and scene.notes == ()
-    assert (board.size, board.dictionary, board.count) == ((2.0, 1.5), "4X4_250", (7, 5))
-    assert (board.side, board.spacing) == (0.057, 0.019)
+    assert (board.size, dataclasses.asdict(board.marker_info)) == ((2.0, 1.5), MARKERS)
     path = changed(tmp_path, printout=printout | {"size": [2.1, 1.6]})
     (note,) = read_burg_scene(path).notes
     line = path.read_text().splitlines().index("printout:") + 1

@@ -14,7 +14,7 @@ import pytest
 
 from burg_drake.core import Pose, rng_from
 from burg_drake.grasping import AntipodalSettings, sample_antipodal
-from burg_drake.motion import ArmReach, Witness
+from burg_drake.motion import ArmPath, ArmReach
 from burg_drake.scene import Scene, load_scene
 from burg_drake.station import Obstacle, Station, load_station
 
@@ -23,7 +23,7 @@ STEP = 0.03
 """Of the audit here; the benchmark has 5 mm [m]."""
 TARGETS = ("mug", "bottle", "bowl")
 
-Motion = tuple[str, Witness, float]
+Motion = tuple[str, ArmPath, float]
 """Target, motion, width."""
 
 
@@ -63,7 +63,7 @@ def motions(scene: Scene, station: Station) -> list[Motion]:
         above = np.flatnonzero(X_WG[:, 2, 2] < -0.5)[:6]
         verdicts = reach.check_all([name] * len(above), X_WG[above], sampled.width[above])
         pairs = zip(verdicts, sampled.width[above].tolist(), strict=True)
-        found += [(name, v.witness, width) for v, width in pairs if v.witness is not None][:1]
+        found += [(name, v.path, width) for v, width in pairs if v.path is not None][:1]
     return found
 
 
@@ -72,8 +72,8 @@ def test_motions_are_free(
 ) -> None:
     assert len(motions) >= 3
     audit = reach_audit.Audit(scene, station)
-    for name, witness, width in motions:
-        assert not audit.faults(name, witness, width, step=STEP), name
+    for name, arm_path, width in motions:
+        assert not audit.faults(name, arm_path, width, step=STEP), name
 
 
 def test_what_is_put_in_the_way_is_found(
@@ -81,12 +81,12 @@ def test_what_is_put_in_the_way_is_found(
 ) -> None:
     """By the hand on its way down, and by the target on its way up: a plate over each target that
     hand and target go through."""
-    name, witness, width = motions[0]
-    x, y, _ = witness.X_WG[:3, 3]
+    name, arm_path, width = motions[0]
+    x, y, _ = arm_path.X_WG[:3, 3]
     plate = Obstacle(X_WB=Pose((float(x), float(y), 0.3)), size=(0.2, 0.2, 0.01))
     background = {**station.document.background, "plate": plate}
     other = replace(station, document=replace(station.document, background=background))
-    faults = reach_audit.Audit(scene, other).faults(name, witness, width, step=STEP)
+    faults = reach_audit.Audit(scene, other).faults(name, arm_path, width, step=STEP)
     met = {(fault.part, *fault.bodies) for fault in faults}
     assert ("approach", "panda_hand", "plate") in met
     assert ("lift", name, "plate") in met
@@ -96,8 +96,8 @@ def test_a_target_pushed_down_is_found(
     reach_audit: ModuleType, scene: Scene, station: Station, motions: list[Motion]
 ) -> None:
     """The lift runs backwards: the target is taken 30 cm down instead of up."""
-    name, witness, width = motions[0]
-    down = replace(witness, lift=witness.lift[::-1])
+    name, arm_path, width = motions[0]
+    down = replace(arm_path, lift=arm_path.lift[::-1])
     faults = reach_audit.Audit(scene, station).faults(name, down, width, step=STEP)
     assert {fault.part for fault in faults} == {"lift"}
     met = {fault.bodies for fault in faults}

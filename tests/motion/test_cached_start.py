@@ -54,10 +54,10 @@ def test_verdicts_do_not_depend_on_the_cache(
         ]
         for verdict in verdicts:
             bits += [verdict.outcome, verdict.blocker, np.array(verdict.clearance).tobytes()]
-            if way := verdict.witness:
+            if way := verdict.path:
                 bits += [x.tobytes() for x in (way.transfer, way.approach, way.lift)]
         found.append(bits)
-    assert sum(verdict.witness is not None for verdict in verdicts) > 2
+    assert sum(verdict.path is not None for verdict in verdicts) > 2
     assert found[0] == found[1] == found[2]
     assert {path.name.split("-")[0] for path in tmp_path.iterdir()} == KINDS
     assert not caplog.messages

@@ -55,8 +55,8 @@ def test_the_block_rises_to_the_bar(tmp_path: Path, room: float) -> None:
     motion = GraspMotion(standoff=0.01, least_lift=0.02)
     found = gantry(tmp_path, motion, bar=in_front(HIGH + room)).check("", X_WG)
     assert found.outcome is None and found.lift == pytest.approx(np.floor(100 * room) / 100)
-    assert found.blocker == "z_link vs bar" and found.witness is not None
-    rise = np.diff(place_on_gantry(found.witness.lift)[[0, -1]], axis=0)
+    assert found.blocker == "z_link vs bar" and found.path is not None
+    rise = np.diff(place_on_gantry(found.path.lift)[[0, -1]], axis=0)
     np.testing.assert_allclose(rise, [[0.0, 0.0, found.lift]], atol=1e-6)
 
 
@@ -81,11 +81,11 @@ def test_back_and_then_aside(tmp_path: Path) -> None:
     """Back is up here; what stands over the grasp, or beside its retreated place, is told."""
     motion = GraspMotion(retreat=0.08, lift_height=0.15, lift_direction=(0.0, 4.0, 3.0))
     found = gantry(tmp_path, motion).check("", X_WG)
-    witness = found.witness
-    assert witness is not None and witness.retreat is not None and found.lift == 0.15
-    np.testing.assert_array_equal(witness.approach[-1], witness.retreat[0])
-    np.testing.assert_array_equal(witness.retreat[-1], witness.lift[0])
-    ends = place_on_gantry(np.array([witness.retreat[0], witness.lift[0], witness.lift[-1]]))
+    arm_path = found.path
+    assert arm_path is not None and arm_path.retreat is not None and found.lift == 0.15
+    np.testing.assert_array_equal(arm_path.approach[-1], arm_path.retreat[0])
+    np.testing.assert_array_equal(arm_path.retreat[-1], arm_path.lift[0])
+    ends = place_on_gantry(np.array([arm_path.retreat[0], arm_path.lift[0], arm_path.lift[-1]]))
     np.testing.assert_allclose(
         ends - X_WG[:3, 3], [[0, 0, 0], [0, 0, 0.08], [0, 0.12, 0.17]], atol=1e-6
     )
@@ -154,11 +154,11 @@ def test_hand_and_target_go_back_and_up(
     assert len(reached) > 2 and len({round(reach.lift, 3) for reach in reached}) > 1
     X_WA, X_HG = reach.diagram.station.document.arm.X_WA.matrix(), reach.diagram.station.hand.X_HG
     for one in reached:
-        witness = one.witness
-        assert witness is not None and witness.retreat is not None
-        ends = np.array([witness.retreat[0], witness.retreat[-1], witness.lift[-1]])
+        arm_path = one.path
+        assert arm_path is not None and arm_path.retreat is not None
+        ends = np.array([arm_path.retreat[0], arm_path.retreat[-1], arm_path.lift[-1]])
         X = X_WA @ reach.kinematics.forward(ends)[0] @ X_HG.matrix()
-        grasp, back = witness.X_WG, MOTION.retreat * witness.X_WG[:3, 2]
+        grasp, back = arm_path.X_WG, MOTION.retreat * arm_path.X_WG[:3, 2]
         up = one.lift * MOTION.direction_W
         wanted = grasp[:3, 3] + np.array([np.zeros(3), -back, up - back])
         np.testing.assert_allclose(X[:, :3, 3], wanted, atol=1e-5)
@@ -176,10 +176,10 @@ def test_drake_sees_nothing_in_the_way(
     spec.loader.exec_module(reach_audit)
     audit = reach_audit.Audit(scene, station)
     names, _, widths = grasps
-    reached = [k for k, reach in enumerate(found) if reach.witness is not None][::2]
+    reached = [k for k, reach in enumerate(found) if reach.path is not None][::2]
     assert len(reached) >= 2
     for k in reached:
-        assert not audit.faults(names[k], found[k].witness, float(widths[k]), step=0.02), names[k]
+        assert not audit.faults(names[k], found[k].path, float(widths[k]), step=0.02), names[k]
 
 
 def test_it_does_not_matter_how_a_grasp_is_given_or_with_what_others(
@@ -194,8 +194,8 @@ def test_it_does_not_matter_how_a_grasp_is_given_or_with_what_others(
         np.testing.assert_array_equal(
             [one.lift, one.clearance], [found[k].lift, found[k].clearance]
         )
-        if one.witness is not None and found[k].witness is not None:
-            np.testing.assert_array_equal(one.witness.lift, found[k].witness.lift)
+        if one.path is not None and found[k].path is not None:
+            np.testing.assert_array_equal(one.path.lift, found[k].path.lift)
 
 
 def test_a_turned_world_has_the_same_heights(
@@ -235,9 +235,9 @@ def test_a_plan_goes_back_before_it_goes_up(
 ) -> None:
     names, _, widths = grasps
     k = next(k for k, one in enumerate(found) if one.outcome is None and one.lift > 0.05)
-    witness = found[k].witness
-    assert witness is not None
-    plan = Planner(reach).time(names[k], witness, float(widths[k]))
+    arm_path = found[k].path
+    assert arm_path is not None
+    plan = Planner(reach).time(names[k], arm_path, float(widths[k]))
     assert list(plan.phases) == ["transfer", "approach", "close", "retreat", "lift"]
     assert plan.retreat is not None
     np.testing.assert_array_equal(plan.retreat.q[-1], plan.lift.q[0])

@@ -123,10 +123,10 @@ def test_what_is_no_grasp_of_the_scene(planner: Planner, scene: Scene) -> None:
 def test_corners_may_be_rounded_where_drake_agrees(planner: Planner, planned: Plan) -> None:
     """A detour of the transfer, which shortening takes out, and a slower one that keeps it."""
     found = planner.reach.check("box", planned.origin.X_WG, planned.width)  # type: ignore[union-attr]
-    assert found.witness is not None
-    home, goal = found.witness.transfer[[0, -1]]
+    assert found.path is not None
+    home, goal = found.path.transfer[[0, -1]]
     middle = home + np.array([0.3, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
-    detour = replace(found.witness, transfer=np.array([home, middle, goal]))
+    detour = replace(found.path, transfer=np.array([home, middle, goal]))
     timed = planner.time("box", detour, planned.width)
     assert timed.transfer.duration == pytest.approx(planned.transfer.duration, abs=0.002)
 

@@ -77,16 +77,16 @@ def same(a: Reach, b: Reach) -> bool:
     return (
         (a.outcome, a.blocker) == (b.outcome, b.blocker)
         and np.array_equal([a.clearance, a.excess], [b.clearance, b.excess], equal_nan=True)
-        and (a.witness is None) == (b.witness is None)
+        and (a.path is None) == (b.path is None)
         and all(np.array_equal(p, q) for p, q in zip(parts(a), parts(b), strict=True))
     )
 
 
 def parts(found: Reach) -> list[np.ndarray]:
-    witness = found.witness
-    if witness is None:
+    arm_path = found.path
+    if arm_path is None:
         return []
-    return [witness.transfer, witness.approach, witness.lift, witness.X_WG]
+    return [arm_path.transfer, arm_path.approach, arm_path.lift, arm_path.X_WG]
 
 
 @pytest.fixture(scope="module")
@@ -147,18 +147,18 @@ def test_a_witness_leads_from_home_straight_to_the_grasp_and_straight_up(
     """By the DH table, at rows and half-way between them."""
     assert station.document.arm is not None
     for X_WG, found in verdicts:
-        witness = found.witness
-        if witness is None:
+        arm_path = found.path
+        if arm_path is None:
             assert found.outcome is not None and found.q_grasp is None
             continue
         assert found.outcome is None and not found.blocker and found.clearance >= 0.0
-        np.testing.assert_array_equal(witness.transfer[0], station.document.arm.home)
-        np.testing.assert_array_equal(witness.transfer[-1], witness.approach[0])
-        np.testing.assert_array_equal(witness.approach[-1], witness.lift[0])
-        goal = witness.X_WG
+        np.testing.assert_array_equal(arm_path.transfer[0], station.document.arm.home)
+        np.testing.assert_array_equal(arm_path.transfer[-1], arm_path.approach[0])
+        np.testing.assert_array_equal(arm_path.approach[-1], arm_path.lift[0])
+        goal = arm_path.X_WG
         assert min(np.abs(goal - X).max() for X in (X_WG, swap_fingers(X_WG))) < 1e-12
-        assert on_line(witness.approach, goal, goal[:3, 2], -0.1, 0.0) < 1e-3
-        assert on_line(witness.lift, goal, np.array([0.0, 0.0, 1.0]), 0.0, 0.3) < 1e-3
+        assert on_line(arm_path.approach, goal, goal[:3, 2], -0.1, 0.0) < 1e-3
+        assert on_line(arm_path.lift, goal, np.array([0.0, 0.0, 1.0]), 0.0, 0.3) < 1e-3
 
 
 def on_line(
@@ -187,9 +187,9 @@ def test_configurations_are_free_in_a_fresh_diagram(
     robot = set(fresh.robot_bodies)
     checked = 0
     for _, found in verdicts:
-        if found.witness is None:
+        if found.path is None:
             continue
-        for q in np.concatenate([found.witness.transfer, found.witness.approach[::2]]):
+        for q in np.concatenate([found.path.transfer, found.path.approach[::2]]):
             plant.SetPositions(plant_context, plant.GetModelInstanceByName("arm"), q)
             query = fresh.diagram.GetOutputPort("geometry_query").Eval(context)
             for pair in query.ComputePointPairPenetration():
@@ -210,7 +210,7 @@ def test_free_configurations_are_found_again(scene: Scene, station: Station) -> 
     assert len(free) == 16
     found = arm.check_all([""] * 16, grasp_by_dh(np.array(free)))
     missed = [q for q, reach in zip(free, found, strict=True) if reach.outcome is not None]
-    assert sum(arm._tree.connect(q[None]) is not None for q in missed) <= 1
+    assert sum(path is not None for q in missed for path in arm._tree.connect(q[None])) <= 1
 
 
 @pytest.mark.thorough

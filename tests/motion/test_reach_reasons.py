@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from gantry import UPPER, box, gantry_diagram
 
+import burg_drake as burg
 from burg_drake.core import Outcome, Pose, grasp_from_axes
 from burg_drake.motion import ArmReach, Reach, ReachSettings
 from burg_drake.scene import Scene, load_scene
@@ -162,3 +163,10 @@ def test_posts_that_the_last_link_meets_at_the_grasp(empty: Scene) -> None:
     found = panda(empty, **posts).check("", X_WG)
     assert found.outcome is Outcome.ARM_COLLISION and found.clearance < 0.0
     assert found.blocker.startswith("panda_link7 vs ")
+
+
+def test_earlier_names_still_work() -> None:
+    with pytest.warns(DeprecationWarning, match="ArmPath since 0.1"):
+        assert burg.arm.Witness is burg.arm.ArmPath
+    with pytest.warns(DeprecationWarning, match="Reach.path since 0.1"):
+        assert burg.Reach(None).witness is None

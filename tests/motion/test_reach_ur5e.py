@@ -59,20 +59,20 @@ def test_motions_are_free_and_whole(
     arm = station.document.arm
     assert arm is not None
     X_FG = arm.X_FH.matrix() @ station.hand.X_HG.matrix()
-    yes = [(n, r.witness) for n, r in zip(grasps[0], verdicts, strict=True) if r.witness]
+    yes = [(n, r.path) for n, r in zip(grasps[0], verdicts, strict=True) if r.path]
     assert len(yes) >= 2
-    for name, witness in yes:
-        np.testing.assert_allclose(witness.transfer[0], arm.home, atol=0)
-        np.testing.assert_array_equal(witness.transfer[-1], witness.approach[0])
-        np.testing.assert_array_equal(witness.approach[-1], witness.lift[0])
-        for q in np.concatenate([between(witness.transfer), witness.approach]):
+    for name, arm_path in yes:
+        np.testing.assert_allclose(arm_path.transfer[0], arm.home, atol=0)
+        np.testing.assert_array_equal(arm_path.transfer[-1], arm_path.approach[0])
+        np.testing.assert_array_equal(arm_path.approach[-1], arm_path.lift[0])
+        for q in np.concatenate([between(arm_path.transfer), arm_path.approach]):
             assert collision.is_free(q)
-        rise = flange(witness.lift, station)[:, 2, 3] - flange(witness.lift[:1], station)[0, 2, 3]
+        rise = flange(arm_path.lift, station)[:, 2, 3] - flange(arm_path.lift[:1], station)[0, 2, 3]
         assert rise[-1] == pytest.approx(0.30, abs=1e-5)
-        for q, height in zip(witness.lift, rise, strict=True):
+        for q, height in zip(arm_path.lift, rise, strict=True):
             assert collision.is_free(q, carried=name, moved_W=(0.0, 0.0, max(0.0, float(height))))
-        X_WG = flange(witness.approach[-1:], station)[0] @ X_FG
-        np.testing.assert_allclose(X_WG, witness.X_WG, atol=1e-5)
+        X_WG = flange(arm_path.approach[-1:], station)[0] @ X_FG
+        np.testing.assert_allclose(X_WG, arm_path.X_WG, atol=1e-5)
 
 
 def between(q: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ def flange(q: np.ndarray, station: Station) -> np.ndarray:
 
 
 def test_out_of_reach_is_named(verdicts: list[Reach]) -> None:
-    assert verdicts[-1].outcome is Outcome.NO_IK and verdicts[-1].witness is None
+    assert verdicts[-1].outcome is Outcome.NO_IK and verdicts[-1].path is None
 
 
 def test_a_routine_of_ones_own_gives_the_same_verdicts(

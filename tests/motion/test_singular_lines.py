@@ -44,7 +44,7 @@ def test_they_are_reached_and_nothing_collides() -> None:
     arm = ArmKinematics.of(reach.diagram)
     for name, width, found in zip(names, widths, reach.check_all(names, X_WG, widths), strict=True):
         assert found.outcome is None, (name, found)
-        motion = found.witness
+        motion = found.path
         assert motion is not None
         assert not audit.faults(name, motion, float(width), step=0.03)
         p = arm.forward(motion.lift)[0][:, :3, 3]  # the arm stands at the origin of the world

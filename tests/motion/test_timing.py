@@ -12,12 +12,12 @@ from burg_drake.core import InvalidInputError, inverse, rotation_from_rpy
 from burg_drake.motion import (
     ArmKinematics,
     ArmLimits,
+    ArmPath,
     PandaIk,
     PathChecks,
     Plan,
     TimingSettings,
     Trajectory,
-    Witness,
     time_motion,
 )
 from burg_drake.scene import Scene, load_scene
@@ -56,14 +56,14 @@ def line(
     return np.array(rows)
 
 
-def witness(
+def arm_path(
     arm: ArmKinematics,
     place: tuple[float, float, float] = (0.4, 0.2, 0.2),
     rpy: tuple[float, float, float] = (0.0, 0.0, -0.4),
     *,
     stepped: float = 0.0,
     corner: bool = False,
-) -> Witness:
+) -> ArmPath:
     """Down to a place and up again; q7 is the home posture's, or changes by `stepped` halfway."""
     ik = PandaIk.of(arm)
     assert ik is not None
@@ -76,7 +76,7 @@ def witness(
     q7 = HOME[6] + stepped * np.clip((np.arange(31) - 10) / 5.0, 0.0, 1.0)
     lift = line(ik, X, np.array([0.0, 0.0, 0.01]), 31, q7, approach[-1])
     middle = [0.5 * (HOME + approach[0]) + 0.3] if corner else []
-    return Witness(X, np.array([HOME, *middle, approach[0]]), approach, lift)
+    return ArmPath(X, np.array([HOME, *middle, approach[0]]), approach, lift)
 
 
 def hand(arm: ArmKinematics, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +115,7 @@ def test_a_panda_can_run_it(
     panda: tuple[ArmKinematics, ArmLimits], checks: PathChecks | None, corner: bool
 ) -> None:
     arm, limits = panda
-    given = witness(arm, corner=corner)
+    given = arm_path(arm, corner=corner)
     plan = time_motion(given, limits, arm, checks=checks)
     assert_runs(plan, limits)
     for part, path in ((plan.transfer, given.transfer), (plan.lift, given.lift)):
@@ -126,7 +126,7 @@ def test_a_panda_can_run_it(
 
 def test_the_hand_goes_straight_and_does_not_turn(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
-    plan = time_motion(witness(arm), limits, arm)
+    plan = time_motion(arm_path(arm), limits, arm)
     for part in (plan.approach, plan.lift):
         p, turn = hand(arm, part)
         way = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
@@ -143,7 +143,7 @@ def test_the_hand_keeps_within_half_of_its_clearance(
     arm, limits = panda
     ik = PandaIk.of(arm)
     assert ik is not None
-    given = witness(arm, (0.56, 0.1, 0.4))
+    given = arm_path(arm, (0.56, 0.1, 0.4))
     fine = line(ik, given.X_WG, np.array([0.0, 0.0, 0.001]), 301, HOME[6], given.approach[-1])
     gaps = {}
     for clearance in (2e-3, 2e-4, 5e-5, np.nan):
@@ -162,7 +162,7 @@ def test_the_lift_is_as_gentle_as_that_of_the_hand_alone(
 ) -> None:
     """Half of 1.25 s with 4 * 0.30 / 1.25^2 upwards, half downwards, and 30 ms to build it up."""
     arm, limits = panda
-    lift = time_motion(witness(arm), limits, arm).lift
+    lift = time_motion(arm_path(arm), limits, arm).lift
     z = hand(arm, lift)[0][:, 2]
     acceleration = np.diff(z, 2) / 1e-6
     assert acceleration.max() == pytest.approx(4 * 0.30 / 1.25**2, rel=0.01)
@@ -177,7 +177,7 @@ def test_a_shorter_lift_has_the_same_acceleration_and_a_retreat_no_more(
 ) -> None:
     """0.07 m with 4 * 0.30 / 1.25^2 up and down, ramps of 30 ms on top; likewise backwards."""
     arm, limits = panda
-    given = witness(arm)
+    given = arm_path(arm)
     plan = time_motion(replace(given, lift=given.lift[:8]), limits, arm)
     assert plan.lift.duration == pytest.approx(1.25 * np.sqrt(0.07 / 0.30) + 0.03, abs=0.002)
     back = time_motion(replace(given, retreat=given.approach[::-1]), limits, arm).retreat
@@ -188,7 +188,7 @@ def test_a_shorter_lift_has_the_same_acceleration_and_a_retreat_no_more(
 def test_the_approach_has_its_speed(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     # 0.1 m at 0.25 m/s takes 0.4 s, and 0.25 / 0.75 s to get there, and 30 ms more.
     arm, limits = panda
-    approach = time_motion(witness(arm), limits, arm).approach
+    approach = time_motion(arm_path(arm), limits, arm).approach
     speed = np.linalg.norm(np.diff(hand(arm, approach)[0], axis=0), axis=1) / 1e-3
     assert speed.max() == pytest.approx(0.25, rel=0.01)
     assert approach.duration == pytest.approx(0.4 + 0.25 / 0.75 + 0.03, abs=0.002)
@@ -198,7 +198,7 @@ def test_a_step_of_the_redundant_joint_is_smoothed_where_that_is_free(
     panda: tuple[ArmKinematics, ArmLimits],
 ) -> None:
     arm, limits = panda
-    given = witness(arm, stepped=0.3)
+    given = arm_path(arm, stepped=0.3)
     as_it_is = time_motion(given, limits, arm).lift
     smooth = time_motion(given, limits, arm, checks=ANYTHING).lift
     refused = time_motion(
@@ -220,21 +220,21 @@ def test_what_leaves_the_path_is_shown_to_the_check(
         return lambda q: seen[name].append(q) or True
 
     checks = PathChecks(*map(seeing, seen))
-    plan = time_motion(witness(arm, corner=True), limits, arm, checks=checks)
+    plan = time_motion(arm_path(arm, corner=True), limits, arm, checks=checks)
     for name in ("approach", "lift"):
         rows = seen[name][-1]
         distance = np.abs(getattr(plan, name).q[:, None] - rows).max(axis=2).min(axis=1)
         assert distance.max() < 0.01  # half of the rows' spacing
     corner = seen["transfer"][-1]
-    given = witness(arm, corner=True).transfer[1]
+    given = arm_path(arm, corner=True).transfer[1]
     assert np.abs(np.diff(corner, axis=0)).max() < 0.05
     assert np.linalg.norm(plan.transfer.q - given, axis=1).min() > 0.0
 
 
 def test_half_the_speed_is_twice_the_time(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
-    full = time_motion(witness(arm), limits, arm)
-    half = time_motion(witness(arm), limits, arm, settings=TimingSettings(speed=0.5))
+    full = time_motion(arm_path(arm), limits, arm)
+    half = time_motion(arm_path(arm), limits, arm, settings=TimingSettings(speed=0.5))
     for name in ("transfer", "approach", "lift"):
         a, b = getattr(full, name), getattr(half, name)
         assert b.duration == pytest.approx(2.0 * a.duration, abs=0.003)
@@ -246,7 +246,7 @@ def test_an_arm_too_slow_for_the_hand_s_speed_takes_longer(
 ) -> None:
     arm, limits = panda
     slow = replace(limits, velocity=limits.velocity / 4.0)
-    plan = time_motion(witness(arm), slow, arm)
+    plan = time_motion(arm_path(arm), slow, arm)
     assert_runs(plan, slow)
     assert plan.lift.duration > 1.5
     used = np.abs(np.diff(plan.lift.q, axis=0)).max(axis=0) / 1e-3 / slow.velocity
@@ -255,7 +255,7 @@ def test_an_arm_too_slow_for_the_hand_s_speed_takes_longer(
 
 def test_no_approach_and_no_lift(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
-    there = witness(arm)
+    there = arm_path(arm)
     still = replace(there, approach=there.approach[[0, 0]], lift=there.approach[:1])
     plan = time_motion(still, limits, arm)
     for part in (plan.approach, plan.lift):
@@ -264,10 +264,10 @@ def test_no_approach_and_no_lift(panda: tuple[ArmKinematics, ArmLimits]) -> None
 
 def test_a_path_beyond_the_limits(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
-    given = witness(arm)
+    given = arm_path(arm)
     beyond = given.transfer.copy()
     beyond[1, 3] = 0.5
-    with pytest.raises(InvalidInputError, match=r"transfer of a witness has joint 4"):
+    with pytest.raises(InvalidInputError, match=r"transfer of the path has joint 4"):
         time_motion(replace(given, transfer=beyond), limits, arm)
 
 
@@ -278,7 +278,7 @@ def test_the_margin_to_joint_limits_is_kept_between_waypoints(
     """Limits lie as tight about all waypoints as the margin allows; Drake's trajectory is looked
     at every 0.1 ms."""
     arm, limits = panda
-    given, margin = witness(arm, stepped=0.4), 0.01
+    given, margin = arm_path(arm, stepped=0.4), 0.01
     given = replace(given, retreat=given.approach[::-1], lift=given.lift)
     waypoints = np.concatenate([given.transfer, given.approach, given.lift])
     low, high = waypoints.min(axis=0), waypoints.max(axis=0)
@@ -297,10 +297,10 @@ def test_the_margin_to_joint_limits_is_kept_between_waypoints(
 
 def test_what_no_time_is_enough_for(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
-    given = witness(arm)
+    given = arm_path(arm)
     lost = given.lift.copy()
     lost[7, 2] = np.nan
-    with pytest.raises(InvalidInputError, match="lift of a witness has joint 3 at nan"):
+    with pytest.raises(InvalidInputError, match="lift of the path has joint 3 at nan"):
         time_motion(replace(given, lift=lost), limits, arm)
 
 

@@ -66,11 +66,11 @@ def test_it_is_seen_that_the_hand_is_not_symmetric(scene: Scene, station: Statio
 def test_the_arm_takes_the_way_in_which_the_camera_is_clear(arm: ArmReach) -> None:
     found, swapped = arm.check("", X_WG), arm.check("", swap_fingers(X_WG))
     assert found.outcome is None and swapped.outcome is None
-    assert found.witness is not None and swapped.witness is not None
+    assert found.path is not None and swapped.path is not None
     for name in ("X_WG", "transfer", "approach", "lift"):
-        np.testing.assert_array_equal(getattr(found.witness, name), getattr(swapped.witness, name))
+        np.testing.assert_array_equal(getattr(found.path, name), getattr(swapped.path, name))
     assert found.clearance == swapped.clearance
-    camera = found.witness.X_WG @ np.array([0.0, -0.07, -0.0734, 1.0])  # x of H is -y of G
+    camera = found.path.X_WG @ np.array([0.0, -0.07, -0.0734, 1.0])  # x of H is -y of G
     assert camera[0] < X_WG[0, 3] - 0.06
 
 

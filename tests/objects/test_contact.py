@@ -31,20 +31,21 @@ def torus() -> trimesh.Trimesh:
 
 
 def test_by_itself_it_is_a_primitive_where_one_fits(tmp_path: Path) -> None:
-    contact, written = contact_geometry(None, cylinder(), True, [cylinder()], tmp_path)
-    assert contact.kind == "primitive" and written == ()
+    contact = contact_geometry(None, cylinder(), True, [cylinder()], tmp_path)
+    assert contact.kind == "primitive" and list(tmp_path.iterdir()) == []
     assert contact.primitive is not None and contact.primitive.shape == "cylinder"
     assert contact.fit is not None and contact.fit.hausdorff < 1e-4
-    contact, written = contact_geometry(None, torus(), True, [cylinder()], tmp_path)
-    assert contact.kind == "surface" and written == (contact.mesh,) == (CONTACT_FILE,)
+    contact = contact_geometry(None, torus(), True, [cylinder()], tmp_path)
+    assert (contact.kind, contact.mesh) == ("surface", CONTACT_FILE)
     assert contact.fit is not None and contact.fit.hausdorff <= MAX_CONTACT_DISTANCE
     assert contact.reason == "" and (tmp_path / CONTACT_FILE).exists()
 
 
 def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
     holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
-    contact, written = contact_geometry(None, holey, False, [torus()], tmp_path)
-    assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
+    contact = contact_geometry(None, holey, False, [torus()], tmp_path)
+    assert contact == ContactGeometry(reason="its surface is not closed")
+    assert list(tmp_path.iterdir()) == []
     assert contact_fallback_message(contact, 12) == (
         "finger pads touch 12 convex pieces, because its surface is not closed; make the"
         " mesh watertight and smooth it, or accept that by 'contact: pieces' in an"
@@ -73,22 +74,22 @@ def test_what_pads_touch_is_told(tmp_path: Path) -> None:
 
 def test_the_volume_of_an_open_surface_is_that_of_its_pieces(tmp_path: Path) -> None:
     lidless = trimesh.Trimesh(cylinder().vertices, cylinder().faces[3:], process=False)
-    contact, _ = contact_geometry(None, lidless, False, [cylinder()], tmp_path)
+    contact = contact_geometry(None, lidless, False, [cylinder()], tmp_path)
     assert contact.kind == "primitive"
 
 
 @pytest.mark.parametrize("kind", ["pieces", "compliant_pieces"])
 def test_pieces_are_taken_as_they_are(tmp_path: Path, kind: str) -> None:
-    contact, written = contact_geometry(kind, cylinder(), True, [], tmp_path)  # type: ignore[arg-type]
+    contact = contact_geometry(kind, cylinder(), True, [], tmp_path)  # type: ignore[arg-type]
     assert contact == ContactGeometry(kind=kind)  # type: ignore[arg-type]
-    assert written == ()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_mesh_is_written_with_few_faces(tmp_path: Path) -> None:
     fine = torus()
     assert len(fine.faces) > 4 * CONTACT_MESH_FACES
-    contact, written = contact_geometry("mesh", fine, True, [], tmp_path)
-    assert written == (contact.mesh,) == (CONTACT_FILE,)
+    contact = contact_geometry("mesh", fine, True, [], tmp_path)
+    assert contact.mesh == CONTACT_FILE
     mesh = trimesh.load_mesh(tmp_path / CONTACT_FILE)
     assert mesh.is_watertight and mesh.euler_number == 0  # it still has its hole
     assert len(mesh.faces) < len(fine.faces) / 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core import InvalidInputError, Pose, UnknownNameError
-from burg_drake.formats import BurgInstance, BurgPrintout, BurgScene
+from burg_drake.formats import BurgInstance, BurgMarkers, BurgPrintout, BurgScene
 from burg_drake.objects import load_library
 from burg_drake.pipeline import import_burg_scene
 from burg_drake.station import MODEL_NAMES
@@ -93,9 +93,14 @@ def test_what_has_no_mass_is_background() -> None:
     )
 
 
-PRINTOUT = BurgPrintout(
-    size=(0.594, 0.42), dictionary="4X4_250", count=(7, 5), side=0.057, spacing=0.019
+MARKERS = BurgMarkers(
+    aruco_dict="DICT_4X4_250",
+    marker_count_x=7,
+    marker_count_y=5,
+    marker_size_mm=57.0,
+    marker_spacing_mm=19.0,
 )
+PRINTOUT = BurgPrintout(size=(0.594, 0.42), marker_info=MARKERS)
 
 
 def test_the_printed_board() -> None:
@@ -115,12 +120,15 @@ def test_the_printed_board() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"dictionary": "4X4_25"}, "there/scene.yaml: printout: marker dictionary '4X4_25' does"),
-        ({"count": (9, 5)}, "there/scene.yaml: printout: markers of 57 mm .* do not fit"),
+        (
+            {"aruco_dict": "DICT_4X4_25"},
+            "there/scene.yaml: printout: marker dictionary '4X4_25' does",
+        ),
+        ({"marker_count_x": 9}, "there/scene.yaml: printout: markers of 57 mm .* do not fit"),
     ],
 )
 def test_a_board_that_cannot_be(change: dict[str, object], message: str) -> None:
-    printout = dataclasses.replace(PRINTOUT, **change)
+    printout = dataclasses.replace(PRINTOUT, marker_info=dataclasses.replace(MARKERS, **change))
     printed = dataclasses.replace(scene(()), printout=printout)
     with pytest.raises(InvalidInputError, match=message):
         import_burg_scene(printed, load_library("household"))

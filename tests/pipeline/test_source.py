@@ -44,7 +44,7 @@ def test_stems_without_letters() -> None:
         ({"friction": math.nan}, "box: friction is nan; it must be at least 0"),
         (
             {"rgba": (1.0, 0.0, 0.0, 2.0)},
-            "box: rgba is (1.0, 0.0, 0.0, 2.0); each number must be from 0 to 1",
+            "box: rgba is [1.0, 0.0, 0.0, 2.0]; each number must be from 0 to 1",
         ),
         ({"name": "My Box"}, "'My Box' is not a valid object name; use a-z, 0-9 and underscores"),
         ({"name": "../x"}, "'../x' is not a valid object name; use a-z"),

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
+from burg_drake.cameras import encode_jpeg
 from burg_drake.core import InvalidInputError
-from burg_drake.ros import IMAGE_ENCODINGS, decode_image_message, jpeg_bytes
+from burg_drake.ros import IMAGE_ENCODINGS, decode_image_message
 
 RGB = np.random.default_rng(5).integers(0, 256, (4, 6, 3), dtype=np.uint8)
 OPAQUE = np.full((4, 6, 1), 255, np.uint8)
@@ -144,5 +145,5 @@ def test_what_is_not_a_compressed_image(form: str, data: bytes, text: str) -> No
 
 def test_jpeg_keeps_the_order_of_colours() -> None:
     image = np.full((16, 16, 3), COLOR, np.uint8)
-    decoded = decode_image_message(SimpleNamespace(format="jpeg", data=jpeg_bytes(image)))
+    decoded = decode_image_message(SimpleNamespace(format="jpeg", data=encode_jpeg(image, 95)))
     assert np.abs(decoded.astype(int) - COLOR).max() <= 4

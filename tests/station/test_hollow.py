@@ -25,7 +25,7 @@ def with_mesh(name: str, folder: Path) -> ObjectLibrary:
     household = load_library("household")
     shutil.copytree(household.root, folder)
     entry = household.entry(name)
-    contact, _ = contact_geometry("mesh", household.surface(name), True, [], folder / name)
+    contact = contact_geometry("mesh", household.surface(name), True, [], folder / name)
     pieces = [Path(p).relative_to(name).as_posix() for p in entry.pieces]
     text = model_sdf(name, entry.mass_properties, entry.friction, "mesh.obj", pieces, contact)
     (folder / entry.sdf).write_text(text)

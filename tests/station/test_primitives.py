@@ -36,7 +36,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     objects = {}
     for name in ("can", "marble", "box"):
         entry, surface = household.entry(name), household.surface(name)
-        contact, _ = contact_geometry("primitive", surface, True, [], folder)
+        contact = contact_geometry("primitive", surface, True, [], folder)
         text = model_sdf(name, entry.mass_properties, entry.friction, "mesh.obj", [], contact)
         (folder / "library" / entry.sdf).write_text(text)
         objects[name] = dataclasses.replace(entry, contact=contact)

@@ -20,8 +20,8 @@ from burg_drake.ui import (
     footprint,
     html_table,
     issues_html,
-    join_html,
     notice_html,
+    paragraph,
     scene_names,
     sheet_picture,
     shortcut_list_html,
@@ -75,8 +75,8 @@ def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: 
 def test_what_cannot_be_checked_is_not_called_sound(tmp_path: Path) -> None:
     with ComposeSession.open("household", load_station("wsg_tabletop"), folder=tmp_path) as session:
         view = session.do(AddObject("mug"))
-    assert "free and supported" in join_html(*issues_html(view))
-    text = join_html(*issues_html(replace(view, status={"mug": "unknown"})))
+    assert "free and supported" in paragraph(*issues_html(view))
+    text = paragraph(*issues_html(replace(view, status={"mug": "unknown"})))
     assert "cannot be checked: mug" in text and "supported" not in text
 
 

@@ -98,7 +98,9 @@ def test_a_label_is_as_wide_as_its_text() -> None:
 
 def test_a_label_reads_upright() -> None:
     gltf = document(label_mesh(("L",), 0.02)[0])
-    image = Image.open(io.BytesIO(data_of(gltf["images"][0]["uri"]))).convert("LA")
+    view = gltf["bufferViews"][gltf["images"][0]["bufferView"]]
+    data = data_of(gltf["buffers"][view["buffer"]]["uri"])
+    image = Image.open(io.BytesIO(data)).convert("LA")
     ink = np.asarray(image)[..., 1].astype(float)
     rows, columns = np.nonzero(ink > 100)
     assert ink[rows.max()].sum() > 2 * ink[rows.min()].sum()  # the foot of the L is below

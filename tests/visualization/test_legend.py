@@ -13,7 +13,7 @@ from burg_drake.visualization import (
     HISTOGRAM_HEIGHT,
     ColorBar,
     LegendEntry,
-    legend_html,
+    page_panel,
 )
 
 BAR = ColorBar(
@@ -31,7 +31,7 @@ def rects(html: str) -> list[dict[str, str]]:
 
 
 def test_histogram_is_in_proportion() -> None:
-    drawn = rects(BAR.html())
+    drawn = rects(BAR.picture())
     heights = [float(r["height"]) for r in drawn[::2]]
     assert heights == pytest.approx([0.0, HISTOGRAM_HEIGHT, HISTOGRAM_HEIGHT / 2, 0.0])
     feet = {float(r["y"]) + float(r["height"]) for r in drawn[::2]}
@@ -39,7 +39,7 @@ def test_histogram_is_in_proportion() -> None:
 
 
 def test_bar_has_every_color_side_by_side() -> None:
-    drawn = rects(BAR.html())[1::2]
+    drawn = rects(BAR.picture())[1::2]
     assert [r["fill"] for r in drawn] == list(BAR.colors)
     edges = [float(r["x"]) for r in drawn]
     widths = [float(r["width"]) for r in drawn]
@@ -48,7 +48,7 @@ def test_bar_has_every_color_side_by_side() -> None:
 
 
 def test_ticks_are_below_their_places() -> None:
-    found = re.findall(r'<text x="([\d.]+)"[^>]*>([^<]*)</text>', BAR.html())
+    found = re.findall(r'<text x="([\d.]+)"[^>]*>([^<]*)</text>', BAR.picture())
     assert found == [
         (f"{BAR_MARGIN:.1f}", "≤ 0"),
         (f"{BAR_MARGIN + BAR_WIDTH / 2:.1f}", "1"),
@@ -60,7 +60,7 @@ def test_no_text_of_a_bar_meets_the_next() -> None:
     """Digits are 7 pixel wide in the widest usual font, DejaVu Sans of 11 pixel."""
     values = ["0.002", "0.004", "0.006", "0.008", "0.01", "0.012", "0.014"]
     ticks = tuple((k / 6, text) for k, text in enumerate(values))
-    html = dataclasses.replace(BAR, ticks=ticks).html()
+    html = dataclasses.replace(BAR, ticks=ticks).picture()
     texts = re.findall(r'<text x="([\d.]+)" y="\d+"(?: style="text-anchor: (\w+)")?>([^<]*)<', html)
     shift = {"start": 0.0, "": 0.5, "end": 1.0}
     begins = [float(x) - shift[anchor] * 7 * len(text) for x, anchor, text in texts]
@@ -70,7 +70,7 @@ def test_no_text_of_a_bar_meets_the_next() -> None:
 
 
 def test_text_is_escaped_and_paths_are_there() -> None:
-    html = legend_html([BAR, LegendEntry("<i>&", "#123456", ("/g/unknown",))])
+    html = page_panel("t", [], [BAR, LegendEntry("<i>&", "#123456", ("/g/unknown",))])
     assert "<b>" not in html and "clearance [m] &lt;b&gt;" in html
     assert "&lt;i&gt;&amp;" in html
     assert 'data-paths="/g/0 /g/1 /g/2 /g/3"' in html
@@ -80,4 +80,4 @@ def test_text_is_escaped_and_paths_are_there() -> None:
 
 def test_all_counts_zero() -> None:
     empty = ColorBar("x", ("#000000",), (0,), ((0.0, "0"), (1.0, "1")), ("/g/0",))
-    assert float(rects(empty.html())[0]["height"]) == 0.0
+    assert float(rects(empty.picture())[0]["height"]) == 0.0

@@ -78,7 +78,8 @@ def test_view_and_panel_are_beside_each_other(page: str) -> None:
 
 
 def test_narrow_views_show_as_much_as_the_narrowest_that_cameras_are_aimed_for(page: str) -> None:
-    assert "Math.min(1, pane.offsetWidth / pane.offsetHeight / 1.2)" in page
+    assert 'data-aspect="1.2"' in page
+    assert "Math.min(1, pane.offsetWidth / pane.offsetHeight / narrowestAspect)" in page
 
 
 def test_legend_is_escaped() -> None:

@@ -8,19 +8,8 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import (
-    MAX_PAGE_CONNECTIONS,
-    Parser,
-    add_live_camera,
-    add_measured_board,
-    add_page_options,
-    add_scene,
-    examples_text,
-    intrinsics_from_options,
-    print_scale_from_options,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.options.values import positive, positive_int
+from burg_drake import cameras
+from burg_drake.apps import options
 from burg_drake.apps.terminal import (
     ignore_interrupts,
     open_in_browser,
@@ -29,44 +18,35 @@ from burg_drake.apps.terminal import (
 )
 
 if TYPE_CHECKING:
-    from burg_drake.cameras import FrameSource, Intrinsics, LiveSession, ViewActions
     from burg_drake.scene import Scene
 
 
-def add_ar_options(parser: Parser) -> None:
+def add_ar_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake ar`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake ar my_scene.yaml --camera 0 --intrinsics camera.yaml",
         "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml",
         "burg-drake ar tabletop_six --camera sim:panda_tabletop/board",
         "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml --no-browser"
         " --check --snapshot trial_7",
     )
-    add_scene(parser)
-    parser.add_argument(
-        "--camera",
-        metavar="SOURCE",
-        default="0",
-        help="camera number, stream address, video, image, folder of images, or"
-        " sim:STATION/CAMERA (default: %(default)s)",
-    )
-    add_live_camera(parser)
-    add_measured_board(parser)
+    options.add_scene(parser)
+    options.add_live_camera(parser, " (default: %(default)s)", default="0")
     _add_view_options(parser)
     _add_result_options(parser)
 
 
 def _add_view_options(parser: Any) -> None:
-    from burg_drake.cameras import OverlayStyle
-
     view = parser.add_argument_group("view")
-    add_settings_options(view, OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True)
-    add_page_options(view, "all computers and tablets of the network can use it")
+    options.add_settings_options(
+        view, cameras.OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True
+    )
+    options.add_page_options(view, "all computers and tablets of the network can use it")
     view.add_argument(
         "--connections",
-        type=positive_int,
+        type=options.positive_int,
         metavar="N",
-        default=MAX_PAGE_CONNECTIONS,
+        default=options.MAX_PAGE_CONNECTIONS,
         help="largest number of connections; a browser takes two to six (default: %(default)s)",
     )
     view.add_argument(
@@ -92,8 +72,12 @@ def _add_result_options(parser: Any) -> None:
         action="store_true",
         help="at the end, measure how far objects are from their targets",
     )
-    results.add_argument("--frames", type=positive_int, metavar="N", help="end after N images")
-    results.add_argument("--seconds", type=positive, metavar="N", help="end after N seconds")
+    results.add_argument(
+        "--frames", type=options.positive_int, metavar="N", help="end after N images"
+    )
+    results.add_argument(
+        "--seconds", type=options.positive, metavar="N", help="end after N seconds"
+    )
     results.add_argument(
         "-o",
         "--output",
@@ -105,14 +89,13 @@ def _add_result_options(parser: Any) -> None:
 
 def run_ar(arguments: argparse.Namespace) -> int:
     """Looks at frames until told to end; 1 if a script's frames had no pose."""
-    from burg_drake.cameras import open_source
     from burg_drake.scene import load_scene
 
     scene = load_scene(arguments.scene)
     _require_writable_outputs(arguments)
-    intrinsics = intrinsics_from_options(arguments)
+    intrinsics = options.intrinsics_from_options(arguments)
     size = (intrinsics.width, intrinsics.height)  # a camera of this computer gives what was asked
-    source = open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
+    source = cameras.open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
     with sigterm_as_interrupt():
         try:
             live, actions = _create_session(arguments, scene, intrinsics, source)
@@ -122,7 +105,9 @@ def run_ar(arguments: argparse.Namespace) -> int:
         return _run_live_view(arguments, live, actions)
 
 
-def _run_live_view(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions) -> int:
+def _run_live_view(
+    arguments: argparse.Namespace, live: cameras.LiveSession, actions: cameras.ViewActions
+) -> int:
     from burg_drake.apps.live_view import finish_script, placement_exit_code
 
     scripted = _is_scripted(arguments)
@@ -151,7 +136,7 @@ def _run_live_view(arguments: argparse.Namespace, live: LiveSession, actions: Vi
     return placement_exit_code(live) if scripted else 0
 
 
-def _print_how_to_stop(arguments: argparse.Namespace, live: LiveSession) -> None:
+def _print_how_to_stop(arguments: argparse.Namespace, live: cameras.LiveSession) -> None:
     """Of a script that looks at a source without end, until somebody ends it."""
     limited = arguments.frames or arguments.seconds
     if arguments.no_browser and live.source.live and not limited:
@@ -168,8 +153,8 @@ def _is_scripted(arguments: argparse.Namespace) -> bool:
 
 def _serve_live_view(
     arguments: argparse.Namespace,
-    live: LiveSession,
-    actions: ViewActions,
+    live: cameras.LiveSession,
+    actions: cameras.ViewActions,
     closing: contextlib.ExitStack,
 ) -> None:
     """Serves the page until all is closed."""
@@ -188,41 +173,35 @@ def _serve_live_view(
 
 
 def _create_session(
-    arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics, source: FrameSource
-) -> tuple[LiveSession, ViewActions]:
+    arguments: argparse.Namespace,
+    scene: Scene,
+    intrinsics: cameras.Intrinsics,
+    source: cameras.FrameSource,
+) -> tuple[cameras.LiveSession, cameras.ViewActions]:
     idle_timeout = 3.0  # Seconds without a request after which no frames are processed.
-    from burg_drake.cameras import (
-        EventLog,
-        FrameProcessor,
-        LiveSession,
-        OverlayStyle,
-        ViewActions,
-        ViewSettings,
-    )
 
-    style = settings_from(arguments, OverlayStyle)
+    style = options.settings_from(arguments, cameras.OverlayStyle)
     always = _is_scripted(arguments) or arguments.check or arguments.snapshot
-    live = LiveSession(
-        FrameProcessor(
-            scene, intrinsics, print_scale=print_scale_from_options(arguments), style=style
+    live = cameras.LiveSession(
+        cameras.FrameProcessor(
+            scene, intrinsics, print_scale=options.print_scale_from_options(arguments), style=style
         ),
         source,
-        events=EventLog(lambda event: print_remark(event.text)),
-        settings=ViewSettings(opacity=style.opacity),
+        events=cameras.EventLog(lambda event: print_remark(event.text)),
+        settings=cameras.ViewSettings(opacity=style.opacity),
         paced=not arguments.no_browser,
         idle_after=math.inf if always else idle_timeout,
     )
-    return live, ViewActions(live, arguments.output, plain=arguments.plain)
+    return live, cameras.ViewActions(live, arguments.output, plain=arguments.plain)
 
 
 def _require_writable_outputs(arguments: argparse.Namespace) -> None:
     """Refuses results that cannot be written, before anything else is done."""
-    from burg_drake.cameras import require_new_folder, require_video_path
     from burg_drake.core import ensure_writable_folder
 
     if arguments.record is not None:
-        require_video_path(arguments.record, plain=arguments.plain)
+        cameras.require_video_path(arguments.record, plain=arguments.plain)
     if arguments.snapshot is not None:
-        require_new_folder(arguments.snapshot)
+        cameras.require_new_folder(arguments.snapshot)
     if not arguments.no_browser:
         ensure_writable_folder(arguments.output)

@@ -5,22 +5,17 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from burg_drake import cameras, core
+from burg_drake.apps import options
 from burg_drake.apps.commands.printout import add_target_board_options, target_from_options
-from burg_drake.apps.options.arguments import Parser, add_output, examples_text
-from burg_drake.apps.options.values import input_file, positive_int, two_numbers
-from burg_drake.apps.terminal import print_remark
-
-if TYPE_CHECKING:
-    from burg_drake.cameras import Calibration, CharucoTarget, CharucoView, FrameSource, Intrinsics
+from burg_drake.apps.terminal import print_remark, show_progress
 
 
-def print_intrinsics(intrinsics: Intrinsics) -> None:
+def print_intrinsics(intrinsics: cameras.Intrinsics) -> None:
     """Prints a camera's figures."""
     import numpy as np
-
-    from burg_drake.cameras import describe_accuracy
 
     k = intrinsics
     title = f"{k.camera}: " if k.camera else ""
@@ -50,10 +45,10 @@ def print_intrinsics(intrinsics: Intrinsics) -> None:
     if k.residual is not None:
         print(f"residual         {k.residual:.3f} pixels")
     if k.known_to is not None:
-        print(f"known            {describe_accuracy(k.known_to, k.except_at)}")
+        print(f"known            {cameras.describe_accuracy(k.known_to, k.except_at)}")
 
 
-def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:
+def field_of_view(intrinsics: cameras.Intrinsics) -> tuple[float, float, float]:
     """Angle between what opposite edges see, across and down, and opposite corners [rad]."""
     import numpy as np
 
@@ -69,9 +64,9 @@ def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:
     return angles[0], angles[1], angles[2]
 
 
-def add_camera_calibrate_options(calibrate: Parser) -> None:
+def add_camera_calibrate_options(calibrate: options.Parser) -> None:
     """Adds the options of `burg-drake camera calibrate`."""
-    calibrate.epilog = examples_text(
+    calibrate.epilog = options.examples_text(
         "burg-drake camera calibrate photos/*.jpg -o K.yaml --report calibration.html",
         "burg-drake camera calibrate --camera 0 --size 1280x720 -o K.yaml",
         "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
@@ -89,17 +84,17 @@ def add_camera_calibrate_options(calibrate: Parser) -> None:
         "--camera", metavar="CAMERA", help="take the views live: 0, /dev/video0, rtsp://..."
     )
     calibrate.add_argument(
-        "--size", metavar="WxH", type=two_numbers, help="image size of the live camera"
+        "--size", metavar="WxH", type=options.two_numbers, help="image size of the live camera"
     )
     calibrate.add_argument(
         "--views",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         default=20,
         help="number of live views (default: %(default)s); Ctrl-C ends earlier",
     )
     calibrate.add_argument("--save-views", metavar="FOLDER", help="save the live images here")
-    add_output(calibrate, "FILE", "intrinsics file to write (.yaml)")
+    options.add_output(calibrate, "FILE", "intrinsics file to write (.yaml)")
     calibrate.add_argument(
         "--report", metavar="FILE", help="page with all residuals to write (.html)"
     )
@@ -120,27 +115,24 @@ def add_camera_calibrate_options(calibrate: Parser) -> None:
 
 def run_camera_calibrate(arguments: argparse.Namespace) -> int:
     """Calibrates; 1 if the result is of little use."""
-    from burg_drake.cameras import calibrate_views, calibration_advice, is_useless, open_source
-    from burg_drake.core import InvalidInputError, require_writable
-
     if bool(arguments.images) == bool(arguments.camera):
-        raise InvalidInputError("give images of the target, or --camera; not both")
+        raise core.InvalidInputError("give images of the target, or --camera; not both")
     for output in (arguments.output, arguments.report):
         if output:
-            require_writable(output)
+            core.require_writable(output)
     target = target_from_options(arguments)
-    with open_source(arguments.camera or arguments.images, size=arguments.size) as source:
+    with cameras.open_source(arguments.camera or arguments.images, size=arguments.size) as source:
         views, rejected = (
             _views_from_camera(source, target, arguments)
             if arguments.camera
             else _views_from_photos(source, target)
         )
-    calibration = calibrate_views(views, target, model=arguments.model, rejected=rejected)
+    calibration = cameras.calibrate_views(views, target, model=arguments.model, rejected=rejected)
     _print_calibration(calibration)
-    lines = calibration_advice(calibration)
+    lines = cameras.calibration_advice(calibration)
     for line in lines:
         print_remark(line)
-    useless = is_useless(calibration)
+    useless = cameras.is_useless(calibration)
     if arguments.report:
         from burg_drake.visualization import write_calibration_report
 
@@ -156,39 +148,33 @@ def run_camera_calibrate(arguments: argparse.Namespace) -> int:
     return 1 if useless else 0
 
 
-def _save_calibration(calibration: Calibration, arguments: argparse.Namespace) -> None:
+def _save_calibration(calibration: cameras.Calibration, arguments: argparse.Namespace) -> None:
     import dataclasses
-
-    from burg_drake.cameras import save_intrinsics
 
     intrinsics = dataclasses.replace(calibration.intrinsics, camera=arguments.name)
     header = (
         f"burg-drake camera calibrate: {len(calibration.views)} views, lens model"
-        f" {calibration.model}\nIn 19 of 20 cases the camera is {calibration.promise}."
+        f" {calibration.model}\nIn 19 of 20 cases the camera is {calibration.accuracy}."
     )
-    save_intrinsics(intrinsics, arguments.output, header)
+    cameras.save_intrinsics(intrinsics, arguments.output, header)
     print(f"wrote {arguments.output}")
 
 
 def _views_from_photos(
-    source: FrameSource, target: CharucoTarget
-) -> tuple[list[CharucoView], list[tuple[str, str]]]:
+    source: cameras.FrameSource, target: cameras.CharucoTarget
+) -> tuple[list[cameras.CharucoView], list[tuple[str, str]]]:
     """Looks for the target in photos."""
-    from burg_drake.cameras import find_target
-    from burg_drake.core import InvalidInputError, Progress, ProgressMeter, Reporter
-
     views, rejected = [], []
-    with Reporter(True) as reporter:
-        pace = ProgressMeter(reporter.show, Progress("looking for the target", unit="images"))
+    with show_progress("looking for the target", "images") as pace:
         while True:
             try:
                 frame = source.read()
-            except InvalidInputError as error:
+            except core.InvalidInputError as error:
                 rejected.append(("", str(error)))
                 continue
             if frame is None:
                 break
-            found = find_target(frame.image, target, frame.name)
+            found = cameras.find_target(frame.image, target, frame.name)
             if isinstance(found, str):
                 rejected.append((frame.name, found))
             else:
@@ -198,22 +184,19 @@ def _views_from_photos(
 
 
 def _views_from_camera(
-    source: FrameSource, target: CharucoTarget, arguments: argparse.Namespace
-) -> tuple[list[CharucoView], list[tuple[str, str]]]:
+    source: cameras.FrameSource, target: cameras.CharucoTarget, arguments: argparse.Namespace
+) -> tuple[list[cameras.CharucoView], list[tuple[str, str]]]:
     """Takes views from a camera until there are enough, it ends, or Ctrl-C."""
     from pathlib import Path
 
-    from burg_drake.cameras import CameraLost, ViewCollector, write_image
-    from burg_drake.core import ensure_writable_folder
-
-    folder = arguments.save_views and ensure_writable_folder(arguments.save_views)
-    collector = ViewCollector(target)
+    folder = arguments.save_views and core.ensure_writable_folder(arguments.save_views)
+    collector = cameras.ViewCollector(target)
     said, enough = "", False
     try:
         while len(collector.views) < arguments.views:
             try:
                 frame = source.read()
-            except CameraLost as error:
+            except cameras.CameraLost as error:
                 word = str(error)
             else:
                 if frame is None:
@@ -221,7 +204,7 @@ def _views_from_camera(
                 taken, word = collector.add_frame(frame)
                 if taken and folder:
                     number = len(collector.views)
-                    write_image(Path(folder) / f"view_{number:03d}.png", frame.image)
+                    cameras.write_image(Path(folder) / f"view_{number:03d}.png", frame.image)
             line = f"{len(collector.views)} of {arguments.views} views: {word}"
             if line != said:
                 print(line, file=sys.stderr, flush=True)
@@ -234,27 +217,24 @@ def _views_from_camera(
     return collector.views, []
 
 
-def _print_calibration(calibration: Calibration) -> None:
+def _print_calibration(calibration: cameras.Calibration) -> None:
     """Prints views, what was left out, parameters and where the image was covered."""
-    from burg_drake.cameras import IMAGE_PARTS, corner_coverage
-    from burg_drake.core import TextTable, format_number
-
-    table = TextTable("views").names("image")
+    table = core.TextTable("views").names("image")
     table.numbers("corners", "rms [px]", "worst [px]", "tilt [deg]", "blur [px]")
     for used in calibration.views:
         worst = float(max((used.residuals**2).sum(axis=1)) ** 0.5)
         table.row(
             used.view.name,
             str(len(used.view.ids)),
-            format_number(used.rms, 3),
-            format_number(worst, 2),
-            format_number(math.degrees(used.tilt), 0),
-            format_number(used.view.blur, 2),
+            core.format_number(used.rms, 3),
+            core.format_number(worst, 2),
+            core.format_number(math.degrees(used.tilt), 0),
+            core.format_number(used.view.blur, 2),
         )
     table.show()
     for name, reason in calibration.rejected:
         print(f"left out: {name} {reason}".replace(":  ", ": "))
-    table = TextTable(f"lens model {calibration.model}").texts("parameter")
+    table = core.TextTable(f"lens model {calibration.model}").texts("parameter")
     table.numbers("value", "standard deviation")
     for name, (value, deviation) in calibration.parameters.items():
         table.row(name, f"{value:.6g}", f"{deviation:.2g}")
@@ -262,34 +242,34 @@ def _print_calibration(calibration: Calibration) -> None:
     table.show()
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     print("corners seen in each part of the image")
-    for row in corner_coverage([used.view for used in calibration.views], size):
+    for row in cameras.corner_coverage([used.view for used in calibration.views], size):
         print("  " + " ".join(f"{count:4d}" for count in row))
     print()
     print_intrinsics(calibration.intrinsics)
     print(f"target           bulges by {1e3 * calibration.bulge:.2f} mm")
     print("known, in 19 of 20 cases, to so many pixels")
-    parts = calibration.promise.parts
-    for row in (IMAGE_PARTS[:3], IMAGE_PARTS[3:6], IMAGE_PARTS[6:]):
-        words = (f"{name} {calibration.promise.bound(name)}" for name in row if name in parts)
+    parts = calibration.accuracy.parts
+    for row in (cameras.IMAGE_PARTS[:3], cameras.IMAGE_PARTS[3:6], cameras.IMAGE_PARTS[6:]):
+        words = (f"{name} {calibration.accuracy.bound(name)}" for name in row if name in parts)
         print("  " + ", ".join(words))
 
 
-def add_camera_list_options(parser: Parser) -> None:
+def add_camera_list_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake camera list`."""
-    parser.epilog = examples_text("burg-drake camera list")
+    parser.epilog = options.examples_text("burg-drake camera list")
 
 
-def add_camera_show_options(show: Parser) -> None:
+def add_camera_show_options(show: options.Parser) -> None:
     """Adds the options of `burg-drake camera show`."""
-    show.epilog = examples_text(
+    show.epilog = options.examples_text(
         "burg-drake camera show K.yaml", "burg-drake camera show sim:panda_tabletop/board"
     )
     _add_intrinsics_argument(show)
 
 
-def add_camera_convert_options(convert: Parser) -> None:
+def add_camera_convert_options(convert: options.Parser) -> None:
     """Adds the options of `burg-drake camera convert`."""
-    convert.epilog = examples_text(
+    convert.epilog = options.examples_text(
         "burg-drake camera convert K.yaml --to ros -o camera_info.yaml",
         "burg-drake camera convert camera_info.yaml -o K.yaml",
         "burg-drake camera convert opencv_calibration.yml -o K.yaml",
@@ -301,24 +281,22 @@ def add_camera_convert_options(convert: Parser) -> None:
         default="burg",
         help="format to write (default: %(default)s)",
     )
-    add_output(convert, "FILE", "file to write")
+    options.add_output(convert, "FILE", "file to write")
 
 
 def _add_intrinsics_argument(parser: Any) -> None:
     parser.add_argument(
         "intrinsics",
         metavar="INTRINSICS",
-        type=input_file,
+        type=options.input_file,
         help="intrinsics file (ours, ROS's camera_info, OpenCV's), or sim:STATION/CAMERA",
     )
 
 
 def run_camera_list(arguments: argparse.Namespace) -> int:
     """Prints the cameras that open; 1 if there are none."""
-    from burg_drake.cameras import open_devices
-
     found = 0
-    for name, (width, height) in open_devices():
+    for name, (width, height) in cameras.open_devices():
         print(f"camera {name}: {width} x {height} pixels")
         found += 1
     if not found:
@@ -331,18 +309,14 @@ def run_camera_list(arguments: argparse.Namespace) -> int:
 
 def run_camera_show(arguments: argparse.Namespace) -> int:
     """Prints intrinsics."""
-    from burg_drake.cameras import load_intrinsics
-
-    print_intrinsics(load_intrinsics(arguments.intrinsics))
+    print_intrinsics(cameras.load_intrinsics(arguments.intrinsics))
     return 0
 
 
 def run_camera_convert(arguments: argparse.Namespace) -> int:
     """Writes intrinsics in another format."""
-    from burg_drake.cameras import load_intrinsics, save_camera_info, save_intrinsics
-
-    intrinsics = load_intrinsics(arguments.intrinsics)
-    save = save_camera_info if arguments.to == "ros" else save_intrinsics
+    intrinsics = cameras.load_intrinsics(arguments.intrinsics)
+    save = cameras.save_camera_info if arguments.to == "ros" else cameras.save_intrinsics
     save(intrinsics, arguments.output)
     print(f"wrote {arguments.output}")
     return 0

@@ -8,41 +8,30 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_depth_unit,
-    add_intrinsics,
-    add_measured_board,
-    add_output,
-    add_scene,
-    add_station,
-    examples_text,
-    print_scale_from_options,
-)
+from burg_drake import cameras, core
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_warning
-from burg_drake.core import TextTable, format_number
 
 if TYPE_CHECKING:
-    from burg_drake.cameras import ExtraObject, Intrinsics, Placement, PlacementCheck
     from burg_drake.scene import Scene
 
 
-def add_camera_locate_options(parser: Parser) -> None:
+def add_camera_locate_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake camera locate`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake camera locate tabletop_six photo.png --intrinsics K.yaml --station my.yaml",
         "burg-drake camera locate tabletop_six photos/ --intrinsics K.yaml --name top",
     )
-    add_scene(parser)
+    options.add_scene(parser)
     parser.add_argument(
         "photos",
         metavar="PHOTO",
         nargs="+",
         help="photos of the board from the same place, or a folder of them",
     )
-    add_intrinsics(parser, required=True)
-    add_measured_board(parser)
-    add_station(parser)
+    options.add_intrinsics(parser, required=True)
+    options.add_measured_board(parser)
+    options.add_station(parser)
     parser.add_argument(
         "--name", metavar="NAME", default="board", help="name of the camera (default: %(default)s)"
     )
@@ -52,31 +41,23 @@ def run_camera_locate(arguments: argparse.Namespace) -> int:
     """Prints the camera's lines, and to stderr how far they can be trusted."""
     import numpy as np
 
-    from burg_drake.cameras import (
-        BoardPose,
-        image_paths,
-        load_intrinsics,
-        locate_camera,
-        read_image,
-    )
-    from burg_drake.core import dump_document
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station
 
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    intrinsics = load_intrinsics(arguments.intrinsics)
+    intrinsics = cameras.load_intrinsics(arguments.intrinsics)
     scene.require_markers()
-    pose = BoardPose(scene.board, intrinsics, print_scale_from_options(arguments))
+    pose = cameras.BoardPose(scene.board, intrinsics, options.print_scale_from_options(arguments))
     estimates = []
-    for photo in image_paths(arguments.photos):
-        image = read_image(photo)
+    for photo in cameras.image_paths(arguments.photos):
+        image = cameras.read_image(photo)
         intrinsics.require_size(image.shape[1], image.shape[0], str(photo))
         estimate = pose.estimate(image)
         estimates.append(estimate)
         figures = f"{len(estimate.ids)} markers, {estimate.reprojection_error:.2f} pixels"
         notes = [figures] if estimate.valid else []
         print(f"{photo}: {', '.join([*notes, *filter(None, [estimate.reason])])}", file=sys.stderr)
-    located = locate_camera(station, estimates, intrinsics)
+    located = cameras.locate_camera(station, estimates, intrinsics)
     if sum(e.valid for e in estimates) > 1:
         distance, angle = located.apart
         print(
@@ -86,13 +67,13 @@ def run_camera_locate(arguments: argparse.Namespace) -> int:
         )
     if not intrinsics.is_pinhole:
         print("a station's camera has no lens distortion: undistort its images", file=sys.stderr)
-    print(dump_document({"cameras": {arguments.name: located.camera}}), end="")
+    print(core.dump_document({"cameras": {arguments.name: located.camera}}), end="")
     return 0
 
 
-def add_camera_placement_options(parser: Parser) -> None:
+def add_camera_placement_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake camera placement`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake camera placement tabletop_six photo.png --intrinsics K.yaml",
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml -o placement.yaml",
         "burg-drake camera placement scene.yaml left.png right.png --intrinsics K.yaml",
@@ -101,20 +82,20 @@ def add_camera_placement_options(parser: Parser) -> None:
         "Exit code 1 if an object is not seen, a measurement is doubtful, or something else"
         " stands there; 2 if a photo does not show the board.",
     )
-    add_scene(parser)
+    options.add_scene(parser)
     parser.add_argument(
         "photo",
         metavar="PHOTO",
         nargs="+",
         help="photo of the scene on its board; several are measured together",
     )
-    add_intrinsics(parser, required=True)
-    add_measured_board(parser)
+    options.add_intrinsics(parser, required=True)
+    options.add_measured_board(parser)
     parser.add_argument(
         "--depth", metavar="FILE", help="depth image of the same camera (16-bit .png, or .npy)"
     )
-    add_depth_unit(parser)
-    add_output(parser, "FILE", "placement file to write (.yaml)", required=False)
+    options.add_depth_unit(parser)
+    options.add_output(parser, "FILE", "placement file to write (.yaml)", required=False)
     parser.add_argument(
         "--overlay", metavar="FILE", help="picture to write: the photo with targets and errors"
     )
@@ -122,78 +103,58 @@ def add_camera_placement_options(parser: Parser) -> None:
 
 def run_camera_placement(arguments: argparse.Namespace) -> int:
     """Measures, prints a line an object, and writes what is asked for."""
-    from burg_drake.cameras import (
-        Overlay,
-        OverlayStyle,
-        combine_checks,
-        load_intrinsics,
-        read_image,
-        require_image_format,
-        save_placement,
-        write_image,
-    )
-    from burg_drake.core import InvalidInputError, require_writable
     from burg_drake.scene import load_scene
 
     for path in filter(None, (arguments.output, arguments.overlay)):
-        require_writable(path)
+        core.require_writable(path)
     if arguments.overlay:
-        require_image_format(arguments.overlay)
+        cameras.require_image_format(arguments.overlay)
     if arguments.depth and len(arguments.photo) > 1:
-        raise InvalidInputError("--depth belongs to one photo; give one alone")
-    scene, intrinsics = load_scene(arguments.scene), load_intrinsics(arguments.intrinsics)
+        raise core.InvalidInputError("--depth belongs to one photo; give one alone")
+    scene, intrinsics = load_scene(arguments.scene), cameras.load_intrinsics(arguments.intrinsics)
     scene.require_markers()
     checks = [_check_photo(path, scene, intrinsics, arguments) for path in arguments.photo]
-    check = combine_checks(checks) if len(checks) > 1 else checks[0]
+    check = cameras.combine_checks(checks) if len(checks) > 1 else checks[0]
     placement_table(check.instances).show()
     for extra in check.extra:
         print(extra_object_line(extra))
     if arguments.output:
-        save_placement(check, arguments.output)
+        cameras.save_placement(check, arguments.output)
         print(f"wrote {arguments.output}")
     if arguments.overlay:
         assert check.camera is not None
-        overlay = Overlay(scene, check.intrinsics, OverlayStyle(opacity=0.15))
-        photo, X_SC = read_image(arguments.photo[0]), check.camera.X_SC.matrix()
-        write_image(arguments.overlay, overlay.draw(photo, X_SC, placement=check))
+        overlay = cameras.Overlay(scene, check.intrinsics, cameras.OverlayStyle(opacity=0.15))
+        photo, X_SC = cameras.read_image(arguments.photo[0]), check.camera.X_SC.matrix()
+        cameras.write_image(arguments.overlay, overlay.draw(photo, X_SC, placement=check))
         print(f"wrote {arguments.overlay}")
     whole = all(p.status == "measured" for p in check.instances.values())
     return 0 if whole and not check.extra else 1
 
 
 def _check_photo(
-    path: str, scene: Scene, intrinsics: Intrinsics, arguments: argparse.Namespace
-) -> PlacementCheck:
+    path: str, scene: Scene, intrinsics: cameras.Intrinsics, arguments: argparse.Namespace
+) -> cameras.PlacementCheck:
     """The check of one photo."""
-    from burg_drake.cameras import (
-        BoardPose,
-        check_placement,
-        describe_image_file,
-        read_depth,
-        read_image,
-    )
-    from burg_drake.core import InvalidInputError
-
-    photo = read_image(path)
+    photo = cameras.read_image(path)
     intrinsics.require_size(photo.shape[1], photo.shape[0], path)
     depth = None
     if arguments.depth:
-        depth = read_depth(arguments.depth, arguments.depth_unit)
+        depth = cameras.read_depth(arguments.depth, arguments.depth_unit)
         intrinsics.require_size(depth.shape[1], depth.shape[0], arguments.depth)
-    scale = print_scale_from_options(arguments)
-    estimate = BoardPose(scene.board, intrinsics, scale).estimate(photo, depth=depth)
-    check = check_placement(
+    scale = options.print_scale_from_options(arguments)
+    estimate = cameras.BoardPose(scene.board, intrinsics, scale).estimate(photo, depth=depth)
+    check = cameras.check_placement(
         scene,
         photo,
         intrinsics,
         depth=depth,
         estimate=estimate,
         scale=scale,
-        image_source=describe_image_file(path),
-        depth_source=describe_image_file(arguments.depth) if arguments.depth else None,
+        image_source=cameras.describe_image_file(path),
+        depth_source=cameras.describe_image_file(arguments.depth) if arguments.depth else None,
     )
     if check.reason:
-        raise InvalidInputError(f"{path}: {check.reason}")
+        raise core.InvalidInputError(f"{path}: {check.reason}")
     if estimate.reason:
         print_warning(f"{path}: {estimate.reason}")
     seen, markers = len(estimate.ids), len(scene.board.layout.ids)
@@ -202,9 +163,9 @@ def _check_photo(
     return check
 
 
-def placement_table(placements: Mapping[str, Placement]) -> TextTable:
+def placement_table(placements: Mapping[str, cameras.Placement]) -> core.TextTable:
     """How far each object is off, a row an object."""
-    table = TextTable().names("object")
+    table = core.TextTable().names("object")
     table.numbers("off by\n[mm]", "x\n[mm]", "y\n[mm]", "±\n[mm]", "turned\n[deg]", "±\n[deg]")
     table.texts("remark")
     table.caption = "x, y: along the board's edges (scene frame S); ±: standard deviation"
@@ -213,7 +174,7 @@ def placement_table(placements: Mapping[str, Placement]) -> TextTable:
     return table
 
 
-def extra_object_line(extra: ExtraObject) -> str:
+def extra_object_line(extra: cameras.ExtraObject) -> str:
     """What to do about something that is no object of the scene."""
     x, y = (1e3 * c for c in extra.position)
     return (
@@ -222,13 +183,13 @@ def extra_object_line(extra: ExtraObject) -> str:
     )
 
 
-def _placement_cells(placement: Placement) -> list[str]:
+def _placement_cells(placement: cameras.Placement) -> list[str]:
     """What a placement says, in millimetres and degrees."""
     if placement.displacement is None or placement.displacement_sd is None:
         return ["-"] * 6 + [f"not seen: {placement.reason}"]
     x, y = (1e3 * d for d in placement.displacement)
-    distances = [format_number(value, 1) for value in (math.hypot(x, y), x, y)]
+    distances = [core.format_number(value, 1) for value in (math.hypot(x, y), x, y)]
     turn = [None if a is None else math.degrees(a) for a in (placement.angle, placement.angle_sd)]
-    deviation = format_number(1e3 * max(placement.displacement_sd), 1)
+    deviation = core.format_number(1e3 * max(placement.displacement_sd), 1)
     remark = f"uncertain: {placement.reason}" if placement.reason else ""
-    return [*distances, deviation, *(format_number(value, 1) for value in turn), remark]
+    return [*distances, deviation, *(core.format_number(value, 1) for value in turn), remark]

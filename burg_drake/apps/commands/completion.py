@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Iterable
 from typing import Any
 
-from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps import options
 
 BUILTIN_DATA_FOLDERS = {
     "scene": ("scenes",),
@@ -22,9 +22,9 @@ BUILTIN_DATA_FOLDERS = {
 """Folders of built-in data that an argument may name, by its name in the parsed arguments."""
 
 
-def add_completion_options(parser: Parser) -> None:
+def add_completion_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake completion`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         'eval "$(burg-drake completion bash)"',
         'eval "$(burg-drake completion zsh)"',
         "burg-drake completion fish | source",
@@ -44,7 +44,7 @@ def run_completion(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def complete_line(parser: Parser) -> None:
+def complete_line(parser: options.Parser) -> None:
     """Answers a shell that asks for completions, and ends the process.
 
     Args:
@@ -84,7 +84,7 @@ def _split_line(line: str) -> list[str]:
         return line.split()[1:]
 
 
-def _parsers_of_line(parser: Parser, words: Iterable[str]) -> Iterable[Parser]:
+def _parsers_of_line(parser: options.Parser, words: Iterable[str]) -> Iterable[options.Parser]:
     """The parsers of the commands that a line names, from that of the whole command on."""
     yield parser
     for word in words:

@@ -8,21 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake import core
+from burg_drake.apps import options
 from burg_drake.apps.commands.render import without_unavailable_colors
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_cluster,
-    add_output,
-    add_quiet,
-    add_station,
-    add_view_options,
-    add_workers,
-    examples_text,
-)
-from burg_drake.apps.options.settings_options import add_settings_options
-from burg_drake.apps.options.values import positive, positive_int
-from burg_drake.apps.terminal import print_remark, print_warning
-from burg_drake.core import InvalidInputError
+from burg_drake.apps.terminal import print_remark, print_warning, show_progress
 
 if TYPE_CHECKING:
     from burg_drake.dataset import DatasetRecipe, ReadableSamples
@@ -39,9 +28,9 @@ def warn_of_damage(samples: ReadableSamples) -> bool:
     return bool(samples.damaged)
 
 
-def add_dataset_show_options(parser: Parser) -> None:
+def add_dataset_show_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake dataset show`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake dataset show data",
         "burg-drake dataset show data --sample 000012_003 --html sample.html",
         "burg-drake dataset show data -o sheet.html",
@@ -49,18 +38,22 @@ def add_dataset_show_options(parser: Parser) -> None:
     )
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
     parser.add_argument("--sample", metavar="KEY", help="sample to show (default: the first)")
-    add_output(parser, "FILE", "write a sheet of samples (.png, .html)", required=False)
+    options.add_output(parser, "FILE", "write a sheet of samples (.png, .html)", required=False)
     parser.add_argument(
-        "--rows", metavar="N", type=positive_int, default=4, help="rows of the sheet (default: 4)"
+        "--rows",
+        metavar="N",
+        type=options.positive_int,
+        default=4,
+        help="rows of the sheet (default: 4)",
     )
     parser.add_argument(
         "--columns",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         default=1,
         help="columns of the sheet (default: 1)",
     )
-    add_view_options(parser)
+    options.add_view_options(parser)
 
 
 def run_dataset_show(arguments: argparse.Namespace) -> int:
@@ -77,7 +70,7 @@ def run_dataset_show(arguments: argparse.Namespace) -> int:
 
     dataset = load_dataset(arguments.data)
     if not len(dataset):
-        raise InvalidInputError(f"{arguments.data} has no samples to show")
+        raise core.InvalidInputError(f"{arguments.data} has no samples to show")
     samples, key = ReadableSamples(dataset), arguments.sample
     chosen = None if key is None else dataset[dataset.index(key)]
     rows, columns = arguments.rows, arguments.columns
@@ -109,9 +102,9 @@ EXPORT_FORMATS = {
 """Export formats, and the depth options that each takes."""
 
 
-def add_dataset_export_options(parser: Parser) -> None:
+def add_dataset_export_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake dataset export`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake dataset export data --to bop -o data_bop",
         "burg-drake dataset export data --to graspnet --sensor-depth -o data_graspnet",
         "",
@@ -119,7 +112,7 @@ def add_dataset_export_options(parser: Parser) -> None:
     )
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
     parser.add_argument("--to", required=True, choices=tuple(EXPORT_FORMATS), help="format")
-    add_output(parser, "FOLDER", "folder to write, new or empty")
+    options.add_output(parser, "FOLDER", "folder to write, new or empty")
     parser.add_argument(
         "--sensor-depth",
         action="store_true",
@@ -128,7 +121,7 @@ def add_dataset_export_options(parser: Parser) -> None:
     parser.add_argument(
         "--depth-unit",
         metavar="METRES",
-        type=positive,
+        type=options.positive,
         help="unit of depth images (default: 0.0001; graspnet: 0.001)",
     )
 
@@ -152,16 +145,16 @@ def run_dataset_export(arguments: argparse.Namespace) -> int:
         "webdataset": write_webdataset,
     }
     given = {"sensor_depth": arguments.sensor_depth or None, "depth_unit": arguments.depth_unit}
-    options = {name: value for name, value in given.items() if value is not None}
-    for name in options:
+    depth = {name: value for name, value in given.items() if value is not None}
+    for name in depth:
         if name not in EXPORT_FORMATS[arguments.to]:
             known = [one for one, taken in EXPORT_FORMATS.items() if name in taken]
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"{arguments.to} takes no {name.replace('_', ' ')}, which"
                 f" {' and '.join(known)} take"
             ).about(name)
     samples = ReadableSamples(load_dataset(arguments.data))
-    for remark in writers[arguments.to](samples, arguments.output, **options):
+    for remark in writers[arguments.to](samples, arguments.output, **depth):
         print_warning(remark)
     damaged = warn_of_damage(samples)
     written = len(samples) - sum(samples.damaged.values())
@@ -169,18 +162,18 @@ def run_dataset_export(arguments: argparse.Namespace) -> int:
     return int(damaged)
 
 
-def add_dataset_check_options(parser: Parser) -> None:
+def add_dataset_check_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake dataset check`."""
-    parser.epilog = examples_text("burg-drake dataset check data")
+    parser.epilog = options.examples_text("burg-drake dataset check data")
     parser.add_argument("data", metavar="DATA", help="folder of the data set")
 
 
-def add_dataset_generate_options(parser: Parser) -> None:
+def add_dataset_generate_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake dataset generate`."""
     from burg_drake.dataset import DatasetRecipe
     from burg_drake.scene import SceneRecipe
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake dataset generate --scenes 'scenes/*.yaml' --views 20 -o data",
         "burg-drake dataset generate --sample household:1000 -n 6 --workers 2 -o data",
         "burg-drake dataset generate --scenes tabletop_six --sensor d435 --grasps sample:100"
@@ -206,11 +199,11 @@ def add_dataset_generate_options(parser: Parser) -> None:
         "-n",
         metavar="N",
         dest="objects",
-        type=positive_int,
+        type=options.positive_int,
         help=f"objects in a sampled scene (default: {SceneRecipe.count})",
     )
-    add_station(parser)
-    add_output(parser, "DATA", "folder to write; the same command continues it")
+    options.add_station(parser)
+    options.add_output(parser, "DATA", "folder to write; the same command continues it")
     parser.add_argument(
         "--camera",
         metavar="NAME",
@@ -220,7 +213,7 @@ def add_dataset_generate_options(parser: Parser) -> None:
     for name in ("views", "sensor", "renderer", "normals", "colors", "seed"):
         default = getattr(DatasetRecipe(), name)
         shown = None if isinstance(default, bool) or default == "" else default
-        add_settings_options(parser, DatasetRecipe, name, unset=True, shown_default=shown)
+        options.add_settings_options(parser, DatasetRecipe, name, unset=True, shown_default=shown)
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -235,14 +228,13 @@ def add_dataset_generate_options(parser: Parser) -> None:
         "--recipe", metavar="FILE", help="YAML file with settings that have no option"
     )
     who = parser.add_mutually_exclusive_group()
-    add_workers(who, "worker processes (default: %(default)d)", default=1)
-    add_cluster(who)
-    add_quiet(parser)
+    options.add_workers(who, "worker processes (default: %(default)d)", default=1)
+    options.add_cluster(who)
+    options.add_quiet(parser)
 
 
 def run_dataset_generate(arguments: argparse.Namespace) -> int:
     """Writes a data set; 1 if some scenes have no samples."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter
     from burg_drake.dataset import generate_dataset, load_dataset
     from burg_drake.station import load_station
 
@@ -253,7 +245,7 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
         scenes, count, sampled = _parse_sample_option(arguments, recipe, station)
         recipe = replace(recipe, sampled=sampled)
     elif arguments.objects is not None:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"-n {arguments.objects} is for sampled scenes; leave it out, or give --sample"
         )
     else:
@@ -261,8 +253,7 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
         count = len(scenes)
     recipe = without_unavailable_colors(recipe, Path(arguments.output))
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
-    with Reporter(not arguments.quiet) as reporter:
-        pace = ProgressMeter(reporter.show, Progress("rendering", 0, count, unit="scenes"))
+    with show_progress("rendering", "scenes", count, quiet=arguments.quiet) as pace:
         found = generate_dataset(
             scenes,
             station,
@@ -282,13 +273,12 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
 
 
 def _recipe_from_options(arguments: argparse.Namespace) -> DatasetRecipe:
-    from burg_drake.core import declared_fields, load_document
     from burg_drake.dataset import DatasetRecipe
 
     recipe = DatasetRecipe()
     if arguments.recipe is not None:
-        recipe = load_document(Path(arguments.recipe), DatasetRecipe)
-    given = {name: getattr(arguments, name, None) for name in declared_fields(DatasetRecipe)}
+        recipe = core.load_document(Path(arguments.recipe), DatasetRecipe)
+    given = {name: getattr(arguments, name, None) for name in core.declared_fields(DatasetRecipe)}
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     values["normals"] = arguments.normals or recipe.normals
     values["colors"] = recipe.colors and not arguments.no_colors
@@ -306,7 +296,7 @@ def _parse_grasps_option(text: str | None) -> dict[str, Any]:
         return {"run": text, "grasps_per_object": 0}
     number = text.removeprefix("sample:")
     if not number.isdecimal() or int(number) < 1:
-        raise InvalidInputError(f"--grasps {text}: give a number of grasps, as in sample:100")
+        raise core.InvalidInputError(f"--grasps {text}: give a number of grasps, as in sample:100")
     return {"grasps_per_object": int(number), "run": ""}
 
 
@@ -318,7 +308,7 @@ def _load_scenes(references: list[str]) -> list[Scene]:
         if glob.has_magic(reference):
             files = sorted(glob.glob(reference))
             if not files:
-                raise InvalidInputError(f"--scenes {reference}: there is no such file")
+                raise core.InvalidInputError(f"--scenes {reference}: there is no such file")
             names += files
         else:
             names.append(reference)
@@ -334,7 +324,7 @@ def _parse_sample_option(
 
     name, colon, count = arguments.sample.rpartition(":")
     if not colon or not count.isdecimal() or int(count) < 1:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"--sample {arguments.sample}: give a library and a number of scenes, as in"
             " household:1000"
         )

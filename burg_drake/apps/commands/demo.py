@@ -6,15 +6,7 @@ import argparse
 import webbrowser
 from pathlib import Path
 
-from burg_drake.apps.options.arguments import (
-    DEFAULT_STATION,
-    Parser,
-    add_output,
-    add_quiet,
-    add_workers,
-    examples_text,
-)
-from burg_drake.apps.options.values import positive_int
+from burg_drake.apps import options
 
 DEMO_SCENE = "tabletop_six"
 DEMO_FOLDER = "runs/demo"  # Folder of the demo's run, if no other is given.
@@ -26,16 +18,16 @@ DEMO_FILES = {
 """Files that the demo points out, and what they contain."""
 
 
-def add_demo_options(parser: Parser) -> None:
+def add_demo_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake demo`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake demo",
         "burg-drake demo -n 10 -o /tmp/demo --open",
         "",
         "Six objects on a table, a Panda arm. With 100 grasps an object it takes some minutes."
         " The same command continues where an interrupted one stopped.",
     )
-    add_output(
+    options.add_output(
         parser,
         "RUN",
         f"folder to write (default: {DEMO_FOLDER}, with another -n {DEMO_FOLDER}_N)",
@@ -45,13 +37,13 @@ def add_demo_options(parser: Parser) -> None:
         "-n",
         "--grasps-per-object",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         default=100,
         help="grasps to sample on each object (default: %(default)s)",
     )
     parser.add_argument("--open", action="store_true", help="open report and replay in the browser")
-    add_workers(parser)
-    add_quiet(parser)
+    options.add_workers(parser)
+    options.add_quiet(parser)
     parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
@@ -61,7 +53,7 @@ def run_demo(arguments: argparse.Namespace) -> int:
     count = arguments.grasps_per_object
     ending = "" if count == 100 else f"_{count}"
     folder = Path(arguments.output or f"{DEMO_FOLDER}{ending}")
-    words = ["evaluate", DEMO_SCENE, "--station", DEFAULT_STATION, "-n", str(count)]
+    words = ["evaluate", DEMO_SCENE, "--station", options.DEFAULT_STATION, "-n", str(count)]
     words += ["-o", str(folder)]
     words += ["--quiet"] * arguments.quiet
     words += [] if arguments.workers is None else ["--workers", str(arguments.workers)]

@@ -9,7 +9,6 @@ import importlib.util
 import json
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
@@ -17,10 +16,10 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from burg_drake import __version__
-from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps import options
 from burg_drake.core import AllocatorSettings
 from burg_drake.system_libraries import (
     SystemLibrary,
@@ -29,6 +28,9 @@ from burg_drake.system_libraries import (
     missing_render_libraries,
     missing_useful_libraries,
 )
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 PACKAGE_NAME = "burg-drake"  # Name of this package in package indexes.
 
@@ -71,43 +73,32 @@ def unmet_requirements(extra: str = "") -> list[str]:
     """What burg_drake, or an extra of it, needs and this environment does not have.
 
     Returns:
-        Such as `mujoco>=3.10` and `viser>=1.1,<1.2 (1.3.0 is installed)`.
+        Such as `mujoco>=3.10` and `viser<1.2,>=1.1 (1.3.0 is installed)`.
     """
     unmet = []
     for requirement in _requirements(extra):
-        name, bounds = re.fullmatch(r"([\w.-]+)(?:\[.*?\])?\s*(.*)", requirement).groups()  # type: ignore[union-attr]
-        found = installed_version(name)
+        found = installed_version(requirement.name)
         if found is None:
-            unmet.append(requirement)
-        elif not _is_within(found, bounds):
+            unmet.append(str(requirement))
+        elif not requirement.specifier.contains(found, prereleases=True):
             unmet.append(f"{requirement} ({found} is installed)")
     return unmet
 
 
-def _requirements(extra: str) -> list[str]:
+def _requirements(extra: str) -> list[Requirement]:
     """What is declared for an extra, or for all if it is empty; none in a checkout on the path."""
+    from packaging.requirements import Requirement
+
     try:
         declared = importlib.metadata.requires(PACKAGE_NAME) or []
     except importlib.metadata.PackageNotFoundError:
         return []
     found = []
-    for requirement in declared:
-        needed, _, marker = requirement.partition(";")
-        named = re.search(r"extra == ['\"](.*?)['\"]", marker)
-        if (named[1] if named else marker) == extra:
-            found.append(needed.strip())
+    for requirement in map(Requirement, declared):
+        marker, requirement.marker = requirement.marker, None
+        if f'extra == "{extra}"' in str(marker) if extra else marker is None:
+            found.append(requirement)
     return found
-
-
-def _is_within(found: str, bounds: str) -> bool:
-    """Whether a version is within bounds such as `>=1.1,<1.2`."""
-    limits = re.findall(r"(>=|<)\s*([\d.]+)", bounds)
-    ours = _version_numbers(found)
-    return all((ours >= _version_numbers(v)) == (operator == ">=") for operator, v in limits)
-
-
-def _version_numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in re.findall(r"\d+", text.partition("+")[0]))
 
 
 def install_command(extra: str, installed: list[str]) -> str:
@@ -446,9 +437,9 @@ def folder_bytes(folder: Path) -> int:
     return total
 
 
-def add_doctor_options(parser: Parser) -> None:
+def add_doctor_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake doctor`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake doctor",
         "burg-drake doctor --json",
         "",

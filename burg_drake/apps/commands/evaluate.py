@@ -5,76 +5,25 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_cluster,
-    add_output,
-    add_quiet,
-    add_retry_failed,
-    add_station,
-    add_workers,
-    cluster_from_options,
-    examples_text,
-    retry_advice,
-    scene_names,
-)
-from burg_drake.apps.options.evaluated_grasps import (
-    add_grasp_file_options,
-    add_motion_options,
-    add_sampling_options,
-    grasps_per_object,
-    motion_from_options,
-    read_grasps_from_options,
-    refuse_sampling_options_with_file,
-    refuse_standoff_without_arm,
-    require_grasp_file,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake import core, evaluation
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning
-from burg_drake.core import CONTESTED_CONFIDENCE, InvalidInputError, list_names
 
 if TYPE_CHECKING:
-    from burg_drake.core import GraspSet, Mode
-    from burg_drake.evaluation import (
-        Campaign,
-        Columns,
-        EvaluationSettings,
-        Executor,
-        GraspsLike,
-        Run,
-        Summary,
-    )
     from burg_drake.scene import Scene
     from burg_drake.station import Engine, GraspMotion, Station
-
-
-def requested_settings(
-    arguments: argparse.Namespace, mode: Mode, motion: GraspMotion
-) -> EvaluationSettings:
-    """The settings that options ask for, on a station that has this mode and motion."""
-    from burg_drake.evaluation import EvaluationSettings
-
-    return settings_from(
-        arguments,
-        EvaluationSettings,
-        grasps_per_object=grasps_per_object(arguments),
-        only=arguments.only,
-        mode=mode,
-        motion=motion,
-        scene_reports=arguments.scene_reports,
-    )
 
 
 SECOND_OPINION_COLUMNS = ("judged_again", "outcome_before", "outcome", "confidence")
 """Columns that `second_opinion_line` reads."""
 
 
-def add_rejudge_contested(parser: Parser) -> None:
+def add_rejudge_contested(parser: options.Parser) -> None:
     """Adds --rejudge."""
     parser.add_argument(
         "--rejudge",
@@ -83,7 +32,7 @@ def add_rejudge_contested(parser: Parser) -> None:
     )
 
 
-def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engine | str:
+def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) -> Engine | str:
     """The engine that judges all grasps: with --rejudge that of the run in the folder, and standard
     of a new one.
 
@@ -91,44 +40,23 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engi
         InvalidInputError: a shard is asked for; and see `require_second_engine`, also for other
             errors.
     """
-    from burg_drake.evaluation import RUN_FILE, is_campaign, open_results, require_second_engine
     from burg_drake.station import DEFAULT_ENGINE, ENGINES
 
     chosen: str = arguments.engine
     if arguments.rejudge is None:
         return chosen
-    exists = is_campaign(folder) or (Path(folder) / RUN_FILE).exists()
-    engine = open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
+    exists = evaluation.is_campaign(folder) or (Path(folder) / evaluation.RUN_FILE).exists()
+    engine = evaluation.open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
     if arguments.shard is not None:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             "--rejudge settles a whole run; merge the shards first (burg-drake merge), or leave"
             " --shard out"
         )
-    require_second_engine(chosen, engine, mode)
+    evaluation.require_second_engine(chosen, engine, mode)
     return engine
 
 
-Judged = TypeVar("Judged", "Run", "Campaign")
-
-
-def rejudge_contested(
-    run: Judged, arguments: argparse.Namespace, executor: Executor | None
-) -> Judged:
-    """Judges contested grasps again, if that is asked for, and says what came of it."""
-    if arguments.rejudge is None:
-        return run
-    from burg_drake.evaluation import judge_again
-
-    return judge_again(
-        run,
-        engine=arguments.engine,
-        executor=executor,
-        workers=arguments.workers,
-        progress=not arguments.quiet,
-    )
-
-
-def second_opinion_line(columns: Columns) -> str:
+def second_opinion_line(columns: evaluation.Columns) -> str:
     """How many verdicts another engine has settled, and how many of them changed.
 
     Args:
@@ -151,93 +79,49 @@ def second_opinion_line(columns: Columns) -> str:
     text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     text += f" ({details})" if details else ""
-    close = int((confidence[again] < CONTESTED_CONFIDENCE).sum())
+    close = int((confidence[again] < core.CONTESTED_CONFIDENCE).sum())
     return f"{text}; close for it, too: {close}" if close else text
 
 
-def evaluate_many(
-    arguments: argparse.Namespace, references: Sequence[str], executor: Executor | None = None
-) -> int:
-    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated.
-
-    Args:
-        arguments: of the verb.
-        references: the scenes.
-        executor: judges in place of processes of this machine.
-    """
-    from burg_drake.evaluation import evaluate, mode_for, motion_text
-    from burg_drake.station import GraspMotion, load_station
-
-    if arguments.output is None:
-        raise InvalidInputError(
-            f"{len(references)} scenes are given; name a folder for the run with -o RUN"
-        )
-    station = load_station(arguments.station)
-    mode = mode_for(station, arguments.mode)
-    refuse_standoff_without_arm(arguments, mode)
-    motion = motion_from_options(arguments, station)
-    settings = requested_settings(arguments, mode, motion)
-    settings = replace(settings, engine=first_engine(arguments, arguments.output, mode))
-    campaign = evaluate(
-        list(references),
-        station,
-        arguments.output,
-        settings=settings,
-        grasps=_grasps_from_file(arguments, station),
-        executor=executor,
-        workers=arguments.workers,
-        retry_failed=arguments.retry_failed,
-        progress=not arguments.quiet,
-    )
-    campaign = rejudge_contested(campaign, arguments, executor)
-    print_campaign(campaign)
-    if arguments.rejudge is not None:
-        print(second_opinion_line(campaign.columns(SECOND_OPINION_COLUMNS)))
-    if motion != GraspMotion():
-        print(f"motion  {motion_text(motion)}")
-    return campaign_exit_code(campaign)
-
-
-def print_campaign(campaign: Campaign) -> None:
+def print_campaign(campaign: evaluation.Campaign) -> None:
     """Prints the tables of a run over many scenes, and where what is."""
     from rich.console import Console
 
-    from burg_drake.evaluation import PARTS_FOLDER, REPORT_FILE, summarize, summary_view
-
-    summary = summarize(campaign)
-    Console().print(summary_view(summary), crop=False)
+    summary = evaluation.summarize(campaign)
+    Console().print(evaluation.summary_view(summary), crop=False)
     _scene_table(summary).show()
     if campaign.document.shard:
         print(f"shard   {campaign.document.shard}; merge all of them with burg-drake merge")
     scenes = f"{campaign.path}/scenes/NAME"
-    if any(campaign.folder(name).joinpath(REPORT_FILE).exists() for name in campaign.names):
+    if any(
+        campaign.folder(name).joinpath(evaluation.REPORT_FILE).exists() for name in campaign.names
+    ):
         print(f"runs    {scenes}, each with a table and a report")
     else:
         print(f"runs    {scenes}, each with a table; burg-drake report {scenes} makes a report")
-    print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
+    print(f"tables  {campaign.path / evaluation.PARTS_FOLDER} (Parquet, all scenes)")
     if campaign.report_path.exists():
         print(f"report  {campaign.report_path}")
 
 
-def campaign_exit_code(campaign: Campaign) -> int:
+def campaign_exit_code(campaign: evaluation.Campaign) -> int:
     """Says what could not be judged; the exit code."""
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
     for name, why in campaign.failed.items():
         print_remark(f"scene {name} could not be judged: {why}")
     if failed:
-        where = list_names([s.scene for s in states if s.failed])
+        where = core.list_names([s.scene for s in states if s.failed])
         print_remark(
             f"{failed} grasps could not be simulated (scenes {where});"
-            f" {retry_advice(interrupted, failed)}"
+            f" {options.retry_advice(interrupted, failed)}"
         )
     return 1 if failed or campaign.failed else 0
 
 
-def _scene_table(summary: Summary) -> Any:
+def _scene_table(summary: evaluation.Summary) -> Any:
     """The scenes in which the smallest share of the executed grasps was lifted."""
     max_rows = 20  # Scenes with a row of their own.
-    from burg_drake.core import TextTable, format_count, format_percent
 
     def share(group: Any) -> float:
         return group.lifted / group.executed if group.executed else -1.0
@@ -245,28 +129,28 @@ def _scene_table(summary: Summary) -> Any:
     groups = sorted(summary.scenes, key=share)[:max_rows]
     more = len(summary.scenes) - len(groups)
     title = f"Scenes, the {max_rows} with the least success" if more else "Scenes"
-    table = TextTable(title).names("scene")
+    table = core.TextTable(title).names("scene")
     table.numbers(*summary.steps, "success")
     for group in groups:
-        success = format_percent(share(group)) if group.executed else "-"
+        success = core.format_percent(share(group)) if group.executed else "-"
         table.row(
-            group.name, *(format_count(group.funnel[name]) for name in summary.steps), success
+            group.name, *(core.format_count(group.funnel[name]) for name in summary.steps), success
         )
     if more:
         table.caption = f"{more:,} more scenes are in the columns of the store"
     return table
 
 
-def _grasps_from_file(arguments: argparse.Namespace, station: Station) -> GraspsLike | None:
+def _grasps_from_file(
+    arguments: argparse.Namespace, station: Station
+) -> evaluation.GraspsLike | None:
     """The grasps of the file: those in the frames of their objects as a set for all scenes."""
     from burg_drake.apps.options.grasp_files import POSE_FRAMES, gripper_for
-    from burg_drake.core import content_hash
-    from burg_drake.evaluation import read_input
     from burg_drake.formats import read_poses, with_objects_renamed
 
     if arguments.grasps is None:
         return None
-    imported = read_input(
+    imported = evaluation.read_input(
         arguments.grasps,
         arguments.grasps_format,
         gripper_for(arguments, station),
@@ -277,7 +161,7 @@ def _grasps_from_file(arguments: argparse.Namespace, station: Station) -> Grasps
     if frame != "object":
         poses = arguments.camera_pose
         placing = [read_poses(poses) if poses else None, sorted(arguments.object_ids.items())]
-        content = content_hash(Path(arguments.grasps), arguments.correction, frame, *placing)
+        content = core.content_hash(Path(arguments.grasps), arguments.correction, frame, *placing)
         return _SceneGraspFile(arguments, station, content, arguments.correction)
     return with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
 
@@ -299,18 +183,15 @@ class _SceneGraspFile:
     content: str
     correction: tuple[str, ...]
 
-    def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
-        from burg_drake.core import UnknownNameError
-        from burg_drake.evaluation import NoSceneIdsError
-
+    def __call__(self, scene: Scene) -> Mapping[str, core.GraspSet]:
         chosen = argparse.Namespace(**{**vars(self.arguments), "run": None})
         chosen.scene_id = scene.name
         try:
-            return read_grasps_from_options(chosen, scene, self.station).by_instance
-        except UnknownNameError:
+            return options.read_grasps_from_options(chosen, scene, self.station).by_instance
+        except core.UnknownNameError:
             return {}
-        except NoSceneIdsError as error:
-            raise InvalidInputError(
+        except evaluation.NoSceneIdsError as error:
+            raise core.InvalidInputError(
                 f"{self.arguments.grasps} has grasps in the frame of a scene or camera, without"
                 " saying which; evaluate that scene alone"
             ) from error
@@ -319,11 +200,9 @@ class _SceneGraspFile:
 RUNS_FOLDER = "runs"  # Parent folder of runs for which no folder is given.
 
 
-def add_evaluate_options(parser: Parser) -> None:
+def add_evaluate_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake evaluate`."""
-    from burg_drake.evaluation import EvaluationSettings
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml -o runs/mine",
         "burg-drake evaluate tabletop_six --only mug,bowl -n 500 -o runs/two",
@@ -342,108 +221,150 @@ def add_evaluate_options(parser: Parser) -> None:
         "scenes",
         metavar="SCENE",
         nargs="+",
-        help=f"scene file, folder of scenes, or built-in: {scene_names()}",
+        help=f"scene file, folder of scenes, or built-in: {options.scene_names()}",
     )
-    add_station(parser)
-    add_output(
+    options.add_station(parser)
+    options.add_output(
         parser,
         "RUN",
         f"folder of the run (default: {RUNS_FOLDER}/SCENE; required for several scenes)",
         required=False,
     )
     which = parser.add_mutually_exclusive_group()
-    add_sampling_options(parser, 100, which)
-    add_grasp_file_options(parser, which)
-    add_settings_options(
-        parser, EvaluationSettings, *("until_balanced", "balanced_among", "max_grasps_per_object")
+    options.add_sampling_options(parser, 100, which)
+    options.add_grasp_file_options(parser, which)
+    options.add_settings_options(
+        parser,
+        evaluation.EvaluationSettings,
+        *("until_balanced", "balanced_among", "max_grasps_per_object"),
     )
-    add_settings_options(parser, EvaluationSettings, "engine")
+    options.add_settings_options(parser, evaluation.EvaluationSettings, "engine")
     add_rejudge_contested(parser)
     who = parser.add_mutually_exclusive_group()
-    add_workers(who)
-    add_cluster(who)
-    add_settings_options(parser, EvaluationSettings, "table", "mode", "shard")
-    add_settings_options(parser, EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach")
-    add_motion_options(parser)
-    add_retry_failed(parser, "grasps")
+    options.add_workers(who)
+    options.add_cluster(who)
+    options.add_settings_options(parser, evaluation.EvaluationSettings, "table", "mode", "shard")
+    options.add_settings_options(
+        parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach"
+    )
+    options.add_motion_options(parser)
+    options.add_retry_failed(parser, "grasps")
     parser.add_argument(
         "--scene-reports",
         action=argparse.BooleanOptionalAction,
         help="also write a report for each of several scenes (default: for up to 100)",
     )
-    add_quiet(parser)
+    options.add_quiet(parser)
 
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
-    """Evaluates; 1 if some grasps could not be simulated."""
-    from burg_drake.scene import scene_references
+    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated."""
+    from burg_drake.scene import load_scene, scene_references
+    from burg_drake.station import load_station
 
-    require_grasp_file(arguments)
-    refuse_sampling_options_with_file(arguments)
+    options.require_grasp_file(arguments)
+    options.refuse_sampling_options_with_file(arguments)
     references = scene_references(arguments.scenes)
-    if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
-        with cluster_from_options(arguments) as executor:
-            return evaluate_many(arguments, references, executor=executor)
-    return _evaluate_one(arguments, references[0])
-
-
-def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
-    """Evaluates one scene."""
-    from burg_drake.evaluation import evaluate, mode_for
-    from burg_drake.motion import require_usable_arm
-    from burg_drake.scene import load_scene
-    from burg_drake.station import load_station, require_valid_scene
-
-    scene = load_scene(reference)
+    several = len(references) > 1 or Path(arguments.scenes[0]).is_dir()
+    if several and arguments.output is None:
+        raise core.InvalidInputError(
+            f"{len(references)} scenes are given; name a folder for the run with -o RUN"
+        )
+    scene = None if several else load_scene(references[0])
     station = load_station(arguments.station)
-    mode = mode_for(station, arguments.mode)
-    refuse_standoff_without_arm(arguments, mode)
-    motion = motion_from_options(arguments, station)
-    given = (
-        None if arguments.grasps is None else read_grasps_from_options(arguments, scene, station)
+    mode = evaluation.mode_for(station, arguments.mode)
+    options.refuse_standoff_without_arm(arguments, mode)
+    motion = options.motion_from_options(arguments, station)
+    if scene is None:
+        folder, grasps = arguments.output, _grasps_from_file(arguments, station)
+    else:
+        folder = arguments.output or f"{RUNS_FOLDER}/{scene.name}"
+        grasps = _grasps_of_scene(arguments, scene, station, mode)
+    settings = options.settings_from(
+        arguments,
+        evaluation.EvaluationSettings,
+        grasps_per_object=options.grasps_per_object(arguments),
+        only=arguments.only,
+        mode=mode,
+        motion=motion,
+        scene_reports=arguments.scene_reports,
+        engine=first_engine(arguments, folder, mode),
     )
-    print_note_lines(given.notes if given else ())
+    found = _evaluate(arguments, scene or list(references), station, folder, settings, grasps)
+    rejudged = arguments.rejudge is not None
+    if isinstance(found, evaluation.Run):
+        _print_run(found, motion, rejudged=rejudged)
+        return 1 if found.failures else 0
+    print_campaign(found)
+    if rejudged:
+        print(second_opinion_line(found.columns(SECOND_OPINION_COLUMNS)))
+    _print_motion(motion)
+    return campaign_exit_code(found)
+
+
+def _grasps_of_scene(
+    arguments: argparse.Namespace, scene: Scene, station: Station, mode: core.Mode
+) -> Mapping[str, core.GraspSet] | None:
+    """The grasps of the file on the instances of one scene, whose faults are told."""
+    from burg_drake.motion import require_usable_arm
+    from burg_drake.station import require_valid_scene
+
+    given = None
+    if arguments.grasps is not None:
+        given = options.read_grasps_from_options(arguments, scene, station)
+        print_note_lines(given.notes)
     warnings = require_valid_scene(scene, station)
     if mode != "hand":
         warnings += require_usable_arm(scene, station)
     for warning in warnings:
         print_warning(warning)
-    folder = arguments.output or f"{RUNS_FOLDER}/{scene.name}"
-    settings = requested_settings(arguments, mode, motion)
-    settings = replace(settings, engine=first_engine(arguments, folder, mode))
-    with cluster_from_options(arguments) as executor:
-        run = evaluate(
-            scene,
+    return given.by_instance if given else None
+
+
+def _evaluate(
+    arguments: argparse.Namespace,
+    scenes: Scene | list[str],
+    station: Station,
+    folder: str,
+    settings: evaluation.EvaluationSettings,
+    grasps: evaluation.GraspsLike | None,
+) -> evaluation.Run | evaluation.Campaign:
+    """Evaluates on this machine or a cluster, and contested grasps again if that is asked for."""
+    with options.cluster_from_options(arguments) as executor:
+        found = evaluation.evaluate(
+            scenes,
             station,
             folder,
             settings=settings,
-            grasps=given.by_instance if given else None,
+            grasps=grasps,
             executor=executor,
             workers=arguments.workers,
             retry_failed=arguments.retry_failed,
             progress=not arguments.quiet,
         )
-        run = rejudge_contested(run, arguments, executor)
-    _print_run(run, motion, rejudged=arguments.rejudge is not None)
-    return 1 if run.failures else 0
+        if arguments.rejudge is None:
+            return found
+        return evaluation.judge_again(
+            found,
+            engine=arguments.engine,
+            executor=executor,
+            workers=arguments.workers,
+            progress=not arguments.quiet,
+        )
 
 
-def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
+def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> None:
     """The tables of a run, where its files are, and what has failed."""
-    from burg_drake.evaluation import motion_text
-    from burg_drake.station import GraspMotion
-
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
-    if motion != GraspMotion():
-        print(f"motion  {motion_text(motion)}")
-    if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
-        print(second_opinion_line({name: run.results[name] for name in SECOND_OPINION_COLUMNS}))
+    _print_motion(motion)
+    if rejudged or run.index.judged_again.any():
+        print(second_opinion_line(run.columns(SECOND_OPINION_COLUMNS)))
     if contested := run.contested:
         finer = "mujoco" if run.document.engine.name == "reference" else "reference"
         print(
-            f"contested: {list_names(contested)}; judge them again by the same command with"
+            f"contested: {core.list_names(contested)}; judge them again by the same command with"
             f" --rejudge contested --engine {finer}"
         )
     print(f"table   {run.table_path}")
@@ -461,14 +382,20 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
         print_remark(
             f"{len(run.failures)} of {len(run.candidates)} grasps could not be"
             f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
-            f" {retry_advice(len(run.interrupted), len(run.failures))}"
+            f" {options.retry_advice(len(run.interrupted), len(run.failures))}"
         )
 
 
-def print_summary(run: Run) -> None:
+def _print_motion(motion: GraspMotion) -> None:
+    """How the hand moves, unless as usual."""
+    from burg_drake.station import GraspMotion
+
+    if motion != GraspMotion():
+        print(f"motion  {evaluation.motion_text(motion)}")
+
+
+def print_summary(run: evaluation.Run) -> None:
     """Prints the tables of a run."""
     from rich.console import Console
 
-    from burg_drake.evaluation import summarize, summary_view
-
-    Console().print(summary_view(summarize(run)), crop=False)
+    Console().print(evaluation.summary_view(evaluation.summarize(run)), crop=False)

@@ -7,48 +7,30 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_only,
-    add_renaming,
-    add_view_options,
-    examples_text,
-)
-from burg_drake.apps.options.grasp_files import (
-    GraspSource,
-    add_file_station,
-    add_reading_options,
-    add_source_options,
-    gripper_for,
-    load_grasp_source,
-    station_for,
-)
-from burg_drake.apps.options.values import input_file, number, positive_int
+from burg_drake import core, evaluation, visualization
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines
-from burg_drake.core import InvalidInputError, Outcome, suggest_names
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
-    from burg_drake.core import Array, GraspSet
-    from burg_drake.evaluation import RankedGrasps
     from burg_drake.station import Station
 
 
-def add_choice_options(show: Parser) -> None:
+def add_choice_options(show: options.Parser) -> None:
     """Adds options that choose grasps."""
-    add_only(show, "grasps")
+    options.add_only(show, "grasps")
     show.add_argument(
         "--outcome",
         metavar="A,B",
-        type=_parse_outcomes,
+        type=lambda text: options.some_of(text, [o.value for o in core.Outcome], "an outcome"),
         help="only grasps with these outcomes, such as lifted,slipped,no_ik",
     )
     count = show.add_mutually_exclusive_group()
     count.add_argument(
         "--most",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         default=20,
         help="show the best N grasps of each object (default: %(default)s)",
     )
@@ -57,24 +39,25 @@ def add_choice_options(show: Parser) -> None:
 
 
 def choose_grasps(
-    grasps: GraspSet, ranking: RankedGrasps, column: str | None, arguments: argparse.Namespace
+    grasps: core.GraspSet,
+    ranking: evaluation.RankedGrasps,
+    column: str | None,
+    arguments: argparse.Namespace,
 ) -> tuple[list[int], int | None, str]:
     """Indices of the grasps to be drawn, which of these has the gripper, and what people are told
     about the choice. Of each object those with the highest number in `column` come first; where it
     has no numbers, the best."""
     import numpy as np
 
-    from burg_drake.evaluation import best_of_each, grasp_index, rows_of_names
-
     instances = grasps.columns.get("instance")
-    keep = rows_of_names(arguments.only, arguments.file, grasps.object, instances)
+    keep = evaluation.rows_of_names(arguments.only, arguments.file, grasps.object, instances)
     if arguments.outcome is not None:
-        keep &= np.isin(grasps.column("outcome"), [o.value for o in arguments.outcome])
+        keep &= np.isin(grasps.column("outcome"), arguments.outcome)
     if not keep.any():
-        raise InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
+        raise core.InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
     most = None if arguments.all else arguments.most
     holder = np.array(object_or_instance_names(grasps))
-    chosen = best_of_each(holder, keep, ranking, most)
+    chosen = evaluation.best_of_each(holder, keep, ranking, most)
     caption = f"{len(chosen):,} of {len(grasps):,} grasps shown"
     if len(chosen) < keep.sum():
         by = ranking.by
@@ -82,7 +65,7 @@ def choose_grasps(
         caption += f": {how}; --most N or --all shows more"
     index = None
     if arguments.select is not None:
-        index = grasp_index(grasps, arguments.select, arguments.file)
+        index = evaluation.grasp_index(grasps, arguments.select, arguments.file)
         if index not in chosen:
             same = [k for k, other in enumerate(chosen) if holder[other] == holder[index]]
             chosen.insert(same[-1] + 1 if same else len(chosen), index)
@@ -98,26 +81,14 @@ def _descending_order(value: float) -> tuple[bool, float]:
     return value != value, 0.0 if value != value else -value
 
 
-def object_or_instance_names(grasps: GraspSet) -> list[str]:
+def object_or_instance_names(grasps: core.GraspSet) -> list[str]:
     """The instance of each grasp, or without a scene the object."""
     return list(grasps.column("instance" if "instance" in grasps.columns else "object").tolist())
 
 
-def _parse_outcomes(text: str) -> set[Outcome]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    known = [outcome.value for outcome in Outcome]
-    unknown = [name for name in names if name not in known]
-    if unknown or not names:
-        given = unknown[0] if unknown else text
-        raise argparse.ArgumentTypeError(
-            f"{given!r} is not an outcome; {suggest_names(given, known)}"
-        )
-    return {Outcome(name) for name in names}
-
-
-def add_grasps_show_options(show: Parser) -> None:
+def add_grasps_show_options(show: options.Parser) -> None:
     """Adds the options of `burg-drake grasps show`."""
-    show.epilog = examples_text(
+    show.epilog = options.examples_text(
         "burg-drake grasps show runs/first",
         "burg-drake grasps show runs/first --only mug --outcome lifted,slipped --all",
         "burg-drake grasps show runs/first --select mug-0123456789ab",
@@ -129,12 +100,15 @@ def add_grasps_show_options(show: Parser) -> None:
         " live view the slider `grasp` does.",
     )
     show.add_argument(
-        "file", metavar="RUN|FILE", type=input_file, help="folder of a run, or any grasp file"
+        "file",
+        metavar="RUN|FILE",
+        type=options.input_file,
+        help="folder of a run, or any grasp file",
     )
-    add_reading_options(show)
-    add_source_options(show)
-    add_file_station(show)
-    add_renaming(show)
+    options.add_reading_options(show)
+    options.add_source_options(show)
+    options.add_file_station(show)
+    options.add_renaming(show)
     add_choice_options(show)
     show.add_argument(
         "--color", metavar="COLUMN", help="column to colour by (default: outcome, else score)"
@@ -143,10 +117,10 @@ def add_grasps_show_options(show: Parser) -> None:
         "--range",
         metavar=("LO", "HI"),
         nargs=2,
-        type=number,
+        type=options.number,
         help="ends of the colour scale (default: of the grasps shown, without outliers)",
     )
-    add_view_options(show)
+    options.add_view_options(show)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -161,36 +135,28 @@ class DisplayedGrasps:
         title: of the page.
     """
 
-    grasps: GraspSet
-    source: GraspSource
+    grasps: core.GraspSet
+    source: options.GraspSource
     station: Station
-    ranking: RankedGrasps
+    ranking: evaluation.RankedGrasps
     title: str
 
 
 def run_grasps_show(arguments: argparse.Namespace) -> int:
     """Shows grasps among the objects that they belong to."""
     from burg_drake.apps.terminal import open_view, present_view, print_legend
-    from burg_drake.evaluation import result_column
-    from burg_drake.visualization import (
-        GraspPicker,
-        GripperView,
-        color_grasps_by,
-        default_color_column,
-        draw_grasps,
-    )
 
     content = _load_content(arguments)
-    column = arguments.color and result_column(content.grasps, arguments.color)
-    column = column or default_color_column(content.grasps)
+    column = arguments.color and evaluation.result_column(content.grasps, arguments.color)
+    column = column or visualization.default_color_column(content.grasps)
     chosen, selected, caption = choose_grasps(content.grasps, content.ranking, column, arguments)
     grasps, station = content.grasps.select(chosen), content.station
-    groups, legend = color_grasps_by(grasps, column, arguments.range)
+    groups, legend = visualization.color_grasps_by(grasps, column, arguments.range)
     width = _finger_widths(grasps, station.hand.opening[1])
     meshcat = open_view(arguments)
     X_WG = _show_objects(content, grasps, width, meshcat)
-    draw_grasps(meshcat, X_WG, width, groups)
-    gripper = GripperView(meshcat, station.hand, station.hand_model, station.packages)
+    visualization.draw_grasps(meshcat, X_WG, width, groups)
+    gripper = visualization.GripperView(meshcat, station.hand, station.hand_model, station.packages)
     if selected is not None:
         gripper.place(X_WG[selected], width[selected])
     print_legend(legend)
@@ -202,7 +168,7 @@ def run_grasps_show(arguments: argparse.Namespace) -> int:
         title=content.title,
         caption=[caption],
         legend=legend,
-        controls=GraspPicker(
+        controls=visualization.GraspPicker(
             gripper,
             X_WG,
             width,
@@ -215,7 +181,7 @@ def run_grasps_show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _finger_widths(grasps: GraspSet, widest: float) -> Array:
+def _finger_widths(grasps: core.GraspSet, widest: float) -> core.Array:
     """(N,) at which fingers are drawn [m]: at their contacts, else as they arrive, else open."""
     import numpy as np
 
@@ -227,86 +193,81 @@ def _finger_widths(grasps: GraspSet, widest: float) -> Array:
 
 
 def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
-    from burg_drake.core import GraspSet
-    from burg_drake.evaluation import FileReading, rank_by_score, read_grasps, read_input
     from burg_drake.formats import with_objects_renamed
     from burg_drake.scene import load_scene
 
     path = Path(arguments.file)
     if path.is_dir():
         return _load_run_content(arguments)
-    station = station_for(arguments, arguments.file)
-    gripper, format = gripper_for(arguments, station), arguments.source
+    station = options.station_for(arguments, arguments.file)
+    gripper, format = options.gripper_for(arguments, station), arguments.source
     objects = dict(arguments.rename)
-    imported = read_input(path, format, gripper, arguments.correction)
+    imported = evaluation.read_input(path, format, gripper, arguments.correction)
     grasps = imported.grasps
     if len(grasps) == 0:
-        raise InvalidInputError(f"{path} has no grasps")
+        raise core.InvalidInputError(f"{path} has no grasps")
     if imported.frame == "object":
         grasps = with_objects_renamed(grasps, objects)
-        source = load_grasp_source(arguments, grasps, arguments.file)
+        source = options.load_grasp_source(arguments, grasps, arguments.file)
     elif imported.frame == "world" and arguments.scene is not None:
         scene = load_scene(arguments.scene)
-        source = GraspSource(scene.library, scene)
+        source = options.GraspSource(scene.library, scene)
     else:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{path} has grasps in the {imported.frame} frame, not in those of objects; place them"
             " with `burg-drake grasps convert --scene` first"
         )
     if source.scene is not None:
-        given = read_grasps(
+        given = evaluation.read_grasps(
             source.scene,
             path,
             gripper,
-            format=FileReading(format, arguments.correction),
+            format=evaluation.FileReading(format, arguments.correction),
             objects=objects,
         )
         provenance = imported.grasps.provenance
-        placed = GraspSet.concatenate(
+        placed = core.GraspSet.concatenate(
             one.with_columns(instance=name) for name, one in given.by_instance.items()
         )
         grasps = dataclasses.replace(placed, provenance=provenance)
     _print_mistakes(grasps, source, station)
-    return DisplayedGrasps(grasps, source, station, rank_by_score(grasps), title=path.name)
+    return DisplayedGrasps(
+        grasps, source, station, evaluation.rank_by_score(grasps), title=path.name
+    )
 
 
-def _print_mistakes(grasps: GraspSet, source: GraspSource, station: Station) -> None:
+def _print_mistakes(grasps: core.GraspSet, source: options.GraspSource, station: Station) -> None:
     """Says which usual mistake grasps from elsewhere show."""
-    from burg_drake.evaluation import mistake_notes
-
     named = grasps.object if source.scene is None else grasps.column("instance")
     by_name = {name: grasps.select(named == name) for name in dict.fromkeys(named.tolist())}
-    for note in mistake_notes(
+    for note in evaluation.mistake_notes(
         by_name, station, source.scene or source.library, format_option="--from"
     ):
         print(f"note: {note}")
 
 
 def _load_run_content(arguments: argparse.Namespace) -> DisplayedGrasps:
-    from burg_drake.evaluation import load_run, rank_run_grasps, run_grasps, run_notes
-
-    run = load_run(arguments.file)
+    run = evaluation.load_run(arguments.file)
     for option in ("scene", "library", "station"):
         if getattr(arguments, option) is not None:
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"--{option} is for grasp files; {run.path} is a run, which has its own"
             )
-    print_note_lines(run_notes(run))
+    print_note_lines(evaluation.run_notes(run))
     scene = run.scene()
-    source = GraspSource(scene.library, scene)
-    grasps = run_grasps(run)
+    source = options.GraspSource(scene.library, scene)
+    grasps = evaluation.run_grasps(run)
     title = f"{scene.name}: grasps"
-    return DisplayedGrasps(grasps, source, run.station(), rank_run_grasps(run, grasps), title=title)
+    return DisplayedGrasps(
+        grasps, source, run.station(), evaluation.rank_run_grasps(run, grasps), title=title
+    )
 
 
-def _list_labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[str], str]:
+def _list_labels(grasps: core.GraspSet, column: str | None, by: str) -> tuple[list[str], str]:
     """What a list says of each grasp, its colour's meaning and its identifier, and the title."""
     import numpy as np
 
-    from burg_drake.evaluation import shown_ids
-    from burg_drake.visualization import column_title
-
-    ids = shown_ids(grasps)
+    ids = evaluation.shown_ids(grasps)
     if column is None:
         return ids, "identifier"
     values = grasps.column(column)
@@ -315,7 +276,7 @@ def _list_labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[st
     else:
         truths = values.dtype.kind == "b"
         texts = [str(v) for v in (np.where(values, "yes", "no") if truths else values).tolist()]
-    title = f"{column_title(column)} and identifier"
+    title = f"{visualization.column_title(column)} and identifier"
     if len(set(object_or_instance_names(grasps))) > 1:
         title += ", object by object"
     if values.dtype.kind in "fiu":
@@ -326,20 +287,18 @@ def _list_labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[st
 
 
 def _show_objects(
-    content: DisplayedGrasps, grasps: GraspSet, width: Array, meshcat: Meshcat
-) -> Array:
+    content: DisplayedGrasps, grasps: core.GraspSet, width: core.Array, meshcat: Meshcat
+) -> core.Array:
     """Shows the objects, in their scene or in rows; returns `X_WG` (N, 4, 4) of their grasps."""
     import numpy as np
 
-    from burg_drake.visualization import aim_camera, show_objects_for_grasps, show_scene
-
     scene, station = content.source.scene, content.station
     if scene is None:
-        return show_objects_for_grasps(content.source.library, grasps, width, meshcat)
+        return visualization.show_objects_for_grasps(content.source.library, grasps, width, meshcat)
     X_WS = station.document.X_WS.matrix()
     X_SO = {name: scene.X_SO(name) for name in set(grasps.column("instance").tolist())}
-    show_scene(scene, station, meshcat, robot="none")
+    visualization.show_scene(scene, station, meshcat, robot="none")
     X_WG = X_WS @ np.stack([X_SO[n] for n in grasps.column("instance").tolist()]) @ grasps.X_OG
     ends = np.vstack([X_WG[:, :3, 3], station.hand.X_AH(X_WG)[:, :3, 3]])
-    aim_camera(scene, station, meshcat, robot="none", also=ends)
+    visualization.aim_camera(scene, station, meshcat, robot="none", also=ends)
     return X_WG

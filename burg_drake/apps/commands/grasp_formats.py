@@ -7,36 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_only,
-    add_renaming,
-    add_view_options,
-    examples_text,
-)
-from burg_drake.apps.options.grasp_files import (
-    POSE_FRAMES,
-    add_camera_options,
-    add_format_option,
-    add_hand,
-    add_reading_options,
-    format_title,
-    grasp_output,
-    gripper_by_name,
-    gripper_for,
-    print_notes,
-)
-from burg_drake.apps.options.values import input_file, number
-from burg_drake.core import TextTable
+from burg_drake import core, evaluation
+from burg_drake.apps import options
 
 if TYPE_CHECKING:
-    from burg_drake.core import GraspSet
     from burg_drake.formats import GraspFormat, Gripper, ImportedGrasps
 
 
-def add_grasps_convert_options(parser: Parser) -> None:
+def add_grasps_convert_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake grasps convert`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake grasps convert Mug_10f6_0.00027.h5 mug.h5 --rename mug",
         "burg-drake grasps convert grasps.h5 mug.yaml --to isaac_grasp --only mug",
         "burg-drake grasps convert grasps.h5 out/ --to graspgen --success-above 0.5",
@@ -44,52 +24,54 @@ def add_grasps_convert_options(parser: Parser) -> None:
         "burg-drake grasps convert scene.npy grasps.h5 --scene tabletop_six --camera-pose cam.npy",
     )
     parser.add_argument(
-        "input", metavar="IN", type=input_file, help="grasp file, or folder of a run"
+        "input", metavar="IN", type=options.input_file, help="grasp file, or folder of a run"
     )
     parser.add_argument(
         "output", metavar="OUT", help="file to write, or folder for a file per object"
     )
     parser.add_argument("--formats", action=_ListFormats, nargs=0, help="list the formats and end")
-    add_reading_options(parser, in_full=True)
-    add_format_option(parser)
-    add_hand(parser, default=None)
+    options.add_reading_options(parser, in_full=True)
+    options.add_format_option(parser)
+    options.add_hand(parser, default=None)
     _add_selection_options(parser)
     _add_frame_options(parser)
 
 
-def _add_selection_options(parser: Parser) -> None:
+def _add_selection_options(parser: options.Parser) -> None:
     """Options about which grasps are written, and of what."""
-    add_only(parser, "write grasps")
-    add_renaming(parser)
+    options.add_only(parser, "write grasps")
+    options.add_renaming(parser)
     parser.add_argument(
         "--success-above",
         metavar="SCORE",
-        type=number,
+        type=options.number,
         help="grasps with a higher score count as successful",
     )
 
 
-def _add_frame_options(parser: Parser) -> None:
+def _add_frame_options(parser: options.Parser) -> None:
     """Options about frames."""
     group = parser.add_argument_group(
         "frames", "For files whose poses are in the frame of a scene or a camera."
     )
     group.add_argument("--scene", metavar="SCENE", help="scene in which the objects stand")
-    add_camera_options(group)
+    options.add_camera_options(group)
     group.add_argument(
-        "--frame", choices=tuple(POSE_FRAMES), help="frame of the poses in IN, if not the format's"
+        "--frame",
+        choices=tuple(options.POSE_FRAMES),
+        help="frame of the poses in IN, if not the format's",
     )
     group.add_argument(
         "--out-frame",
-        choices=tuple(POSE_FRAMES),
+        choices=tuple(options.POSE_FRAMES),
         help="frame of the poses in OUT, if not the format's",
     )
 
 
 def run_grasps_convert(arguments: argparse.Namespace) -> int:
     """Reads, changes what is asked for, writes, and says what got lost on the way."""
-    output = grasp_output(arguments.output, arguments.target)
-    gripper = gripper_for(arguments, path=arguments.input)
+    output = options.grasp_output(arguments.output, arguments.target)
+    gripper = options.gripper_for(arguments, path=arguments.input)
     imported = _read_grasps(arguments, output.format, gripper)
     _print_import(arguments, imported)
     grasps = _select_grasps(imported.grasps, arguments)
@@ -102,18 +84,17 @@ def _read_grasps(
     arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper
 ) -> ImportedGrasps:
     """The grasps in the frame that the target wants."""
-    from burg_drake.evaluation import SeenScene, read_in_frame
     from burg_drake.formats import read_poses
     from burg_drake.scene import load_scene
 
-    return read_in_frame(
+    return evaluation.read_in_frame(
         arguments.input,
-        POSE_FRAMES.get(arguments.out_frame, target.frame),  # type: ignore[arg-type]
+        options.POSE_FRAMES.get(arguments.out_frame, target.frame),  # type: ignore[arg-type]
         gripper,
         format=arguments.source,
-        frame=POSE_FRAMES.get(arguments.frame),  # type: ignore[arg-type]
+        frame=options.POSE_FRAMES.get(arguments.frame),  # type: ignore[arg-type]
         objects=dict(arguments.rename),
-        seen=SeenScene(
+        seen=evaluation.SeenScene(
             scene=load_scene(arguments.scene) if arguments.scene else None,
             X_SF=read_poses(arguments.camera_pose) if arguments.camera_pose else None,
             object_ids=arguments.object_ids,
@@ -123,14 +104,13 @@ def _read_grasps(
     )
 
 
-def _select_grasps(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
-    from burg_drake.evaluation import rows_of_names
+def _select_grasps(grasps: core.GraspSet, arguments: argparse.Namespace) -> core.GraspSet:
     from burg_drake.formats import with_success
 
     if arguments.only:
         instances = grasps.columns.get("instance")
         grasps = grasps.select(
-            rows_of_names(arguments.only, arguments.input, grasps.object, instances)
+            evaluation.rows_of_names(arguments.only, arguments.input, grasps.object, instances)
         )
     if arguments.success_above is not None:
         grasps = with_success(grasps, arguments.success_above)
@@ -138,18 +118,16 @@ def _select_grasps(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
 
 
 def _print_import(arguments: argparse.Namespace, imported: ImportedGrasps) -> None:
-    from burg_drake.core import list_names
-    from burg_drake.evaluation import FRAME_WORDS, format_name
     from burg_drake.formats import format_named
 
     path = arguments.input
-    format = format_title(format_named(arguments.source or format_name(path)))
+    format = options.format_title(format_named(arguments.source or evaluation.format_name(path)))
     names = sorted({name for name in imported.grasps.object.tolist() if name})
-    of = f" of {list_names(names)}" if names else ""
-    where = FRAME_WORDS[imported.frame]
+    of = f" of {core.list_names(names)}" if names else ""
+    where = evaluation.FRAME_WORDS[imported.frame]
     kind = "run" if Path(path).is_dir() else format
     print(f"{path}: {kind}, {len(imported.grasps)} grasps{of} in {where}")
-    print_notes(imported.notes)
+    options.print_notes(imported.notes)
 
 
 class _ListFormats(argparse.Action):
@@ -164,15 +142,14 @@ class _ListFormats(argparse.Action):
 
 def _print_formats(formats: Sequence[GraspFormat]) -> None:
     """Prints each format in a few lines; lengths are those of the Panda."""
-    from burg_drake.evaluation import FRAME_WORDS
     from burg_drake.formats import PANDA_GRIPPER, convention_of
 
     for format in formats:
         frame = convention_of(format, PANDA_GRIPPER)
-        print(f"{format_title(format)} {' '.join(format.suffixes)}")
+        print(f"{options.format_title(format)} {' '.join(format.suffixes)}")
         print(
-            f"  measured in {FRAME_WORDS[format.frame]}; approach {frame.approach}, closing"
-            f" {frame.closing}, origin {frame.origin}"
+            f"  measured in {evaluation.FRAME_WORDS[format.frame]}; approach {frame.approach},"
+            f" closing {frame.closing}, origin {frame.origin}"
         )
         print(f"  carries {', '.join(format.carries) or 'poses only'}")
         if format.cannot_carry:
@@ -192,9 +169,9 @@ OWN_FRAMES = (
 """Letter, name and location of the frames of burg_drake."""
 
 
-def add_frames_options(frames: Parser) -> None:
+def add_frames_options(frames: options.Parser) -> None:
     """Adds the options of `burg-drake frames`."""
-    frames.epilog = examples_text(
+    frames.epilog = options.examples_text(
         "burg-drake frames --text",
         "burg-drake frames --html frames.html",
         "burg-drake frames acronym graspnet --hand wsg_50",
@@ -202,9 +179,9 @@ def add_frames_options(frames: Parser) -> None:
     frames.add_argument(
         "names", metavar="NAME", nargs="*", help="formats of grasp files (default: all)"
     )
-    add_hand(frames)
+    options.add_hand(frames)
     frames.add_argument("--text", action="store_true", help="print only the tables")
-    add_view_options(frames)
+    options.add_view_options(frames)
 
 
 def run_frames(arguments: argparse.Namespace) -> int:
@@ -213,13 +190,13 @@ def run_frames(arguments: argparse.Namespace) -> int:
 
     formats = {name: format_named(name) for name in arguments.names or GRASP_FORMATS}
     if arguments.text:
-        _print_tables(formats, gripper_by_name(arguments.hand))
+        _print_tables(formats, options.gripper_by_name(arguments.hand))
         return 0
     from burg_drake.apps.terminal import open_view, present_view
     from burg_drake.station import locate_hand
     from burg_drake.visualization import show_frames
 
-    gripper = gripper_by_name(arguments.hand)
+    gripper = options.gripper_by_name(arguments.hand)
     hand, model, _ = locate_hand(arguments.hand)
     meshcat = open_view(arguments)
     # ours is in every picture
@@ -256,7 +233,7 @@ def _print_tables(formats: Mapping[str, GraspFormat], gripper: Gripper) -> None:
 
 
 def _print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    table = TextTable(title).texts(*columns)
+    table = core.TextTable(title).texts(*columns)
     for row in rows:
         table.row(*row)
     table.show()

@@ -6,48 +6,21 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_renaming,
-    add_station,
-    examples_text,
-)
-from burg_drake.apps.options.evaluated_grasps import (
-    add_sampling_options,
-    grasps_per_object,
-    print_shortfalls,
-)
-from burg_drake.apps.options.grasp_files import (
-    GraspSource,
-    add_file_station,
-    add_format_option,
-    add_reading_options,
-    add_source_options,
-    grasp_output,
-    gripper_for,
-    load_grasp_source,
-    open_grasp_source,
-    station_for,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.options.values import friction, input_file, number
-from burg_drake.apps.terminal import print_note_lines
-from burg_drake.core import InvalidInputError, TextTable
+from burg_drake import core, evaluation
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_note_lines, show_progress
 
 if TYPE_CHECKING:
-    from burg_drake.core import Array, GraspSet
-    from burg_drake.evaluation import SamplingSettings
     from burg_drake.station import Station
 
 
-def add_grasps_sample_options(parser: Parser) -> None:
+def add_grasps_sample_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake grasps sample`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
         "burg-drake grasps sample tabletop_six --only mug --from-arm-side -o mug.h5",
         "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
@@ -58,22 +31,24 @@ def add_grasps_sample_options(parser: Parser) -> None:
     parser.add_argument(
         "source", metavar="SCENE|LIB", help="scene file, library folder, or built-in name"
     )
-    add_sampling_options(parser, 1000)
-    add_output(parser, "OUT", "grasp file to write, such as .h5, or folder for a file per object")
-    add_format_option(parser)
-    add_station(parser)
+    options.add_sampling_options(parser, 1000)
+    options.add_output(
+        parser, "OUT", "grasp file to write, such as .h5, or folder for a file per object"
+    )
+    options.add_format_option(parser)
+    options.add_station(parser)
     _add_sampling_settings(parser)
-    add_quiet(parser)
+    options.add_quiet(parser)
 
 
-def _add_sampling_settings(parser: Parser) -> None:
-    from burg_drake.evaluation import SamplingSettings
-
-    add_settings_options(parser, SamplingSettings, "friction", "approaches", "from_arm_side")
+def _add_sampling_settings(parser: options.Parser) -> None:
+    options.add_settings_options(
+        parser, evaluation.SamplingSettings, "friction", "approaches", "from_arm_side"
+    )
     parser.add_argument(
         "--standoffs-mm",
         metavar="MM",
-        type=number,
+        type=options.number,
         nargs="+",
         default=[0.0],
         help=(
@@ -83,105 +58,94 @@ def _add_sampling_settings(parser: Parser) -> None:
     parser.add_argument(
         "--weights",
         metavar="OBJECT=FILE.npy",
-        type=_parse_named_file,
+        type=partial(options.key_and_value, form="OBJECT=FILE.npy, such as mug=rim.npy"),
         action="append",
         default=[],
         help="weight of each mesh face when contacts are sampled; repeatable",
     )
-    add_settings_options(parser, SamplingSettings, "margin", "conservative", "diverse")
+    options.add_settings_options(
+        parser, evaluation.SamplingSettings, "margin", "conservative", "diverse"
+    )
 
 
 def run_grasps_sample(arguments: argparse.Namespace) -> int:
     """Samples and writes a file; 1 if there are no grasps at all."""
-    from burg_drake.core import open_npy
-    from burg_drake.evaluation import SamplingSettings, sampled_set
     from burg_drake.station import load_station, station_gripper
 
-    output = grasp_output(arguments.output, arguments.target, frame="object")
-    source = open_grasp_source(arguments.source)
+    output = options.grasp_output(arguments.output, arguments.target, frame="object")
+    source = options.open_grasp_source(arguments.source)
     output.require_fits(_objects_to_sample(arguments.only, source))
     station = load_station(arguments.station)
-    weights: dict[str, Array] = {}
+    weights: dict[str, core.Array] = {}
     for name, path in arguments.weights:
-        with open_npy(Path(path)) as stored:
+        with core.open_npy(Path(path)) as stored:
             weights[name] = stored.read("fiu").astype(float)
-    settings = settings_from(
+    settings = options.settings_from(
         arguments,
-        SamplingSettings,
+        evaluation.SamplingSettings,
         approach_angle_deg=arguments.approach_angle,
         standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
         weights=weights,
         blind=arguments.blind,
     )
-    asked = grasps_per_object(arguments)
+    asked = options.grasps_per_object(arguments)
     sampled, seconds = _sample_objects(arguments, source, asked, station, settings)
-    grasps = sampled_set(
+    grasps = evaluation.sampled_set(
         sampled, source.library, source.scene, station, asked, arguments.seed, settings
     )
     sampling_table(sampled, seconds, asked).show()
-    print_shortfalls(sampled, asked)
+    options.print_shortfalls(sampled, asked)
     output.write(grasps, station_gripper(station))
     return 0 if len(grasps) else 1
 
 
-def _objects_to_sample(only: list[str] | None, source: GraspSource) -> list[str]:
+def _objects_to_sample(only: list[str] | None, source: options.GraspSource) -> list[str]:
     """The objects that are to be sampled on, of a scene one for each instance."""
-    from burg_drake.evaluation import chosen_instances
-
     if source.scene is None:
         return list(dict.fromkeys(only or source.library.objects))
-    return [source.scene.instance(name).object for name in chosen_instances(source.scene, only)]
+    return [
+        source.scene.instance(name).object
+        for name in evaluation.chosen_instances(source.scene, only)
+    ]
 
 
 def _sample_objects(
     arguments: argparse.Namespace,
-    source: GraspSource,
+    source: options.GraspSource,
     n: int,
     station: Station,
-    settings: SamplingSettings,
-) -> tuple[dict[str, GraspSet], dict[str, float]]:
+    settings: evaluation.SamplingSettings,
+) -> tuple[dict[str, core.GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter
-    from burg_drake.evaluation import sample_library, sample_on_scene
-
     seed, only = arguments.seed, arguments.only
     if source.scene is None:
-        stream = sample_library(source.library, station, n, seed, settings, only)
+        stream = evaluation.sample_library(source.library, station, n, seed, settings, only)
     else:
-        stream = sample_on_scene(source.scene, station, n, seed, settings, only)
+        stream = evaluation.sample_on_scene(source.scene, station, n, seed, settings, only)
     sampled, seconds = {}, {}
     total = len(_objects_to_sample(only, source))
-    with Reporter(not arguments.quiet) as reporter:
-        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
+    with show_progress("sampling", "objects", total, quiet=arguments.quiet) as pace:
         start = time.perf_counter()
         for name, grasps in stream:
             sampled[name], seconds[name] = grasps, time.perf_counter() - start
             pace.step(note=name)
             start = time.perf_counter()
     if not sampled:
-        raise InvalidInputError(f"{arguments.source} has no free objects; nothing to sample on")
+        raise core.InvalidInputError(
+            f"{arguments.source} has no free objects; nothing to sample on"
+        )
     return sampled, seconds
 
 
 def sampling_table(
-    sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int
-) -> TextTable:
+    sampled: Mapping[str, core.GraspSet], seconds: Mapping[str, float], asked: int
+) -> core.TextTable:
     """What sampling came to, by instance or object."""
-    from burg_drake.core import format_count, format_number
-
-    table = TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
+    table = core.TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
     for name, grasps in sampled.items():
         counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
-        table.row(name, *map(format_count, counts), format_number(seconds[name], 2))
+        table.row(name, *map(core.format_count, counts), core.format_number(seconds[name], 2))
     return table
-
-
-def _parse_named_file(text: str) -> tuple[str, str]:
-    """`OBJECT=FILE`."""
-    name, equals, path = text.partition("=")
-    if not (name and equals and path):
-        raise argparse.ArgumentTypeError(f"{text!r} is not OBJECT=FILE.npy, such as mug=rim.npy")
-    return name, path
 
 
 SCORE_COLUMNS_HELP = """\
@@ -196,11 +160,11 @@ Adds these columns, which are nan where a pad meets nothing:
 """Help text about the columns that scoring adds."""
 
 
-def add_grasps_score_options(parser: Parser) -> None:
+def add_grasps_score_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake grasps score`."""
     from burg_drake.grasping import DEFAULT_METRIC
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake grasps score grasps.h5 -o scored.h5",
         "burg-drake grasps score grasps.h5 --scene tabletop_six --by gravity_margin -o scored.h5",
         "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",
@@ -209,15 +173,18 @@ def add_grasps_score_options(parser: Parser) -> None:
         SCORE_COLUMNS_HELP,
     )
     parser.add_argument(
-        "file", metavar="FILE", type=input_file, help="grasp file of any format, or folder of a run"
+        "file",
+        metavar="FILE",
+        type=options.input_file,
+        help="grasp file of any format, or folder of a run",
     )
-    add_reading_options(parser)
-    add_output(
+    options.add_reading_options(parser)
+    options.add_output(
         parser, "OUT", "grasp file to write, or folder (default: only print)", required=False
     )
-    add_format_option(parser)
-    add_source_options(parser)
-    add_file_station(parser)
+    options.add_format_option(parser)
+    options.add_source_options(parser)
+    options.add_file_station(parser)
     parser.add_argument(
         "--by",
         metavar="METRIC",
@@ -227,37 +194,36 @@ def add_grasps_score_options(parser: Parser) -> None:
     parser.add_argument(
         "--friction",
         metavar="[OBJECT=]MU",
-        type=friction,
+        type=options.friction,
         action="append",
         default=[],
         help="friction coefficient (default: the object's); repeatable",
     )
-    add_renaming(parser)
-    add_quiet(parser)
+    options.add_renaming(parser)
+    options.add_quiet(parser)
 
 
 def run_grasps_score(arguments: argparse.Namespace) -> int:
     """Scores, prints a table and writes a file."""
-    from burg_drake.evaluation import read_input, scored_set
     from burg_drake.formats import with_objects_renamed
 
     output = None
     if arguments.output is not None:
-        output = grasp_output(arguments.output, arguments.target, frame="object")
-    station = station_for(arguments, arguments.file)
-    gripper = gripper_for(arguments, station)
-    imported = read_input(arguments.file, arguments.source, gripper)
+        output = options.grasp_output(arguments.output, arguments.target, frame="object")
+    station = options.station_for(arguments, arguments.file)
+    gripper = options.gripper_for(arguments, station)
+    imported = evaluation.read_input(arguments.file, arguments.source, gripper)
     if imported.frame != "object":
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{arguments.file} has grasps in the {imported.frame} frame; bring them into those of"
             " the objects with `burg-drake grasps convert`"
         )
     grasps = with_objects_renamed(imported.grasps, dict(arguments.rename))
-    source = load_grasp_source(arguments, grasps, arguments.file)
+    source = options.load_grasp_source(arguments, grasps, arguments.file)
     if output is not None:
         output.require_fits(grasps.object.tolist())
     print_note_lines(imported.notes)
-    scored = scored_set(
+    scored = evaluation.scored_set(
         grasps,
         source.library,
         station,
@@ -273,7 +239,7 @@ def run_grasps_score(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print_score_tables(grasps: GraspSet) -> None:
+def _print_score_tables(grasps: core.GraspSet) -> None:
     """Quantiles of each metric by object, and what the hand collides with."""
     import numpy as np
 

@@ -8,21 +8,16 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import Parser, add_renaming, examples_text
-from burg_drake.apps.options.grasp_files import add_hand, add_reading_options, gripper_for
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.options.values import input_file
-from burg_drake.core import InvalidInputError, atomic_write, require_writable
+from burg_drake import core, grasping
+from burg_drake.apps import options
 
 if TYPE_CHECKING:
     from burg_drake.formats import ImportedGrasps
 
 
-def add_grasps_stats_options(parser: Parser) -> None:
+def add_grasps_stats_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake grasps stats`."""
-    from burg_drake.grasping import Tolerance
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake grasps stats grasps.h5",
         "burg-drake grasps stats reference.h5 mine.h5 --translation-mm 10 --angle-deg 20",
         "burg-drake grasps stats reference.h5 mine.h5 --distance-mm 15 --angle-deg 180",
@@ -31,17 +26,20 @@ def add_grasps_stats_options(parser: Parser) -> None:
         "The two fingers count as equal. Only grasps of the same object are compared.",
     )
     parser.add_argument(
-        "a", metavar="A", type=input_file, help="grasp file of any format, or folder of a run"
+        "a",
+        metavar="A",
+        type=options.input_file,
+        help="grasp file of any format, or folder of a run",
     )
     parser.add_argument(
-        "b", metavar="B", type=input_file, nargs="?", help="another one, to compare with A"
+        "b", metavar="B", type=options.input_file, nargs="?", help="another one, to compare with A"
     )
-    add_reading_options(parser)
-    add_hand(parser, default=None)
-    add_renaming(parser)
+    options.add_reading_options(parser)
+    options.add_hand(parser, default=None)
+    options.add_renaming(parser)
     match = parser.add_argument_group("grasps of A and B match if all hold")
-    add_settings_options(match, Tolerance, "translation", "angle", "distance")
-    add_settings_options(parser, Tolerance, "lever")
+    options.add_settings_options(match, grasping.Tolerance, "translation", "angle", "distance")
+    options.add_settings_options(parser, grasping.Tolerance, "lever")
     parser.add_argument(
         "--ap",
         metavar="COLUMN",
@@ -55,21 +53,22 @@ def run_grasps_stats(arguments: argparse.Namespace) -> int:
     """Prints the figures of one set or two."""
     from burg_drake.apps.commands.grasp_tables import print_comparison, print_ranking, print_summary
     from burg_drake.evaluation import read_input
-    from burg_drake.grasping import Tolerance, compare_grasps, rank_by, summarize
 
     if arguments.json is not None:
-        require_writable(arguments.json)
-    tolerance, column = settings_from(arguments, Tolerance), arguments.ap
+        core.require_writable(arguments.json)
+    tolerance, column = options.settings_from(arguments, grasping.Tolerance), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
     given = arguments.hand or arguments.gripper_link
-    gripper = gripper_for(arguments) if given else None
+    gripper = options.gripper_for(arguments) if given else None
     sets = [read_input(path, arguments.source, gripper, arguments.correction) for path in paths]
     sets = _rename_objects(sets, dict(arguments.rename))
     _require_same_frames(paths, sets)
-    summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]
-    rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
+    summaries = [grasping.summarize(s.grasps, lever=tolerance.lever) for s in sets]
+    rankings = [] if column is None else [grasping.rank_by(s.grasps, column) for s in sets]
     comparison = (
-        compare_grasps(sets[0].grasps, sets[1].grasps, tolerance) if len(sets) == 2 else None
+        grasping.compare_grasps(sets[0].grasps, sets[1].grasps, tolerance)
+        if len(sets) == 2
+        else None
     )
     for k, path in enumerate(paths):
         print_summary(path, summaries[k], sets[k].notes, sets[k].frame)
@@ -81,7 +80,7 @@ def run_grasps_stats(arguments: argparse.Namespace) -> int:
         inputs = [{"file": p, "frame": s.frame} for p, s in zip(paths, sets, strict=True)]
         figures = {"sets": inputs, "summaries": summaries, "rankings": rankings}
         text = json.dumps(_json_value({**figures, "comparison": comparison}), indent=2)
-        atomic_write(arguments.json, text + "\n")
+        core.atomic_write(arguments.json, text + "\n")
         print(f"wrote {arguments.json}")
     return 0
 
@@ -105,7 +104,7 @@ def _rename_objects(sets: list[ImportedGrasps], names: dict[str, str]) -> list[I
 def _require_same_frames(paths: list[str], sets: list[ImportedGrasps]) -> None:
     if len({imported.frame for imported in sets}) > 1:
         frames = " and ".join(f"{p} ({s.frame})" for p, s in zip(paths, sets, strict=True))
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"grasps are measured in different frames: {frames}; place them first with"
             " `burg-drake grasps convert --scene`"
         )
@@ -113,15 +112,15 @@ def _require_same_frames(paths: list[str], sets: list[ImportedGrasps]) -> None:
 
 def _json_value(value: Any) -> Any:
     """JSON values: shares with their value, null for what is not finite."""
-    from burg_drake.grasping import Share, TopPrecision
-
-    if isinstance(value, TopPrecision):
+    if isinstance(value, grasping.TopPrecision):
         figures = {"ap": value.ap, "attainable": value.attainable, "kept": len(value.kept)}
         by_criterion = value.by_criterion.tolist()
         return _json_value({**figures, "by_criterion": by_criterion, "version": value.version})
     if dataclasses.is_dataclass(value):
         fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
-        return _json_value({**fields, "share": value.value} if isinstance(value, Share) else fields)
+        return _json_value(
+            {**fields, "share": value.value} if isinstance(value, grasping.Share) else fields
+        )
     if isinstance(value, dict):
         return {str(key): _json_value(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

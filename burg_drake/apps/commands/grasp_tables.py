@@ -8,14 +8,7 @@ from typing import TypeVar
 
 from rich.console import Console
 
-from burg_drake.core import (
-    DIMENSIONLESS,
-    TextTable,
-    describe_column,
-    format_count,
-    format_number,
-    format_percent,
-)
+from burg_drake import core
 from burg_drake.grasping import (
     DISTRIBUTION_QUANTILES,
     FRICTION_NEEDED,
@@ -59,18 +52,20 @@ def print_numbers(title: str, rows: NumberRows, frame: str = "object") -> None:
 
 def number_table(
     title: str, heads: list[str], rows: NumberRows, frame: str = "object"
-) -> TextTable:
+) -> core.TextTable:
     """The table of some of the figures; see `print_numbers`."""
-    table = TextTable(title).names("column").numbers("known", *heads)
+    table = core.TextTable(title).names("column").numbers("known", *heads)
     if {"x", "y", "z"} & set(rows):
         where = "the frame of its object" if frame == "object" else f"the {frame} frame"
         table.caption = f"x, y, z: the grasp frame's origin in {where}"
     for name, (known, figures) in rows.items():
-        column = describe_column(name)
+        column = core.describe_column(name)
         unit, size = DISPLAY_UNITS.get(column.unit, (column.unit, 1.0)) if column else ("", 1.0)
-        label = f"{name} [{unit}]" if unit not in ("", DIMENSIONLESS) else name
+        label = f"{name} [{unit}]" if unit not in ("", core.DIMENSIONLESS) else name
         table.row(
-            label, format_count(known), *(format_number(figures[head] / size) for head in heads)
+            label,
+            core.format_count(known),
+            *(core.format_number(figures[head] / size) for head in heads),
         )
     return table
 
@@ -95,7 +90,7 @@ def print_summary(
         "", {name: (of.count, _mean_and_quantiles(of)) for name, of in numbers.items()}, frame
     )
     for name, share in summary.truths.items():
-        print(f"{name}: {share.count:,} of {share.total:,} ({format_percent(share.value)})")
+        print(f"{name}: {share.count:,} of {share.total:,} ({core.format_percent(share.value)})")
     for name, counts in summary.texts.items():
         if 1 < len(counts) < summary.overall.grasps or name == "outcome":
             print(f"{name}: {_value_counts_text(counts)}")
@@ -103,27 +98,31 @@ def print_summary(
         print(note)
 
 
-def summary_table(title: str, summary: SetSummary) -> TextTable:
+def summary_table(title: str, summary: SetSummary) -> core.TextTable:
     """Figures of one set by object."""
-    table = TextTable(title).names("object").numbers("grasps", "inst.", "equal")
+    table = core.TextTable(title).names("object").numbers("grasps", "inst.", "equal")
     table.numbers("width\n[mm]", "score", "nearest\n[mm]")
     table.caption = "Means of width, score, and combined distance to the nearest other grasp."
     for name, one in _rows_with_total(summary.objects, summary.overall):
         table.row(
             name or "-",
-            format_count(one.grasps),
-            format_count(one.instances or None),
-            format_count(one.duplicates),
-            format_number(1e3 * one.width.mean, 1),
-            format_number(one.score.mean, 3),
-            format_number(1e3 * one.neighbour.mean, 1),
+            core.format_count(one.grasps),
+            core.format_count(one.instances or None),
+            core.format_count(one.duplicates),
+            core.format_number(1e3 * one.width.mean, 1),
+            core.format_number(one.score.mean, 3),
+            core.format_number(1e3 * one.neighbour.mean, 1),
         )
     return table
 
 
-def comparison_table(comparison: SetComparison) -> TextTable:
+def comparison_table(comparison: SetComparison) -> core.TextTable:
     """How two sets compare, by object."""
-    table = TextTable("A and B").names("object").numbers("A", "B", "A has\nB near", "B has\nA near")
+    table = (
+        core.TextTable("A and B")
+        .names("object")
+        .numbers("A", "B", "A has\nB near", "B has\nA near")
+    )
     table.numbers("A to B\n[mm]", "95 %\n[mm]", "shift\n[mm]", "turn\n[deg]", "B to A\n[mm]")
     table.caption = (
         f"Near is {_tolerance_text(comparison.tolerance)}. Medians of distances to the nearest"
@@ -133,30 +132,32 @@ def comparison_table(comparison: SetComparison) -> TextTable:
     for name, one in _rows_with_total(comparison.objects, comparison.overall):
         table.row(
             name or "-",
-            format_count(one.coverage.total),
-            format_count(one.precision.total),
-            format_percent(one.coverage.value),
-            format_percent(one.precision.value),
-            format_number(1e3 * one.to_grasps.median, 1),
-            format_number(1e3 * one.to_grasps.quantiles[DISTRIBUTION_QUANTILES.index(0.95)], 1),
-            format_number(1e3 * one.translation.median, 1),
-            format_number(math.degrees(one.angle.median), 1),
-            format_number(1e3 * one.to_reference.median, 1),
+            core.format_count(one.coverage.total),
+            core.format_count(one.precision.total),
+            core.format_percent(one.coverage.value),
+            core.format_percent(one.precision.value),
+            core.format_number(1e3 * one.to_grasps.median, 1),
+            core.format_number(
+                1e3 * one.to_grasps.quantiles[DISTRIBUTION_QUANTILES.index(0.95)], 1
+            ),
+            core.format_number(1e3 * one.translation.median, 1),
+            core.format_number(math.degrees(one.angle.median), 1),
+            core.format_number(1e3 * one.to_reference.median, 1),
         )
     return table
 
 
-def ranking_table(ranking: Ranking) -> TextTable:
+def ranking_table(ranking: Ranking) -> core.TextTable:
     """Average precision, by criterion."""
     top = ranking.top
-    table = TextTable(f"scores judged by {ranking.column}").names("good if")
+    table = core.TextTable(f"scores judged by {ranking.column}").names("good if")
     table.numbers("good", "AP", f"AP of the top {len(top.precision)}")
     rows = zip(
         ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
     )
     for name, good, ap, ap_top in rows:
-        of = f"{format_count(good)} of {format_count(ranking.grasps)}"
-        table.row(name, of, format_number(ap, 3), format_number(ap_top, 3))
+        of = f"{core.format_count(good)} of {core.format_count(ranking.grasps)}"
+        table.row(name, of, core.format_number(ap, 3), core.format_number(ap_top, 3))
     return table
 
 
@@ -164,8 +165,8 @@ def print_comparison(comparison: SetComparison) -> None:
     """Prints how two sets compare, by object."""
     comparison_table(comparison).show()
     overall = comparison.overall
-    print(f"coverage: B has {format_percent(overall.coverage.value)} of A")
-    print(f"precision: A has {format_percent(overall.precision.value)} of B")
+    print(f"coverage: B has {core.format_percent(overall.coverage.value)} of A")
+    print(f"precision: A has {core.format_percent(overall.precision.value)} of B")
     print(f"ids in both: {comparison.shared_ids:,}")
 
 

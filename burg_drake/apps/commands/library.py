@@ -10,44 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from burg_drake import core, pipeline
+from burg_drake.apps import options
 from burg_drake.apps.commands.library_sources import (
     mesh_sources,
     named_values,
     with_common_values,
     with_frictions,
 )
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_view_options,
-    add_workers,
-    examples_text,
-)
-from burg_drake.apps.options.values import (
-    coefficient,
-    friction,
-    input_file,
-    named_positive,
-    names,
-    positive,
-    unit,
-)
-from burg_drake.apps.terminal import print_remark
-from burg_drake.core import (
-    BurgError,
-    InvalidInputError,
-    MeshError,
-    TextTable,
-    format_count,
-    format_number,
-    list_names,
-)
+from burg_drake.apps.terminal import print_remark, show_progress
 from burg_drake.system_libraries import describe_missing, missing_import_libraries
 
 if TYPE_CHECKING:
     from burg_drake.objects import ObjectEntry, ObjectLibrary
-    from burg_drake.pipeline import BuildReport, ObjectSource
 
 
 def run_library_list(arguments: argparse.Namespace) -> int:
@@ -64,10 +39,9 @@ def run_library_list(arguments: argparse.Namespace) -> int:
 def run_library_check(arguments: argparse.Namespace) -> int:
     """Prints what is wrong with a library; 1 if there are errors."""
     from burg_drake.objects import load_library
-    from burg_drake.pipeline import check_library
 
     library = load_library(arguments.library)
-    issues = check_library(library)
+    issues = pipeline.check_library(library)
     print_contact_geometry(library, library.objects)
     for issue in issues:
         where = f"{issue.object}: " if issue.object else ""
@@ -83,7 +57,6 @@ def run_library_show(arguments: argparse.Namespace) -> int:
     """Shows a library in Meshcat, or writes pages of it."""
     from burg_drake.apps.terminal import open_view, present_view
     from burg_drake.objects import load_library
-    from burg_drake.pipeline import check_library
     from burg_drake.visualization import show_library, write_contact_sheet
 
     library = load_library(arguments.library)
@@ -91,7 +64,7 @@ def run_library_show(arguments: argparse.Namespace) -> int:
         library.entry(name)
     if arguments.sheet is not None:
         remarks: dict[str, list[str]] = defaultdict(list)
-        for issue in check_library(library):
+        for issue in pipeline.check_library(library):
             remarks[issue.object].append(issue.message)
         write_contact_sheet(library, arguments.sheet, arguments.only, remarks=remarks)
         print(f"wrote {arguments.sheet}")
@@ -124,25 +97,25 @@ def print_contact_geometry(library: ObjectLibrary, names: Iterable[str]) -> None
 
     for name in names:
         if not library.entry(name).contact.reason:
-            with contextlib.suppress(BurgError):
+            with contextlib.suppress(core.BurgError):
                 print(f"{name}: gripper pads touch {describe_pad_contact(library, name)}")
 
 
-def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:
+def library_table(objects: Mapping[str, ObjectEntry]) -> core.TextTable:
     """Objects by name."""
-    table = TextTable().names("object")
+    table = core.TextTable().names("object")
     table.numbers("mass [g]", "size [mm]", "mu", "pieces", "poses")
     for name, entry in objects.items():
         size = [1e3 * (b - a) for a, b in zip(entry.lower, entry.upper, strict=True)]
-        mass = format_number(1e3 * entry.mass, 1)
+        mass = core.format_number(1e3 * entry.mass, 1)
         marks = {"density": f"~{mass}", "fixed": "fixed"}
         table.row(
             name,
             marks.get(entry.mass_properties.source, mass),
-            " x ".join(format_number(s, 0) for s in size),
-            format_number(entry.friction),
-            format_count(len(entry.pieces)),
-            format_count(len(entry.stable_poses)),
+            " x ".join(core.format_number(s, 0) for s in size),
+            core.format_number(entry.friction),
+            core.format_count(len(entry.pieces)),
+            core.format_count(len(entry.stable_poses)),
         )
     return table
 
@@ -156,15 +129,14 @@ def run_library_build(arguments: argparse.Namespace) -> int:
 def run_library_add(arguments: argparse.Namespace) -> int:
     """Adds an object to a library that exists."""
     from burg_drake.objects import LIBRARY_FILE, load_library
-    from burg_drake.pipeline import ObjectSource, object_name
 
     folder = Path(arguments.library)
     if not (folder / LIBRARY_FILE).is_file():
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{folder} holds no {LIBRARY_FILE}; burg-drake library build MESH -o {folder} makes one"
         )
     load_library(folder)
-    source = ObjectSource.from_file(
+    source = pipeline.ObjectSource.from_file(
         arguments.mesh,
         mass=arguments.mass,
         density=arguments.density,
@@ -172,39 +144,37 @@ def run_library_add(arguments: argparse.Namespace) -> int:
         description=arguments.description or "",
     )
     if arguments.name:
-        source = replace(source, name=object_name(arguments.name))
+        source = replace(source, name=pipeline.object_name(arguments.name))
     return _build_library(with_common_values([source], arguments), folder, None, arguments)
 
 
 def run_library_import_burg(arguments: argparse.Namespace) -> int:
     """Builds what a library of BURG-Toolkit lists, and tells how the stable poses agree."""
-    from burg_drake.core import make_name
     from burg_drake.formats import read_burg_library
     from burg_drake.objects import load_library
-    from burg_drake.pipeline import burg_names, burg_sources, compare_poses, fixed_note
 
     burg = read_burg_library(arguments.file)
-    names = burg_names(burg)
+    names = pipeline.burg_names(burg)
     values = named_values(arguments, set(names.values()))
-    sources = burg_sources(
+    sources = pipeline.burg_sources(
         burg,
         values.masses,
         density=arguments.density,
         friction=values.common_friction,
         skip=arguments.skip,
     )
-    for note in (*burg.notes, fixed_note(burg, sources)):
+    for note in (*burg.notes, pipeline.fixed_note(burg, sources)):
         if note:
             print(note)
     sources = with_frictions(sources, values)
-    name = arguments.name or (make_name(burg.name) if burg.name else None)
+    name = arguments.name or (core.make_name(burg.name) if burg.name else None)
     code = _build_library(sources, arguments.output, name, arguments)
     library = load_library(arguments.output)
     for item in burg.objects:
         name = names[item.identifier]
         if item.stable_poses and name in library.objects and not library.entry(name).is_fixed:
             recorded = [pose.X_SO for pose in item.stable_poses]
-            comparison = compare_poses(recorded, library, name)
+            comparison = pipeline.compare_poses(recorded, library, name)
             print(f"{name}: {comparison.sentence(Path(arguments.file).name)}")
     return code
 
@@ -212,11 +182,10 @@ def run_library_import_burg(arguments: argparse.Namespace) -> int:
 def run_library_import_ycb(arguments: argparse.Namespace) -> int:
     """Builds the objects of a YCB download."""
     from burg_drake.formats import find_ycb
-    from burg_drake.pipeline import object_name, ycb_sources
 
     objects = find_ycb(arguments.folder)
-    values = named_values(arguments, {object_name(item.name) for item in objects})
-    sources = ycb_sources(
+    values = named_values(arguments, {pipeline.object_name(item.name) for item in objects})
+    sources = pipeline.ycb_sources(
         objects, values.masses, density=arguments.density, friction=values.common_friction
     )
     return _build_library(
@@ -225,20 +194,14 @@ def run_library_import_ycb(arguments: argparse.Namespace) -> int:
 
 
 def _build_library(
-    sources: Sequence[ObjectSource],
+    sources: Sequence[pipeline.ObjectSource],
     output: str | Path,
     name: str | None,
     arguments: argparse.Namespace,
 ) -> int:
-    from burg_drake.core import Progress, ProgressMeter, Reporter, default_workers
-    from burg_drake.pipeline import build_library
-
     if missing := missing_import_libraries():
-        raise InvalidInputError(describe_missing(missing))
-    with Reporter(not arguments.quiet) as reporter:
-        pace = ProgressMeter(
-            reporter.show, Progress("building", total=len(sources), unit="objects")
-        )
+        raise core.InvalidInputError(describe_missing(missing))
+    with show_progress("building", "objects", len(sources), quiet=arguments.quiet) as pace:
 
         def progress(name: str, state: str, done: int, total: int) -> None:
             """Objects that are up to date come first, and cost nothing."""
@@ -250,16 +213,16 @@ def _build_library(
         def on_failure(name: str, message: str, error: BaseException) -> None:
             """Told at once, as the others may take long; an only object's ends the command."""
             if len(sources) > 1:
-                units = error.units if isinstance(error, MeshError) else ()
+                units = error.units if isinstance(error, core.MeshError) else ()
                 hint = f"; for this mesh alone --unit {name}={units[0]}" if units else ""
                 print_remark(f"error: {_failure_message(by_name[name], message)}{hint}")
 
-        report = build_library(
+        report = pipeline.build_library(
             sources,
             output,
             name=name,
             confirm=not arguments.no_confirm,
-            workers=arguments.workers or default_workers(),
+            workers=arguments.workers or core.default_workers(),
             progress=progress,
             on_failure=on_failure,
         )
@@ -267,15 +230,17 @@ def _build_library(
     if report.failed and not done:
         _print_build_summary(report)
         if len(sources) == 1:
-            raise InvalidInputError(_failure_message(sources[0], report.failed[sources[0].name]))
-        raise InvalidInputError(f"none of the {len(sources)} objects could be built")
+            raise core.InvalidInputError(
+                _failure_message(sources[0], report.failed[sources[0].name])
+            )
+        raise core.InvalidInputError(f"none of the {len(sources)} objects could be built")
     print_library(report.library, only=done)
     _print_build_notes(report)
     _print_build_summary(report)
     return 1 if report.failed else 0
 
 
-def _print_build_notes(report: BuildReport) -> None:
+def _print_build_notes(report: pipeline.BuildReport) -> None:
     for name in report.built:
         print_contact_geometry(report.library, [name])
         repairs = report.library.objects[name].source.repairs
@@ -284,15 +249,15 @@ def _print_build_notes(report: BuildReport) -> None:
             print(f"{name}: {note}")
 
 
-def _print_build_summary(report: BuildReport) -> None:
-    failed = f" ({list_names(list(report.failed))})" if report.failed else ""
+def _print_build_summary(report: pipeline.BuildReport) -> None:
+    failed = f" ({core.list_names(list(report.failed))})" if report.failed else ""
     print(
         f"{report.library.root}: {len(report.built)} built, {len(report.cached)} up to date,"
         f" {len(report.failed)} failed{failed}"
     )
 
 
-def _failure_message(source: ObjectSource, message: str) -> str:
+def _failure_message(source: pipeline.ObjectSource, message: str) -> str:
     """A message that names the object or its mesh file."""
     is_named = message.startswith(f"{source.name}: ") or str(source.mesh) in message
     return message if is_named else f"{source.name}: {message}"
@@ -316,9 +281,9 @@ Meshes may have 512 MB and 2,000,000 triangles, with openings 1,000,000; texture
 """Help text about objects.yaml and the limits of meshes."""
 
 
-def add_library_build_options(build: Parser) -> None:
+def add_library_build_options(build: options.Parser) -> None:
     """Adds the options of `burg-drake library build`."""
-    build.epilog = examples_text(
+    build.epilog = options.examples_text(
         "burg-drake library build scans/*.obj -o my_library",
         "burg-drake library build mug.stl -o my_library --unit mm --mass mug=0.118",
         "burg-drake library build scans/ -o my_library --masses masses.yaml --friction 0.4",
@@ -338,11 +303,11 @@ def add_library_build_options(build: Parser) -> None:
     _add_common_values(build)
 
 
-def add_library_add_options(add: Parser) -> None:
+def add_library_add_options(add: options.Parser) -> None:
     """Adds the options of `burg-drake library add`."""
     from burg_drake.objects import DEFAULT_FRICTION
 
-    add.epilog = examples_text(
+    add.epilog = options.examples_text(
         "burg-drake library add my_library mug.obj --mass 0.118 --friction 0.4",
         "burg-drake library add my_library scan_7.ply --name towel --mass 0.2"
         " --wall-thickness 0.005",
@@ -350,20 +315,20 @@ def add_library_add_options(add: Parser) -> None:
     add.add_argument("library", metavar="LIBRARY", help="folder of the library")
     add.add_argument("mesh", metavar="MESH", help="mesh file")
     add.add_argument("--name", help="name of the object (default: that of the mesh file)")
-    add.add_argument("--mass", metavar="KG", type=positive, help="mass in kg")
+    add.add_argument("--mass", metavar="KG", type=options.positive, help="mass in kg")
     add.add_argument(
         "--friction",
         metavar="MU",
-        type=coefficient,
+        type=options.coefficient,
         help=f"friction coefficient (default: {DEFAULT_FRICTION:g})",
     )
     add.add_argument("--description", metavar="TEXT", help="a note for people")
     _add_common_values(add)
 
 
-def add_library_import_burg_options(burg: Parser) -> None:
+def add_library_import_burg_options(burg: options.Parser) -> None:
     """Adds the options of `burg-drake library import-burg`."""
-    burg.epilog = examples_text(
+    burg.epilog = options.examples_text(
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake library import-burg object_library.yaml -o my_library --mass table=4",
     )
@@ -380,71 +345,71 @@ def add_library_import_burg_options(burg: Parser) -> None:
     _add_shared_import_options(burg, " (default: such objects stay fixed, as background)")
 
 
-def add_library_import_ycb_options(ycb: Parser) -> None:
+def add_library_import_ycb_options(ycb: options.Parser) -> None:
     """Adds the options of `burg-drake library import-ycb`."""
-    ycb.epilog = examples_text("burg-drake library import-ycb ~/data/ycb -o ycb_library")
+    ycb.epilog = options.examples_text("burg-drake library import-ycb ~/data/ycb -o ycb_library")
     ycb.add_argument("folder", metavar="DIR", help="folder with the downloaded objects")
     _add_shared_import_options(ycb)
 
 
-def _add_shared_import_options(parser: Parser, without: str = "") -> None:
+def _add_shared_import_options(parser: options.Parser, without: str = "") -> None:
     _add_output(parser)
     _add_named_values(parser)
     _add_density(parser, without)
     _add_build_run_options(parser)
 
 
-def _add_library_argument(parser: Parser) -> None:
+def _add_library_argument(parser: options.Parser) -> None:
     parser.add_argument(
         "library", metavar="LIBRARY", help="folder of a library, or the built-in household"
     )
 
 
-def add_library_list_options(listing: Parser) -> None:
+def add_library_list_options(listing: options.Parser) -> None:
     """Adds the options of `burg-drake library list`."""
-    listing.epilog = examples_text(
+    listing.epilog = options.examples_text(
         "burg-drake library list household", "burg-drake library list my_library"
     )
     _add_library_argument(listing)
 
 
-def add_library_check_options(check: Parser) -> None:
+def add_library_check_options(check: options.Parser) -> None:
     """Adds the options of `burg-drake library check`."""
-    check.epilog = examples_text("burg-drake library check my_library")
+    check.epilog = options.examples_text("burg-drake library check my_library")
     _add_library_argument(check)
 
 
-def add_library_show_options(show: Parser) -> None:
+def add_library_show_options(show: options.Parser) -> None:
     """Adds the options of `burg-drake library show`."""
-    show.epilog = examples_text(
+    show.epilog = options.examples_text(
         "burg-drake library show household",
         "burg-drake library show my_library --only mug,bowl",
         "burg-drake library show my_library --html gallery.html --sheet sheet.html",
     )
     _add_library_argument(show)
     show.add_argument(
-        "--only", metavar="A,B", type=names, action="extend", help="only these objects"
+        "--only", metavar="A,B", type=options.names, action="extend", help="only these objects"
     )
     show.add_argument(
         "--sheet",
         metavar="FILE",
         help="also write a page with a picture and key figures of each object",
     )
-    add_view_options(show)
+    options.add_view_options(show)
 
 
-def _add_output(parser: Parser) -> None:
-    add_output(parser, "DIR", "folder of the library")
+def _add_output(parser: options.Parser) -> None:
+    options.add_output(parser, "DIR", "folder of the library")
     parser.add_argument("--name", help="name of the library (default: that of its folder)")
 
 
-def _add_named_values(parser: Parser) -> None:
+def _add_named_values(parser: options.Parser) -> None:
     from burg_drake.objects import DEFAULT_FRICTION
 
     parser.add_argument(
         "--mass",
         metavar="NAME=KG",
-        type=named_positive,
+        type=options.named_positive,
         action="append",
         default=[],
         help="mass of an object in kg; repeatable",
@@ -452,29 +417,29 @@ def _add_named_values(parser: Parser) -> None:
     parser.add_argument(
         "--masses",
         metavar="FILE",
-        type=input_file,
+        type=options.input_file,
         help="YAML file of 'NAME: KG' lines, '-' for standard input; --mass wins",
     )
     parser.add_argument(
         "--friction",
         metavar="[NAME=]MU",
-        type=friction,
+        type=options.friction,
         action="append",
         default=[],
         help=f"friction coefficient of one object or of all (default: {DEFAULT_FRICTION:g})",
     )
 
 
-def _add_density(parser: Parser, without: str = "") -> None:
+def _add_density(parser: options.Parser, without: str = "") -> None:
     parser.add_argument(
         "--density",
         metavar="KG/M3",
-        type=positive,
+        type=options.positive,
         help=f"density of objects without a mass{without}",
     )
 
 
-def _add_common_values(parser: Parser) -> None:
+def _add_common_values(parser: options.Parser) -> None:
     from burg_drake.objects import CONTACT_KINDS, UNITS, Openings
 
     _add_density(parser)
@@ -482,18 +447,20 @@ def _add_common_values(parser: Parser) -> None:
     scale.add_argument(
         "--unit",
         metavar="[NAME=]UNIT",
-        type=unit,
+        type=options.unit,
         action="append",
         default=[],
         help=f"unit of one mesh or of all: {', '.join(UNITS)} (default: m)",
     )
     scale.add_argument(
-        "--scale", type=positive, help="factor from the meshes' unit to metres, such as 0.0005"
+        "--scale",
+        type=options.positive,
+        help="factor from the meshes' unit to metres, such as 0.0005",
     )
     parser.add_argument(
         "--wall-thickness",
         metavar="M",
-        type=positive,
+        type=options.positive,
         help="treat surfaces as walls of this thickness in metres",
     )
     parser.add_argument(
@@ -507,9 +474,9 @@ def _add_common_values(parser: Parser) -> None:
     _add_build_run_options(parser)
 
 
-def _add_build_run_options(parser: Parser) -> None:
+def _add_build_run_options(parser: options.Parser) -> None:
     parser.add_argument(
         "--no-confirm", action="store_true", help="skip the simulation that confirms stable poses"
     )
-    add_workers(parser)
-    add_quiet(parser)
+    options.add_workers(parser)
+    options.add_quiet(parser)

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_measured_board,
-    add_output,
-    add_scene,
-    examples_text,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake import cameras, core
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_warning
 
-if TYPE_CHECKING:
-    from burg_drake.cameras import CharucoTarget
 
-
-def add_printout_options(parser: Parser) -> None:
+def add_printout_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake printout`."""
     from burg_drake.printout import PrintSettings
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake printout tabletop_six -o board.pdf",
         "burg-drake printout tabletop_six --page A2 -o board.pdf",
         "burg-drake printout tabletop_six --measured-mm 98.5 -o board.pdf",
@@ -31,14 +22,14 @@ def add_printout_options(parser: Parser) -> None:
         "Print at 100 % and measure the two printed rulers of 100 mm. If they are not 100 mm"
         " long, print again with what they measure, such as --measured-mm 98.5,99.2.",
     )
-    add_scene(parser)
-    add_output(parser, "FILE", "file to write (.pdf)")
-    add_settings_options(parser, PrintSettings, "page", "margin")
-    add_measured_board(
+    options.add_scene(parser)
+    options.add_output(parser, "FILE", "file to write (.pdf)")
+    options.add_settings_options(parser, PrintSettings, "page", "margin")
+    options.add_measured_board(
         parser,
         "length of the printed 100 mm rulers along x and y, to correct the print (default: 100)",
     )
-    add_settings_options(parser, PrintSettings, "height_map", "names")
+    options.add_settings_options(parser, PrintSettings, "height_map", "names")
     parser.add_argument(
         "--no-instructions", action="store_true", help="leave out the page of instructions"
     )
@@ -46,28 +37,25 @@ def add_printout_options(parser: Parser) -> None:
 
 def require_pdf(path: str) -> None:
     """Refuses names of other files."""
-    from burg_drake.core import InvalidInputError
-
     if not path.lower().endswith(".pdf"):
-        raise InvalidInputError(f"{path}: only PDF is written; end the name with .pdf")
+        raise core.InvalidInputError(f"{path}: only PDF is written; end the name with .pdf")
 
 
 def run_printout(arguments: argparse.Namespace) -> int:
     """Writes the PDF; what is not on it as in the scene goes to stderr."""
-    from burg_drake.core import require_writable
     from burg_drake.printout import PAPER_SIZES, PrintSettings, print_board
     from burg_drake.scene import load_scene
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = settings_from(
+    settings = options.settings_from(
         arguments,
         PrintSettings,
         measured=(x * 1e-3, y * 1e-3),
         instructions=not arguments.no_instructions,
     )
     scene = load_scene(arguments.scene)
-    require_writable(arguments.output)
+    core.require_writable(arguments.output)
     printout = print_board(scene, settings)
     printout.save(arguments.output)
     for warning in printout.warnings:
@@ -83,17 +71,17 @@ def run_printout(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def add_camera_target_options(target: Parser) -> None:
+def add_camera_target_options(target: options.Parser) -> None:
     """Adds the options of `burg-drake camera target`."""
     from burg_drake.printout import PrintSettings
 
-    target.epilog = examples_text(
+    target.epilog = options.examples_text(
         "burg-drake camera target -o target.pdf",
         "burg-drake camera target --page A3 --square-mm 30 --marker-mm 22 -o target.pdf",
     )
-    add_output(target, "FILE", "file to write (.pdf)")
-    add_settings_options(target, PrintSettings, "page")
-    add_measured_board(
+    options.add_output(target, "FILE", "file to write (.pdf)")
+    options.add_settings_options(target, PrintSettings, "page")
+    options.add_measured_board(
         target, "length of the 100 mm rulers of an earlier print, to correct this one"
     )
     add_target_board_options(target)
@@ -101,31 +89,26 @@ def add_camera_target_options(target: Parser) -> None:
 
 def add_target_board_options(parser: Any) -> None:
     """The options about the board."""
-    from burg_drake.cameras import CharucoTarget
-
     board = parser.add_argument_group(
         "calibration board", "The defaults are those of `burg-drake camera target`."
     )
-    add_settings_options(board, CharucoTarget)
+    options.add_settings_options(board, cameras.CharucoTarget)
 
 
-def target_from_options(arguments: argparse.Namespace) -> CharucoTarget:
+def target_from_options(arguments: argparse.Namespace) -> cameras.CharucoTarget:
     """The board that the options tell."""
-    from burg_drake.cameras import CharucoTarget
-
-    return settings_from(arguments, CharucoTarget)
+    return options.settings_from(arguments, cameras.CharucoTarget)
 
 
 def run_camera_target(arguments: argparse.Namespace) -> int:
     """Writes the PDF."""
-    from burg_drake.cameras import write_target
     from burg_drake.printout import PrintSettings
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = settings_from(arguments, PrintSettings, measured=(1e-3 * x, 1e-3 * y))
+    settings = options.settings_from(arguments, PrintSettings, measured=(1e-3 * x, 1e-3 * y))
     target = target_from_options(arguments)
-    paper = write_target(target, arguments.output, settings)
+    paper = cameras.write_target(target, arguments.output, settings)
     columns, rows = target.squares
     print(
         f"wrote {arguments.output}: {columns} x {rows} squares of {arguments.square_mm:g} mm on"

@@ -8,40 +8,17 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_retry_failed,
-    add_scene,
-    add_station,
-    add_workers,
-    examples_text,
-    retry_advice,
-)
-from burg_drake.apps.options.evaluated_grasps import (
-    add_grasp_file_options,
-    add_motion_options,
-    add_sampling_options,
-    grasps_per_object,
-    motion_from_options,
-    print_shortfalls,
-    read_grasps_from_options,
-    refuse_sampling_options_with_file,
-    require_grasp_file,
-)
-from burg_drake.apps.options.grasp_files import GraspOutput, add_format_option, grasp_output
-from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning
-from burg_drake.core import InvalidInputError, TextTable, require_writable
+from burg_drake import core, evaluation
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning, show_progress
 
 if TYPE_CHECKING:
-    from burg_drake.core import GraspSet, Outcome
     from burg_drake.scene import Scene
     from burg_drake.station import GraspMotion, Station
 
 
 def print_reach_tables(
-    grasps: GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
+    grasps: core.GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
 ) -> None:
     """Counts by object and by outcome, what was in the way, objects without a clear or reachable
     grasp, and how fast that was found out.
@@ -52,41 +29,42 @@ def print_reach_tables(
         motion: of the hand.
         given: whether the grasps are the user's own.
     """
-    from burg_drake.core import Outcome, Stage, format_number
-    from burg_drake.evaluation import unclear_notes, unmoved_notes
-
-    outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
-    by_object: dict[str, Counter[Outcome]] = {name: Counter() for name in asked}
+    outcomes = [core.Outcome(text) for text in grasps.column("outcome").tolist()]
+    by_object: dict[str, Counter[core.Outcome]] = {name: Counter() for name in asked}
     for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
         by_object.setdefault(name, Counter())[outcome] += 1
     total = Counter(outcomes)
     reach_table(by_object, total).show()
     outcome_table(grasps, by_object, total).show()
     ended, blocker = grasps.column("outcome"), grasps.column("blocker")
-    notes = unclear_notes(grasps.object, ended, blocker, given=given)
-    print_note_lines((*notes, *unmoved_notes(grasps.object, ended, blocker, motion)))
-    clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
+    notes = evaluation.unclear_notes(grasps.object, ended, blocker, given=given)
+    print_note_lines((*notes, *evaluation.unmoved_notes(grasps.object, ended, blocker, motion)))
+    clear = sum(n for o, n in total.items() if o.stage is not core.Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())
     if clear and seconds > 0.0:
-        rate = f"{format_number(clear / seconds)} clear grasps per CPU second"
-        print(f"{rate}; {format_number(seconds)} CPU seconds without set-up")
+        rate = f"{core.format_number(clear / seconds)} clear grasps per CPU second"
+        print(f"{rate}; {core.format_number(seconds)} CPU seconds without set-up")
 
 
-def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
+def reach_table(
+    by_object: Mapping[str, Counter[core.Outcome]], total: Counter[core.Outcome]
+) -> core.TextTable:
     """How many grasps of each object the arm can execute."""
-    from burg_drake.core import Outcome, Stage, format_count, format_percent
-
-    table = TextTable("Grasps that the arm can execute").names("object")
+    table = core.TextTable("Grasps that the arm can execute").names("object")
     table.numbers("grasps", "clear", "reachable", "of clear")
     rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
     for name, counts in rows.items():
         if name == "all":
             table.gap()
-        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
-        good = counts[Outcome.REACHABLE]
-        share = format_percent(good / clear) if clear else "-"
+        clear = sum(n for o, n in counts.items() if o.stage is not core.Stage.CLEAR)
+        good = counts[core.Outcome.REACHABLE]
+        share = core.format_percent(good / clear) if clear else "-"
         table.row(
-            name, format_count(counts.total()), format_count(clear), format_count(good), share
+            name,
+            core.format_count(counts.total()),
+            core.format_count(clear),
+            core.format_count(good),
+            share,
         )
     table.caption = (
         "clear: the open hand collides with nothing at the grasp\n"
@@ -96,37 +74,37 @@ def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcom
 
 
 def outcome_table(
-    grasps: GraspSet, by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]
-) -> TextTable:
+    grasps: core.GraspSet,
+    by_object: Mapping[str, Counter[core.Outcome]],
+    total: Counter[core.Outcome],
+) -> core.TextTable:
     """Outcomes by object where they fit, with what was mostly in the way."""
     max_blockers = 3  # Most frequent bodies listed for each outcome.
     from rich.console import Console
 
-    from burg_drake.core import Outcome, format_count, format_percent
-
     room = Console().width - 70
     names = [name for name in by_object if len(by_object) > 1]
     names = names if sum(len(name) + 2 for name in names) <= room else []
-    table = TextTable("Outcomes").texts("outcome")
+    table = core.TextTable("Outcomes").texts("outcome")
     table.numbers(*names, "all", "share").texts("mostly in the way")
-    order = [Outcome.REACHABLE, *Outcome]
+    order = [core.Outcome.REACHABLE, *core.Outcome]
     for outcome in sorted(total, key=order.index):
         mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(max_blockers)
-        counts = [format_count(n) if (n := by_object[name][outcome]) else "·" for name in names]
-        share = format_percent(total[outcome] / len(grasps))
-        in_the_way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
-        table.row(outcome.value, *counts, format_count(total[outcome]), share, in_the_way)
-    failed = [one for one in Outcome if one in total and one is not Outcome.REACHABLE]
+        counts = [
+            core.format_count(n) if (n := by_object[name][outcome]) else "·" for name in names
+        ]
+        share = core.format_percent(total[outcome] / len(grasps))
+        in_the_way = ", ".join(f"{name} ({core.format_count(n)})" for name, n in blockers)
+        table.row(outcome.value, *counts, core.format_count(total[outcome]), share, in_the_way)
+    failed = [one for one in core.Outcome if one in total and one is not core.Outcome.REACHABLE]
     table.caption = "\n".join(f"{outcome}: {outcome.meaning}" for outcome in failed)
     return table
 
 
-def add_reach_options(parser: Parser) -> None:
+def add_reach_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake reach`."""
-    from burg_drake.evaluation import PlanFormat
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
         "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
         "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
@@ -137,20 +115,20 @@ def add_reach_options(parser: Parser) -> None:
         " lift, and it finds a path from home. Each yes is checked by Drake. Nothing is"
         " simulated; `evaluate` does that.",
     )
-    add_scene(parser)
+    options.add_scene(parser)
     which = parser.add_mutually_exclusive_group()
-    add_sampling_options(parser, 100, which)
-    add_grasp_file_options(parser, which)
-    add_station(parser)
-    add_motion_options(parser)
-    add_output(
+    options.add_sampling_options(parser, 100, which)
+    options.add_grasp_file_options(parser, which)
+    options.add_station(parser)
+    options.add_motion_options(parser)
+    options.add_output(
         parser,
         "OUT",
         "table (.csv, .parquet), grasp file (.h5, .npz, ...), or folder for a file per"
         " object (default: only print)",
         required=False,
     )
-    add_format_option(parser)
+    options.add_format_option(parser)
     parser.add_argument("--only-reachable", action="store_true", help="write only reachable grasps")
     parser.add_argument(
         "--plans",
@@ -159,7 +137,7 @@ def add_reach_options(parser: Parser) -> None:
     )
     parser.add_argument(
         "--plan-format",
-        choices=get_args(PlanFormat),
+        choices=get_args(evaluation.PlanFormat),
         help="format of the motions: JSON like ROS's JointTrajectory, or CSV (default: json)",
     )
     parser.add_argument(
@@ -167,14 +145,13 @@ def add_reach_options(parser: Parser) -> None:
         action="store_true",
         help="twice as fast, and wrong for one or two grasps in a hundred",
     )
-    add_workers(parser)
-    add_retry_failed(parser, "grasps")
-    add_quiet(parser)
+    options.add_workers(parser)
+    options.add_retry_failed(parser, "grasps")
+    options.add_quiet(parser)
 
 
 def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
-    from burg_drake.evaluation import PlanOutput, mistake_notes, reach
     from burg_drake.motion import require_usable_arm
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station, require_valid_scene
@@ -183,17 +160,19 @@ def run_reach(arguments: argparse.Namespace) -> int:
     output = _reach_output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     warnings = require_valid_scene(scene, station)
-    motion = motion_from_options(arguments, station)
+    motion = options.motion_from_options(arguments, station)
     grasps = _load_or_sample_grasps(arguments, scene, station)
-    hints = mistake_notes(grasps, station, scene) if arguments.grasps is not None else ()
-    if isinstance(output, GraspOutput):
+    hints = evaluation.mistake_notes(grasps, station, scene) if arguments.grasps is not None else ()
+    if isinstance(output, options.GraspOutput):
         output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
     for warning in (*warnings, *require_usable_arm(scene, station)):
         print_warning(warning)
     plans = None
     if arguments.plans is not None:
-        plans = PlanOutput(arguments.plans, arguments.plan_format or "json", arguments.retry_failed)
-    judged = reach(
+        plans = evaluation.PlanOutput(
+            arguments.plans, arguments.plan_format or "json", arguments.retry_failed
+        )
+    judged = evaluation.reach(
         scene,
         station,
         grasps,
@@ -221,71 +200,63 @@ def _require_consistent_options(arguments: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: names the option or the folder.
     """
-    require_grasp_file(arguments)
-    refuse_sampling_options_with_file(arguments)
+    options.require_grasp_file(arguments)
+    options.refuse_sampling_options_with_file(arguments)
     if arguments.plan_format and not arguments.plans:
-        raise InvalidInputError("--plan-format is for plan files; add --plans DIR")
+        raise core.InvalidInputError("--plan-format is for plan files; add --plans DIR")
     if arguments.retry_failed and not arguments.plans:
-        raise InvalidInputError("--retry-failed is for plan files; add --plans DIR")
+        raise core.InvalidInputError("--retry-failed is for plan files; add --plans DIR")
     if arguments.only_reachable and arguments.output is None:
-        raise InvalidInputError("--only-reachable is for the output file; add -o OUT")
+        raise core.InvalidInputError("--only-reachable is for the output file; add -o OUT")
     if arguments.plans:
-        require_writable(Path(arguments.plans) / "plan")
+        core.require_writable(Path(arguments.plans) / "plan")
         arguments.after_interrupt = "; run the same command to continue"
 
 
 def _print_answers(
-    judged: GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
+    judged: core.GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
 ) -> None:
     """The tables, and what one has to know to read them."""
-    from burg_drake.evaluation import (
-        chosen_instances,
-        count_short_lifts,
-        missing_grasps_note,
-        motion_text,
-    )
     from burg_drake.station import GraspMotion
 
-    names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
+    names = [scene.instance(n).object for n in evaluation.chosen_instances(scene, arguments.only)]
     given = arguments.grasps is not None
     print_reach_tables(judged.select(_judged_mask(judged)), names, motion, given=given)
-    if given and (note := missing_grasps_note(names, judged.object.tolist())):
+    if given and (note := evaluation.missing_grasps_note(names, judged.object.tolist())):
         print(f"note: {note}")
     if motion != GraspMotion():
-        print(f"motion: {motion_text(motion)}")
-    lifts = count_short_lifts(judged.column("lift_height"), motion.lift_height)
+        print(f"motion: {evaluation.motion_text(motion)}")
+    lifts = evaluation.count_short_lifts(judged.column("lift_height"), motion.lift_height)
     if lifts is not None:
         print(lifts)
 
 
-def _judged_mask(judged: GraspSet) -> Any:
+def _judged_mask(judged: core.GraspSet) -> Any:
     """(N,) bool, which grasps could be judged."""
     return judged.column("outcome") != ""
 
 
-def _reachable_mask(judged: GraspSet) -> Any:
+def _reachable_mask(judged: core.GraspSet) -> Any:
     """(N,) bool, which grasps the arm can execute."""
-    from burg_drake.core import Outcome
-
-    return judged.column("outcome") == Outcome.REACHABLE
+    return judged.column("outcome") == core.Outcome.REACHABLE
 
 
-def _unplanned_mask(judged: GraspSet) -> Any:
+def _unplanned_mask(judged: core.GraspSet) -> Any:
     """(N,) bool, which of those have no plan though one was wanted."""
     return _reachable_mask(judged) & (judged.column("reason") != "")
 
 
-def _report_failures(judged: GraspSet, arguments: argparse.Namespace) -> int:
+def _report_failures(judged: core.GraspSet, arguments: argparse.Namespace) -> int:
     """Says of which grasps the computation has failed; 1 if there are any."""
     answered, unplanned = _judged_mask(judged), _unplanned_mask(judged)
     failed = judged.select(~answered)
-    retry = f"; {retry_advice(0, len(failed))}" if arguments.plans else ""
+    retry = f"; {options.retry_advice(0, len(failed))}" if arguments.plans else ""
     _print_failures(failed, "could not be judged", len(judged), retry)
     _print_failures(judged.select(unplanned), "have no plan", int(_reachable_mask(judged).sum()))
     return 0 if answered.all() and not unplanned.any() else 1
 
 
-def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:
+def _print_failures(failed: core.GraspSet, what: str, total: int, retry: str = "") -> None:
     """A line about grasps whose computation has failed, if there are any."""
     if len(failed):
         reason = failed.column("reason")[0].removeprefix("no plan: ")
@@ -295,38 +266,36 @@ def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") ->
 
 def _load_or_sample_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
-) -> Mapping[str, GraspSet]:
+) -> Mapping[str, core.GraspSet]:
     """The grasps of the file, or sampled ones, by instance."""
-    from burg_drake.evaluation import select_instances
-
     if arguments.grasps is not None:
-        given = read_grasps_from_options(arguments, scene, station)
+        given = options.read_grasps_from_options(arguments, scene, station)
         print_note_lines(given.notes)
-        return select_instances(scene, given.by_instance, arguments.only)
+        return evaluation.select_instances(scene, given.by_instance, arguments.only)
     return sampled_grasps(arguments, scene, station)
 
 
 def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
-) -> dict[str, GraspSet]:
+) -> dict[str, core.GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter
-    from burg_drake.evaluation import SamplingSettings, chosen_instances, sample_on_scene
-
-    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
-    count, seed = grasps_per_object(arguments), arguments.seed
+    settings = evaluation.SamplingSettings(
+        approach_angle_deg=arguments.approach_angle, blind=arguments.blind
+    )
+    count, seed = options.grasps_per_object(arguments), arguments.seed
     sampled = {}
-    total = len(chosen_instances(scene, arguments.only))
-    with Reporter(not arguments.quiet) as reporter:
-        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
-        for name, grasps in sample_on_scene(scene, station, count, seed, settings, arguments.only):
+    total = len(evaluation.chosen_instances(scene, arguments.only))
+    with show_progress("sampling", "objects", total, quiet=arguments.quiet) as pace:
+        for name, grasps in evaluation.sample_on_scene(
+            scene, station, count, seed, settings, arguments.only
+        ):
             sampled[name] = grasps
             pace.step(note=name)
-    print_shortfalls(sampled, count)
+    options.print_shortfalls(sampled, count)
     return sampled
 
 
-def _reach_output(arguments: argparse.Namespace) -> Path | GraspOutput | None:
+def _reach_output(arguments: argparse.Namespace) -> Path | options.GraspOutput | None:
     """Where to write: a table, a grasp file, or nowhere; a place that cannot be written to is
     refused before any work."""
     table_suffixes = (".csv", ".parquet")  # Tables have one row per grasp and no provenance.
@@ -334,22 +303,20 @@ def _reach_output(arguments: argparse.Namespace) -> Path | GraspOutput | None:
         return None
     path = Path(arguments.output)
     if arguments.target is None and path.suffix in table_suffixes and not path.is_dir():
-        from burg_drake.evaluation import require_table
-
-        require_table(path)
+        evaluation.require_table(path)
         return path
-    return grasp_output(arguments.output, arguments.target, frame="object")
+    return options.grasp_output(arguments.output, arguments.target, frame="object")
 
 
-def _write_grasps(grasps: GraspSet, output: Path | GraspOutput, station: Station) -> None:
+def _write_grasps(
+    grasps: core.GraspSet, output: Path | options.GraspOutput, station: Station
+) -> None:
     frame_text = "x, y, z: the grasp frame's origin in the frame of its object"
-    from burg_drake.core import with_shareable_references
-    from burg_drake.evaluation import reach_columns, write_table
     from burg_drake.station import station_gripper
 
-    if isinstance(output, GraspOutput):
+    if isinstance(output, options.GraspOutput):
         output.write(grasps, station_gripper(station))
         return
-    provenance = with_shareable_references(grasps.provenance, output.absolute().parent)
-    write_table(output, reach_columns(grasps), provenance)
+    provenance = core.with_shareable_references(grasps.provenance, output.absolute().parent)
+    evaluation.write_table(output, evaluation.reach_columns(grasps), provenance)
     print(f"wrote {len(grasps)} grasps to {output}; {frame_text}")

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_scene,
-    add_station,
-    examples_text,
-)
-from burg_drake.apps.options.settings_options import add_settings_options
-
-if TYPE_CHECKING:
-    from burg_drake.dataset import DatasetRecipe
+from burg_drake import core, dataset
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_warning
 
 
 def warn_without_colors(consequence: str) -> bool:
@@ -30,12 +20,13 @@ def warn_without_colors(consequence: str) -> bool:
 
     missing = missing_render_libraries()
     if missing:
-        line = f"burg-drake: warning: {consequence}: {describe_missing(missing)}"
-        print(line, file=sys.stderr)
+        print_warning(f"{consequence}: {describe_missing(missing)}")
     return bool(missing)
 
 
-def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
+def without_unavailable_colors(
+    recipe: dataset.DatasetRecipe, folder: Path
+) -> dataset.DatasetRecipe:
     """A recipe without colours where they cannot be rendered, which a line on stderr says.
 
     Args:
@@ -48,17 +39,15 @@ def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRe
     """
     from dataclasses import replace
 
-    from burg_drake.core import MissingDependencyError
     from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
     missing = missing_render_libraries()
     if not recipe.colors or recipe.renderer != "drake" or not missing:
         return recipe
-    from burg_drake.dataset import DATASET_FILE, load_dataset_document
 
-    document = folder / DATASET_FILE
-    if document.exists() and (load_dataset_document(document).recipe or {}).get("colors"):
-        raise MissingDependencyError(
+    document = folder / dataset.DATASET_FILE
+    if document.exists() and (dataset.load_dataset_document(document).recipe or {}).get("colors"):
+        raise core.MissingDependencyError(
             f"the samples of {folder} have colours, and so must new ones:"
             f" {describe_missing(missing)}"
         )
@@ -67,11 +56,9 @@ def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRe
     return replace(recipe, colors=False)
 
 
-def add_render_options(parser: Parser) -> None:
+def add_render_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake render`."""
-    from burg_drake.dataset import DatasetRecipe
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake render tabletop_six --camera board -o view.png",
         "burg-drake render tabletop_six --camera overview --arm -o view.png --depth --labels",
         "burg-drake render tabletop_six --renderer blender -o view.png",
@@ -80,17 +67,17 @@ def add_render_options(parser: Parser) -> None:
         " none), view.labels.png (instances from 1, 0: the rest), view.normals.png (16 bit,"
         " component = (value - 32768) / 32767, camera frame).",
     )
-    add_scene(parser)
-    add_station(parser)
+    options.add_scene(parser)
+    options.add_station(parser)
     parser.add_argument(
         "--camera",
         metavar="NAME",
         default="board",
         help="camera of the station (default: %(default)s)",
     )
-    add_output(parser, "FILE", "file to write (.png)")
+    options.add_output(parser, "FILE", "file to write (.png)")
     parser.add_argument("--arm", action="store_true", help="show the arm in its home posture")
-    add_settings_options(parser, DatasetRecipe, "renderer")
+    options.add_settings_options(parser, dataset.DatasetRecipe, "renderer")
     for kind in ("depth", "labels", "normals"):
         parser.add_argument(f"--{kind}", action="store_true", help=f"also write {kind}")
 
@@ -99,29 +86,29 @@ def run_render(arguments: argparse.Namespace) -> int:
     """Writes the images; 1 if there is none that can be made."""
     import numpy as np
 
-    from burg_drake.core import InvalidInputError, atomic_write, require_writable
-    from burg_drake.dataset import ImageKind, depth_unit_of, encode_image, render, station_view
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station
 
     output = Path(arguments.output)
     if output.suffix.lower() != ".png":
-        raise InvalidInputError(f"{output}: only PNG is written; end the name with .png")
+        raise core.InvalidInputError(f"{output}: only PNG is written; end the name with .png")
     by_drake = arguments.renderer == "drake"
     missing = by_drake and warn_without_colors(f"{output} is not written, as it has colours")
-    extra: tuple[ImageKind, ...] = ("depth", "labels", "normals")
-    kinds: list[ImageKind] = [] if missing else ["color"]
+    extra: tuple[dataset.ImageKind, ...] = ("depth", "labels", "normals")
+    kinds: list[dataset.ImageKind] = [] if missing else ["color"]
     kinds += [kind for kind in extra if getattr(arguments, kind)]
     if not kinds:
         return 1
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    view = station_view(station, arguments.camera, arm=arguments.arm)
-    require_writable(output)
-    images = render(scene, station, view, kinds, renderer=arguments.renderer)
+    view = dataset.station_view(station, arguments.camera, arm=arguments.arm)
+    core.require_writable(output)
+    images = dataset.render(scene, station, view, kinds, renderer=arguments.renderer)
     for kind in kinds:
         path = output if kind == "color" else output.with_suffix(f".{kind}.png")
         image = getattr(images, kind)
-        atomic_write(path, encode_image(kind, image, depth_unit_of(view.depth_range)))
+        core.atomic_write(
+            path, dataset.encode_image(kind, image, dataset.depth_unit_of(view.depth_range))
+        )
         print(f"wrote {path}")
     if images.labels is not None:
         names = [*scene.instances, *scene.background]

@@ -8,30 +8,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import Parser, add_only, add_view_options, examples_text
-from burg_drake.apps.options.values import positive_int
+from burg_drake import core, evaluation, simulation, visualization
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_remark
-from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
-    from burg_drake.core import Verdict
-    from burg_drake.evaluation import Columns, RecordedTrial, TrialInputs, TrialOrigin
     from burg_drake.motion import Plan
-    from burg_drake.simulation import TrialResult
 
 
 @dataclass(frozen=True)
 class ReplaySource:
     """What is to be replayed."""
 
-    trial: RecordedTrial
-    origin: TrialOrigin
-    inputs: TrialInputs
+    trial: evaluation.RecordedTrial
+    origin: evaluation.TrialOrigin
+    inputs: evaluation.TrialInputs
 
 
-def add_replay_options(parser: Parser) -> None:
+def add_replay_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake replay`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake replay runs/first --best",
         "burg-drake replay runs/first --grasp mug-0123456789 --html replay.html",
         "burg-drake replay results.csv --row 17",
@@ -44,39 +40,33 @@ def add_replay_options(parser: Parser) -> None:
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--grasp", metavar="ID", help="id of the grasp")
-    which.add_argument("--row", metavar="N", type=positive_int, help="row of the table, from 1")
+    which.add_argument(
+        "--row", metavar="N", type=options.positive_int, help="row of the table, from 1"
+    )
     which.add_argument(
         "--best",
         action="store_true",
         help="the lifted grasp with the most room around the open hand",
     )
-    add_only(parser, "with --best, the best grasp")
+    options.add_only(parser, "with --best, the best grasp")
     parser.add_argument("--scene", metavar="FILE", help="scene file, if it has moved")
     parser.add_argument("--station", metavar="FILE", help="station file, if it has moved")
     parser.add_argument(
         "--force", action="store_true", help="replay even if scene or station have changed"
     )
-    add_view_options(parser)
+    options.add_view_options(parser)
 
 
 def run_replay(arguments: argparse.Namespace) -> int:
     """Executes a trial once more, recorded; 1 if it ends unlike the record."""
     from burg_drake.apps.terminal import open_view, present_view
-    from burg_drake.evaluation import (
-        arm_figures,
-        as_result,
-        comparison,
-        differences,
-        motion_figures,
-    )
-    from burg_drake.visualization import describe_trial
 
     if arguments.only and not arguments.best:
-        raise InvalidInputError("--only is for --best; add it")
+        raise core.InvalidInputError("--only is for --best; add it")
     path = Path(arguments.results)
     is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
     if path.is_file() and not is_table:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{path} is neither the folder of a run nor a table of results (.csv, .parquet)"
         )
     source = _source_from_table(path, arguments) if is_table else _source_from_run(path, arguments)
@@ -84,13 +74,16 @@ def run_replay(arguments: argparse.Namespace) -> int:
         print_remark(note)
     meshcat = open_view(arguments)
     verdict, shown, who = _simulate_trial(source, meshcat)
-    lines = [*describe_trial(as_result(verdict)), *arm_figures(verdict)]
-    lines += motion_figures(source.trial, source.origin)
+    lines = [
+        *visualization.describe_trial(evaluation.as_result(verdict)),
+        *evaluation.arm_figures(verdict),
+    ]
+    lines += evaluation.motion_figures(source.trial, source.origin)
     recorded = source.trial.verdict
-    found = [] if recorded is None else differences(recorded, verdict)
-    lines += [] if recorded is None else comparison(found, source.origin)
+    found = [] if recorded is None else evaluation.differences(recorded, verdict)
+    lines += [] if recorded is None else evaluation.comparison(found, source.origin)
     if shown.outcome is not verdict.outcome:
-        lines += [f"shown is {who}, to the end:", *describe_trial(shown)]
+        lines += [f"shown is {who}, to the end:", *visualization.describe_trial(shown)]
     for line in lines:
         print(line)
     if arguments.html is None and shown.margins.end_time == 0.0:
@@ -100,32 +93,29 @@ def run_replay(arguments: argparse.Namespace) -> int:
     return 0 if all(difference.rounding for difference in found) else 1
 
 
-def _simulate_trial(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, str]:
+def _simulate_trial(
+    source: ReplaySource, meshcat: Any
+) -> tuple[core.Verdict, simulation.TrialResult, str]:
     """The verdict as the row's engine gives it, and the whole trial as shown, of what.
 
     An engine that ends trials early is run twice: as recorded, and to the end for the picture. So
     is a trial of the arm, which is shown from its home posture on.
     """
-    from burg_drake.evaluation import decisive_mode, rerun, trial_verdict
-
     trial, origin = source.trial, source.origin
-    if decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
+    if evaluation.decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
         shown = _show_hand(source, meshcat)
-        return trial_verdict(shown), shown, "the hand alone"
-    verdict, plan = rerun(source.inputs.scene, source.inputs.station, trial, origin)
+        return evaluation.trial_verdict(shown), shown, "the hand alone"
+    verdict, plan = evaluation.rerun(source.inputs.scene, source.inputs.station, trial, origin)
     if plan is not None:
         return verdict, _show_arm(source, plan, meshcat), "the arm from home on"
     return verdict, _show_hand(source, meshcat), "the hand alone"
 
 
-def _show_hand(source: ReplaySource, meshcat: Any) -> TrialResult:
+def _show_hand(source: ReplaySource, meshcat: Any) -> simulation.TrialResult:
     """The whole trial of the hand alone, recorded."""
-    from burg_drake.simulation import hand_trial_of
-    from burg_drake.visualization import record_trial
-
     trial = source.trial
-    return record_trial(
-        hand_trial_of(
+    return visualization.record_trial(
+        simulation.hand_trial_of(
             source.inputs.scene, source.inputs.station, **_shared_trial_options(source, meshcat)
         ),
         trial.instance,
@@ -137,14 +127,11 @@ def _show_hand(source: ReplaySource, meshcat: Any) -> TrialResult:
     )
 
 
-def _show_arm(source: ReplaySource, plan: Plan, meshcat: Any) -> TrialResult:
+def _show_arm(source: ReplaySource, plan: Plan, meshcat: Any) -> simulation.TrialResult:
     """The whole trial of the arm from its home posture on, recorded."""
-    from burg_drake.simulation import ArmTrial
-    from burg_drake.visualization import record_arm_trial
-
     trial, inputs = source.trial, source.inputs
-    return record_arm_trial(
-        ArmTrial(
+    return visualization.record_arm_trial(
+        simulation.ArmTrial(
             inputs.scene, inputs.station, transfer=True, **_shared_trial_options(source, meshcat)
         ),
         trial.instance,
@@ -163,62 +150,60 @@ def _shared_trial_options(source: ReplaySource, meshcat: Any) -> dict[str, Any]:
 
 
 def _source_from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
-    from burg_drake.evaluation import RUN_FILE, TrialInputs, find_inputs, load_run, origin_of
-
-    run = load_run(path)
+    run = evaluation.load_run(path)
     if arguments.grasp is not None:
         id = arguments.grasp
     else:
         id = str(run.results["id"][_choose_row(run.results, path, arguments)])
     trial = run.trial(id)
     judge = "" if trial.verdict is None else trial.verdict.judged_again
-    origin = origin_of(run.document).judged_by(judge)
-    origin.settings(f"{path / RUN_FILE}: trial")
+    origin = evaluation.origin_of(run.document).judged_by(judge)
+    origin.settings(f"{path / evaluation.RUN_FILE}: trial")
     if arguments.scene is None and arguments.station is None and not arguments.force:
-        return ReplaySource(trial, origin, TrialInputs(run.scene(), run.station()))
-    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
-    return ReplaySource(trial, origin, find_inputs(origin, f"{path}, {id},", path, **options))
+        return ReplaySource(trial, origin, evaluation.TrialInputs(run.scene(), run.station()))
+    moved = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return ReplaySource(
+        trial, origin, evaluation.find_inputs(origin, f"{path}, {id},", path, **moved)
+    )
 
 
 def _source_from_table(path: Path, arguments: argparse.Namespace) -> ReplaySource:
-    from burg_drake.evaluation import find_inputs, read_origin, read_table, read_trial, table_row
-
-    columns = read_table(path)
+    columns = evaluation.read_table(path)
     if "id" not in columns:
-        raise InvalidInputError(f"{path} is not a results table (it has no column id)")
+        raise core.InvalidInputError(f"{path} is not a results table (it has no column id)")
     index = _choose_row(columns, path, arguments)
-    where, row = f"{path}, row {index + 1}", table_row(columns, index)
-    trial, origin = read_trial(row, where), read_origin(row, where)
-    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
-    return ReplaySource(trial, origin, find_inputs(origin, where, path.parent, **options))
+    where, row = f"{path}, row {index + 1}", evaluation.table_row(columns, index)
+    trial, origin = evaluation.read_trial(row, where), evaluation.read_origin(row, where)
+    moved = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return ReplaySource(trial, origin, evaluation.find_inputs(origin, where, path.parent, **moved))
 
 
-def _choose_row(columns: Columns, path: Path, arguments: argparse.Namespace) -> int:
+def _choose_row(columns: evaluation.Columns, path: Path, arguments: argparse.Namespace) -> int:
     """Index of the row that is asked for."""
-    from burg_drake.evaluation import best_rows, rows_of
-
     ids = columns["id"].tolist()
     if not ids:
-        raise InvalidInputError(f"{path} has no rows")
+        raise core.InvalidInputError(f"{path} has no rows")
     if arguments.row is not None:
         if arguments.row > len(ids):
-            raise InvalidInputError(f"{path} has no row {arguments.row}; it has {len(ids)}")
+            raise core.InvalidInputError(f"{path} has no row {arguments.row}; it has {len(ids)}")
         return int(arguments.row) - 1
     if arguments.grasp is not None:
-        rows = rows_of(columns, arguments.grasp, str(path))
+        rows = evaluation.rows_of(columns, arguments.grasp, str(path))
         if len(rows) > 1:
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"{path} has {len(rows)} rows of {arguments.grasp}, the first is row"
                 f" {rows[0] + 1}; choose one with --row"
             )
         return rows[0]
     if arguments.best:
-        best = best_rows(columns, only=arguments.only)
+        best = evaluation.best_rows(columns, only=arguments.only)
         if not best:
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"{path}: no grasp was lifted; choose one with --grasp ID or --row N"
             )
         return best[0]
     if len(ids) != 1:
-        raise InvalidInputError(f"{path} has {len(ids)} rows; give --grasp ID, --row N or --best")
+        raise core.InvalidInputError(
+            f"{path} has {len(ids)} rows; give --grasp ID, --row N or --best"
+        )
     return 0

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_only,
-    add_output,
-    add_quiet,
-    add_retry_failed,
-    add_workers,
-    examples_text,
-    retry_advice,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.options.values import positive_int, seed
+from burg_drake import evaluation
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_remark
 from burg_drake.core import InvalidInputError
 
-if TYPE_CHECKING:
-    from burg_drake.evaluation import RobustnessSettings
 
-
-def add_robustness_options(parser: Parser) -> None:
+def add_robustness_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake robustness`."""
-    from burg_drake.evaluation import DEFAULT_BEST_COUNT, ROBUSTNESS_TESTS, RobustnessSettings
     from burg_drake.simulation import Noise
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake robustness runs/first",
         "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
@@ -50,32 +35,34 @@ def add_robustness_options(parser: Parser) -> None:
     which.add_argument(
         "--best",
         metavar="N",
-        type=positive_int,
-        default=DEFAULT_BEST_COUNT,
+        type=options.positive_int,
+        default=evaluation.DEFAULT_BEST_COUNT,
         help="the N lifted grasps of each object with the most room around the hand (default:"
         " %(default)d)",
     )
-    add_only(parser, "only grasps")
+    options.add_only(parser, "only grasps")
     parser.add_argument(
         "--tests",
         metavar="LIST",
-        type=_parse_tests,
-        default=ROBUSTNESS_TESTS,
-        help=f"some of {','.join(ROBUSTNESS_TESTS)} (default: all)",
+        type=lambda text: tuple(options.some_of(text, evaluation.ROBUSTNESS_TESTS, "a test")),
+        default=evaluation.ROBUSTNESS_TESTS,
+        help=f"some of {','.join(evaluation.ROBUSTNESS_TESTS)} (default: all)",
     )
     noise = parser.add_argument_group("noise (standard deviations)")
-    add_settings_options(noise, RobustnessSettings, "repeats")
-    add_settings_options(noise, Noise)
-    noise.add_argument("--seed", metavar="N", type=seed, help="random seed (default: the run's)")
-    add_output(
+    options.add_settings_options(noise, evaluation.RobustnessSettings, "repeats")
+    options.add_settings_options(noise, Noise)
+    noise.add_argument(
+        "--seed", metavar="N", type=options.seed, help="random seed (default: the run's)"
+    )
+    options.add_output(
         parser,
         "FILE",
         "table to write (default: robustness.csv in the run's folder)",
         required=False,
     )
-    add_workers(parser)
-    add_retry_failed(parser, "tests")
-    add_quiet(parser)
+    options.add_workers(parser)
+    options.add_retry_failed(parser, "tests")
+    options.add_quiet(parser)
 
 
 def run_robustness(arguments: argparse.Namespace) -> int:
@@ -84,17 +71,14 @@ def run_robustness(arguments: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from burg_drake.evaluation import require_table
-
     if arguments.output is not None:
-        require_table(Path(arguments.output))
-    from burg_drake.evaluation import assess_robustness, load_run, robustness_view
+        evaluation.require_table(Path(arguments.output))
 
     if arguments.only and arguments.grasp:
         raise InvalidInputError("--only is for the best grasps; leave out either it or --grasp")
-    run = load_run(arguments.run_folder)
+    run = evaluation.load_run(arguments.run_folder)
     settings = _robustness_settings(arguments, run.document.seed)
-    found = assess_robustness(
+    found = evaluation.assess_robustness(
         run,
         grasps=arguments.grasp,
         best=arguments.best,
@@ -105,39 +89,25 @@ def run_robustness(arguments: argparse.Namespace) -> int:
         retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
     )
-    Console().print(robustness_view(found.grasps, settings))
+    Console().print(evaluation.robustness_view(found.grasps, settings))
     print(f"table   {found.table_path}")
     if found.failures:
         id, reason = next(iter(found.failures.items()))
         print_remark(
             f"{len(found.failures)} tests could not be simulated, such as {id}:"
-            f" {reason}; {retry_advice(found.interrupted, len(found.failures))}"
+            f" {reason}; {options.retry_advice(found.interrupted, len(found.failures))}"
         )
         return 1
     return 0
 
 
-def _robustness_settings(arguments: argparse.Namespace, seed: int) -> RobustnessSettings:
-    from burg_drake.evaluation import RobustnessSettings
+def _robustness_settings(arguments: argparse.Namespace, seed: int) -> evaluation.RobustnessSettings:
     from burg_drake.simulation import Noise
 
-    return settings_from(
+    return options.settings_from(
         arguments,
-        RobustnessSettings,
+        evaluation.RobustnessSettings,
         tests=arguments.tests,
-        noise=settings_from(arguments, Noise),
+        noise=options.settings_from(arguments, Noise),
         seed=seed if arguments.seed is None else arguments.seed,
     )
-
-
-def _parse_tests(text: str) -> tuple[str, ...]:
-    """Names of tests, each once, in the usual order."""
-    from burg_drake.evaluation import ROBUSTNESS_TESTS
-
-    names = [name.strip() for name in text.split(",")]
-    for name in names:
-        if name not in ROBUSTNESS_TESTS:
-            raise argparse.ArgumentTypeError(
-                f"{name!r} is not a test; tests are {', '.join(ROBUSTNESS_TESTS)}"
-            )
-    return tuple(test for test in ROBUSTNESS_TESTS if test in names)

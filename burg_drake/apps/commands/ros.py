@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import signal
-from typing import Any, NoReturn
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_intrinsics,
-    add_measured_board,
-    add_scene,
-    examples_text,
-    print_scale_from_options,
-)
+from burg_drake.apps import options
+from burg_drake.apps.terminal import sigterm_as_interrupt
 
 
-def add_ros_options(parser: Parser) -> None:
+def add_ros_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake ros`."""
     from burg_drake.ros import NodeNames, ParentFrame
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake ros tabletop_six --image /camera/color/image_raw",
         "burg-drake ros my_scene.yaml --image /usb_cam/image_raw/compressed --frame board_link",
     )
-    add_scene(parser)
+    options.add_scene(parser)
     parser.add_argument(
         "--image",
         metavar="TOPIC",
@@ -37,11 +29,11 @@ def add_ros_options(parser: Parser) -> None:
         default="",
         help="intrinsics topic (default: camera_info beside the images)",
     )
-    add_intrinsics(parser, "intrinsics file instead of the topic")
+    options.add_intrinsics(parser, "intrinsics file instead of the topic")
     parser.add_argument(
         "--rectified", action="store_true", help="the images have no distortion (image_rect)"
     )
-    add_measured_board(parser)
+    options.add_measured_board(parser)
     parser.add_argument(
         "--frame",
         metavar="NAME",
@@ -90,20 +82,15 @@ def run_ros(arguments: argparse.Namespace) -> int:
         scene,
         intrinsics=intrinsics,
         rectified=arguments.rectified,
-        print_scale=print_scale_from_options(arguments),
+        print_scale=options.print_scale_from_options(arguments),
     )
-    signal.signal(signal.SIGTERM, _interrupt)
-    link = start_ros_node(version, names, with_camera_info=intrinsics is None)
-    try:
-        link.log(f"{scene.name}: ROS {version}, images from {names.image}")
-        run_node(link, node)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        link.close()
+    with sigterm_as_interrupt():  # launchers end nodes by it where SIGINT did not
+        link = start_ros_node(version, names, with_camera_info=intrinsics is None)
+        try:
+            link.log(f"{scene.name}: ROS {version}, images from {names.image}")
+            run_node(link, node)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            link.close()
     return 0
-
-
-def _interrupt(number: int, frame: Any) -> NoReturn:
-    """Launchers end nodes by SIGTERM where SIGINT did not."""
-    raise KeyboardInterrupt

@@ -6,18 +6,15 @@ import argparse
 import json
 import sys
 import time
-from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import Parser, add_output, examples_text
+from burg_drake import core, evaluation
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines
 
-if TYPE_CHECKING:
-    from burg_drake.evaluation import Status
 
-
-def add_status_options(parser: Parser) -> None:
+def add_status_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake status`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake status runs/many",
         "burg-drake status runs/many --follow",
         "burg-drake status runs/many --json",
@@ -30,9 +27,8 @@ def add_status_options(parser: Parser) -> None:
 def run_status(arguments: argparse.Namespace) -> int:
     """Prints the status; 1 if scenes could not be judged."""
     poll_interval = 1.0  # Seconds between two reads of a run's state.
-    from burg_drake.evaluation import RunWatch
 
-    watch = RunWatch(arguments.run_folder)
+    watch = evaluation.RunWatch(arguments.run_folder)
     status = watch.look()
     _print_status(status, arguments.json)
     if not arguments.follow:
@@ -48,7 +44,7 @@ def run_status(arguments: argparse.Namespace) -> int:
     return 1 if status.failed else 0
 
 
-def _print_status(status: Status, as_json: bool, *, again: bool = False) -> None:
+def _print_status(status: evaluation.Status, as_json: bool, *, again: bool = False) -> None:
     if as_json:
         print(json.dumps(status.plain()), flush=True)
         return
@@ -60,20 +56,19 @@ def _print_status(status: Status, as_json: bool, *, again: bool = False) -> None
     print("\n".join(lines), flush=True)
 
 
-def status_lines(status: Status) -> list[str]:
+def status_lines(status: evaluation.Status) -> list[str]:
     """The status for people; always as many lines for the same run, but for its failures."""
     max_named = 8  # Scenes.
-    from burg_drake.core import Outcome, format_number, format_percent, list_names
 
-    share = f" ({format_percent(status.judged / status.total)})" if status.total else ""
+    share = f" ({core.format_percent(status.judged / status.total)})" if status.total else ""
     about = "about " if status.kind == "campaign" and not status.complete else ""
     head = f"{status.judged:,} of {about}{status.total:,} grasps judged{share}"
     if status.rate:
-        head += f", {format_number(status.rate)}/s"
+        head += f", {core.format_number(status.rate)}/s"
     if status.left is not None and not status.complete:
         left = int(status.left)
         head += f", {left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
-    found = [f"{n:,} {o.value}" for o in Outcome if (n := status.outcomes[o.value])]
+    found = [f"{n:,} {o.value}" for o in core.Outcome if (n := status.outcomes[o.value])]
     lines = [head, f"outcomes  {', '.join(found) or '-'}"]
     if status.kind == "campaign":
         now = status.under_way
@@ -84,12 +79,12 @@ def status_lines(status: Status) -> list[str]:
     if status.shard:
         lines.append(f"shard     {status.shard}")
     if status.failed:
-        lines.append(f"failed    {list_names(list(status.failed))}")
+        lines.append(f"failed    {core.list_names(list(status.failed))}")
         lines += [f"  {name}: {why}" for name, why in list(status.failed.items())[:max_named]]
     return lines
 
 
-def _process_text(status: Status) -> str:
+def _process_text(status: evaluation.Status) -> str:
     last = ""
     if status.last is not None:
         ago = max(0, int(time.time() - status.last))
@@ -102,9 +97,9 @@ def _process_text(status: Status) -> str:
     return f"none; the same command continues{last}"
 
 
-def add_report_options(parser: Parser) -> None:
+def add_report_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake report`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake report runs/first",
         "burg-drake report runs/many",
         "burg-drake report runs/many/scenes/kitchen_3",
@@ -119,39 +114,37 @@ def add_report_options(parser: Parser) -> None:
 def run_report(arguments: argparse.Namespace) -> int:
     """Prints the tables of a run, of one scene or of many, and writes its report."""
     from burg_drake.apps.commands.evaluate import campaign_exit_code, print_campaign, print_summary
-    from burg_drake.evaluation import Campaign, open_results, write_campaign_report, write_report
 
-    run = open_results(arguments.run_folder)
-    if isinstance(run, Campaign):
-        write_campaign_report(run)
+    run = evaluation.open_results(arguments.run_folder)
+    if isinstance(run, evaluation.Campaign):
+        evaluation.write_campaign_report(run)
         print_campaign(run)
         return campaign_exit_code(run)
-    write_report(run)
+    evaluation.write_report(run)
     print_summary(run)
     if not run.complete:
         print(
-            f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; the same"
+            f"{run.rows().count} of {len(run.mine)} grasps are judged; the same"
             " `evaluate` command continues"
         )
     print(f"report  {run.report_path}")
     return 0
 
 
-def add_merge_options(parser: Parser) -> None:
+def add_merge_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake merge`."""
-    parser.epilog = examples_text("burg-drake merge runs/shard* -o runs/whole")
+    parser.epilog = options.examples_text("burg-drake merge runs/shard* -o runs/whole")
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
-    add_output(parser, "RUN", "folder of the merged run")
+    options.add_output(parser, "RUN", "folder of the merged run")
 
 
 def run_merge(arguments: argparse.Namespace) -> int:
     """Merges runs and prints what is in them; 1 if grasps could not be simulated."""
     from burg_drake.apps.commands.evaluate import campaign_exit_code, print_campaign, print_summary
-    from burg_drake.evaluation import Campaign, merge_folders
 
-    merged = merge_folders(arguments.runs, arguments.output)
+    merged = evaluation.merge_folders(arguments.runs, arguments.output)
     result = merged.result
-    if isinstance(result, Campaign):
+    if isinstance(result, evaluation.Campaign):
         print_campaign(result)
         code = campaign_exit_code(result)
     else:

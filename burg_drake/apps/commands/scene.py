@@ -9,41 +9,31 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from burg_drake import core, simulation
+from burg_drake.apps import options
 from burg_drake.apps.commands.scene_sampling import library_reference, require_another_file
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_scene,
-    add_station,
-    add_view_options,
-    examples_text,
-)
-from burg_drake.apps.options.values import positive
-from burg_drake.apps.terminal import print_remark, print_warning
-from burg_drake.core import InvalidInputError, TextTable, format_number
+from burg_drake.apps.terminal import print_remark, print_warning, show_progress
 
 if TYPE_CHECKING:
     from burg_drake.scene import Scene
-    from burg_drake.simulation import Displacement, SettledScene
 
 
-def add_scene_export_options(parser: Parser) -> None:
+def add_scene_export_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake scene export`."""
     from burg_drake.export import SCENE_FORMATS
 
     formats = (f"  {name:5}{format.about}" for name, format in SCENE_FORMATS.items())
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake scene export tabletop_six --to sdf -o tabletop_sdf",
         "burg-drake scene export my_scene.yaml --station my_station.yaml --to mjcf -o my_mjcf",
         "burg-drake scene export tabletop_six --station panda_tabletop --to mjcf --hand -o hand",
         "",
         "\n".join(["The folder holds all files that it needs. Formats:", *formats]),
     )
-    add_scene(parser)
+    options.add_scene(parser)
     parser.add_argument("--to", choices=SCENE_FORMATS, required=True, help="format")
-    add_output(parser, "FOLDER", "folder to write; an earlier export is replaced")
-    add_station(parser, "export table and obstacles of this station, too", default=None)
+    options.add_output(parser, "FOLDER", "folder to write; an earlier export is replaced")
+    options.add_station(parser, "export table and obstacles of this station, too", default=None)
     parser.add_argument(
         "--hand",
         action="store_true",
@@ -73,9 +63,9 @@ def run_scene_export(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def add_scene_import_burg_options(parser: Parser) -> None:
+def add_scene_import_burg_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake scene import-burg`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml"
@@ -86,7 +76,7 @@ def add_scene_import_burg_options(parser: Parser) -> None:
     parser.add_argument(
         "--library", metavar="LIB", required=True, help="library made by `library import-burg`"
     )
-    add_output(parser, "FILE", "scene file to write (.yaml)")
+    options.add_output(parser, "FILE", "scene file to write (.yaml)")
     parser.add_argument("--name", metavar="NAME", help="name of the scene (default: that of FILE)")
     parser.add_argument(
         "--station-out", metavar="FILE", help="also write a station that the scene fits on"
@@ -95,7 +85,6 @@ def add_scene_import_burg_options(parser: Parser) -> None:
 
 def run_scene_import_burg(arguments: argparse.Namespace) -> int:
     """Writes a scene document."""
-    from burg_drake.core import make_name, require_writable
     from burg_drake.formats import read_burg_scene
     from burg_drake.objects import load_library
     from burg_drake.pipeline import import_burg_scene
@@ -103,7 +92,7 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
 
     output = Path(arguments.output)
     for file in filter(None, (arguments.output, arguments.station_out)):
-        require_writable(file)
+        core.require_writable(file)
         require_another_file(Path(arguments.file), file)
     if arguments.station_out is not None:
         require_another_file(output, arguments.station_out)
@@ -112,7 +101,7 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
     imported = import_burg_scene(
         burg,
         library,
-        name=arguments.name or make_name(output.stem),
+        name=arguments.name or core.make_name(output.stem),
         reference=library_reference(arguments.library, library, output.parent),
     )
     for note in (*burg.notes, *imported.notes):
@@ -126,13 +115,12 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
 
 def _propose_station(scene: Scene, output: str | None) -> None:
     """Says which station fits, and writes it if that is asked for."""
-    from burg_drake.core import save_document
     from burg_drake.motion import find_built_in, propose_station
 
     if output is None:
         try:
             fitting, misfits = find_built_in(scene)
-        except InvalidInputError as error:
+        except core.InvalidInputError as error:
             print(f"no station fits: {error}")
             return
         _print_fits(fitting.name if fitting else "", misfits)
@@ -141,7 +129,7 @@ def _propose_station(scene: Scene, output: str | None) -> None:
         return
     proposal = propose_station(scene, Path(output))
     _print_fits(proposal.source, proposal.misfits)
-    save_document(proposal.document, output)
+    core.save_document(proposal.document, output)
     where = "without an arm"
     if (arm := proposal.document.arm) is not None:
         where = "the arm's base at ({:g}, {:g}, {:g}) m".format(*arm.X_WA.translation)
@@ -158,46 +146,45 @@ def _print_fits(fitting: str, misfits: dict[str, str]) -> None:
         print(f"station {fitting} fits: --station {fitting}")
 
 
-def add_scene_show_options(parser: Parser) -> None:
+def add_scene_show_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake scene show`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake scene show tabletop_six",
         "burg-drake scene show my_scene.yaml --station my_station.yaml",
         "burg-drake scene show tabletop_six --html scene.html",
     )
-    add_scene(parser)
-    add_station(parser)
+    options.add_scene(parser)
+    options.add_station(parser)
     parser.add_argument("--no-robot", action="store_true", help="hide the arm")
-    add_view_options(parser)
+    options.add_view_options(parser)
 
 
-def add_scene_validate_options(parser: Parser) -> None:
+def add_scene_validate_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake scene validate`."""
-    parser.epilog = examples_text("burg-drake scene validate my_scene.yaml")
-    add_scene(parser)
-    add_station(parser)
+    parser.epilog = options.examples_text("burg-drake scene validate my_scene.yaml")
+    options.add_scene(parser)
+    options.add_station(parser)
 
 
-def add_scene_settle_options(settle: Parser) -> None:
+def add_scene_settle_options(settle: options.Parser) -> None:
     """Adds the options of `burg-drake scene settle`."""
-    from burg_drake.simulation import SETTLING_ENGINE, SETTLING_TIME
     from burg_drake.station import DRAKE_ENGINES
 
-    settle.epilog = examples_text(
+    settle.epilog = options.examples_text(
         "burg-drake scene settle heap.yaml -o settled.yaml",
         "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
         "",
         "Exit code 1 if an object still moves, fell off the table or came to rest where `scene"
         " validate` refuses it; the scene is then written only with --keep.",
     )
-    add_scene(settle)
-    add_station(settle)
-    add_output(settle, "FILE", "scene file to write (.yaml)")
+    options.add_scene(settle)
+    options.add_station(settle)
+    options.add_output(settle, "FILE", "scene file to write (.yaml)")
     settle.add_argument(
         "--time-limit",
         metavar="S",
-        type=positive,
-        default=SETTLING_TIME,
+        type=options.positive,
+        default=simulation.SETTLING_TIME,
         help="simulated time in seconds (default: %(default)g)",
     )
     settle.add_argument(
@@ -206,10 +193,10 @@ def add_scene_settle_options(settle: Parser) -> None:
     settle.add_argument(
         "--engine",
         choices=DRAKE_ENGINES,
-        default=SETTLING_ENGINE,
+        default=simulation.SETTLING_ENGINE,
         help="physics preset (default: %(default)s)",
     )
-    add_quiet(settle)
+    options.add_quiet(settle)
 
 
 def run_scene_show(arguments: argparse.Namespace) -> int:
@@ -258,26 +245,23 @@ def run_scene_validate(arguments: argparse.Namespace) -> int:
 
 def run_scene_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter, require_writable
     from burg_drake.scene import load_scene, save_scene
-    from burg_drake.simulation import settle_scene
     from burg_drake.station import check_scene, load_station
 
-    require_writable(arguments.output)
+    core.require_writable(arguments.output)
     scene = load_scene(arguments.scene)
     require_another_file(scene.path, arguments.output)
     station = load_station(arguments.station)
-    with Reporter(not arguments.quiet) as reporter:
-        whole = Progress("settling", 0.0, arguments.time_limit, unit="s at most")
-        pace = ProgressMeter(reporter.show, whole)
-        settled = settle_scene(
+    limit, quiet = arguments.time_limit, arguments.quiet
+    with show_progress("settling", "s at most", limit, quiet=quiet) as pace:
+        settled = simulation.settle_scene(
             scene,
             station,
             engine=arguments.engine,
-            time_limit=arguments.time_limit,
+            time_limit=limit,
             progress=lambda time, moving: pace.step(time, note=f"{moving} moving"),
         )
-    faults = _settling_faults(settled, arguments.time_limit, kept=arguments.keep)
+    faults = _settling_faults(settled, limit, kept=arguments.keep)
     faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
     written = arguments.keep or not faults
     if written:
@@ -294,19 +278,21 @@ def run_scene_settle(arguments: argparse.Namespace) -> int:
     return 1 if faults else 0
 
 
-def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:
+def displacement_table(displacements: Mapping[str, simulation.Displacement]) -> core.TextTable:
     """How far each object has come."""
-    table = TextTable().names("object").numbers("moved [mm]", "turned [deg]")
+    table = core.TextTable().names("object").numbers("moved [mm]", "turned [deg]")
     for name, moved in displacements.items():
         table.row(
             name,
-            format_number(1e3 * moved.distance, 1),
-            format_number(math.degrees(moved.angle), 1),
+            core.format_number(1e3 * moved.distance, 1),
+            core.format_number(math.degrees(moved.angle), 1),
         )
     return table
 
 
-def _settling_faults(settled: SettledScene, time_limit: float, *, kept: bool) -> list[str]:
+def _settling_faults(
+    settled: simulation.SettledScene, time_limit: float, *, kept: bool
+) -> list[str]:
     """What keeps a scene from being settled, a line each."""
     lines = []
     if settled.moving:

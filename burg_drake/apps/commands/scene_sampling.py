@@ -9,21 +9,11 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_station,
-    add_workers,
-    examples_text,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.options.values import names, positive_int
-from burg_drake.apps.terminal import print_remark, print_warning
-from burg_drake.core import InvalidInputError, builtin_names, portable_reference
+from burg_drake import core, generation
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_remark, print_warning, show_progress
 
 if TYPE_CHECKING:
-    from burg_drake.generation import ReproducedScene, SampledFolder, SampledScene
     from burg_drake.objects import ObjectLibrary
     from burg_drake.scene import Scene, SceneDocument, SceneRecipe
     from burg_drake.station import Station
@@ -36,18 +26,26 @@ def require_another_file(scene: Path, output: str) -> None:
         InvalidInputError: the files are one.
     """
     if os.path.realpath(output) == os.path.realpath(scene):
-        raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
+        raise core.InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 
 def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
     """How a scene file in `folder` refers to a library so that it is found from there: the name of
     a built-in one, else package:// or the relative path."""
-    return given if given in builtin_names("models") else portable_reference(library.root, folder)
+    return (
+        given
+        if given in core.builtin_names("models")
+        else core.portable_reference(library.root, folder)
+    )
 
 
 def station_reference(given: str, station: Station, folder: Path) -> str:
     """The same for a station."""
-    return given if given in builtin_names("stations") else portable_reference(station.path, folder)
+    return (
+        given
+        if given in core.builtin_names("stations")
+        else core.portable_reference(station.path, folder)
+    )
 
 
 def add_recipe_options(parser: Any) -> None:
@@ -65,22 +63,22 @@ def _add_object_options(parser: Any) -> None:
         "-n",
         metavar="N",
         dest="objects",
-        type=positive_int,
+        type=options.positive_int,
         default=SceneRecipe.count,
         help="objects in a scene (default: %(default)d)",
     )
     group.add_argument(
-        "--only", metavar="A,B", type=names, action="extend", help="only these objects"
+        "--only", metavar="A,B", type=options.names, action="extend", help="only these objects"
     )
-    add_settings_options(group, SceneRecipe, "repeat", "poses", "seed")
+    options.add_settings_options(group, SceneRecipe, "repeat", "poses", "seed")
     group.add_argument(
         "--count",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         default=1,
         help="number of scenes (default: %(default)d)",
     )
-    add_workers(group, "worker processes (default: %(default)d)", default=1)
+    options.add_workers(group, "worker processes (default: %(default)d)", default=1)
 
 
 def _add_layout_options(parser: Any) -> None:
@@ -103,17 +101,17 @@ def _add_layout_options(parser: Any) -> None:
     )
     how.add_argument("--packed", action="store_true", help="pack objects side by side")
     how.add_argument("--heap", action="store_true", help="drop objects in a heap")
-    add_settings_options(group, SceneRecipe, "tries", "fewer", "settle")
+    options.add_settings_options(group, SceneRecipe, "tries", "fewer", "settle")
 
 
 def _add_rule_options(parser: Any) -> None:
     from burg_drake.scene import SceneRecipe
 
     group = parser.add_argument_group("rules")
-    add_station(group)
-    add_settings_options(group, SceneRecipe, "within_reach")
-    add_settings_options(group, SceneRecipe, "clear_grasps", "visible_from", unset=True)
-    add_settings_options(group, SceneRecipe, "attempts")
+    options.add_station(group)
+    options.add_settings_options(group, SceneRecipe, "within_reach")
+    options.add_settings_options(group, SceneRecipe, "clear_grasps", "visible_from", unset=True)
+    options.add_settings_options(group, SceneRecipe, "attempts")
 
 
 def recipe_from_options(
@@ -124,11 +122,11 @@ def recipe_from_options(
     from burg_drake.scene import Board, SceneRecipe
 
     if arguments.objects > max_objects:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"-n {arguments.objects}: a scene has {max_objects} objects at most"
         )
     layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
-    return settings_from(
+    return options.settings_from(
         arguments,
         SceneRecipe,
         library=library_reference(arguments.library, library, folder),
@@ -147,22 +145,21 @@ def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
         UnknownNameError: there is no such size.
     """
     from burg_drake.compose import BOARD_SIZES, board_size
-    from burg_drake.core import UnknownNameError, suggest_names
 
     own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", size.lower())
     if own:
         return float(own[1]) * 1e-3, float(own[2]) * 1e-3
     if size.upper() not in BOARD_SIZES:
-        raise UnknownNameError(
-            f"board size {size!r} does not exist; {suggest_names(size, BOARD_SIZES)}; or give WxH"
-            " in mm, such as 700x500"
+        known = core.suggest_names(size, BOARD_SIZES)
+        raise core.UnknownNameError(
+            f"board size {size!r} does not exist; {known}; or give WxH in mm, such as 700x500"
         )
     return board_size(size.upper(), upright=upright)
 
 
-def add_scene_sample_options(parser: Parser) -> None:
+def add_scene_sample_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake scene sample`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake scene sample household -n 5 --seed 7 -o scene.yaml",
         "burg-drake scene sample household -n 6 --spacing close --count 1000 --workers 2 -o close/",
         "burg-drake scene sample household -n 10 --heap --station panda_bin -o heap.yaml",
@@ -180,7 +177,7 @@ def add_scene_sample_options(parser: Parser) -> None:
         nargs="?",
         help="folder of a library, or the built-in household",
     )
-    add_output(parser, "SCENES", "folder to write, or for one scene a file (.yaml)")
+    options.add_output(parser, "SCENES", "folder to write, or for one scene a file (.yaml)")
     add_recipe_options(parser)
     parser.add_argument(
         "--again",
@@ -192,7 +189,7 @@ def add_scene_sample_options(parser: Parser) -> None:
         action="store_true",
         help="with --again, even if library, station or versions differ",
     )
-    add_quiet(parser)
+    options.add_quiet(parser)
 
 
 def run_scene_sample(arguments: argparse.Namespace) -> int:
@@ -202,14 +199,14 @@ def run_scene_sample(arguments: argparse.Namespace) -> int:
 
     single = Path(arguments.output).suffix.lower() in (".yaml", ".yml")
     if (arguments.library is None) == (arguments.again is None):
-        raise InvalidInputError("give a LIBRARY to sample from, or --again SCENE")
+        raise core.InvalidInputError("give a LIBRARY to sample from, or --again SCENE")
     if arguments.again is not None:
         _refuse_recipe_options(arguments)
         return _reproduce_scene(arguments)
     if arguments.force:
-        raise InvalidInputError("--force goes with --again")
+        raise core.InvalidInputError("--force goes with --again")
     if single and arguments.count > 1:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"-o {arguments.output} is a file, for a single scene; give a folder for"
             f" {arguments.count}"
         )
@@ -226,16 +223,12 @@ def _sample_one(
     arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> int:
     """Writes one file."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter, require_writable
-    from burg_drake.generation import SceneSampler
     from burg_drake.scene import save_scene
 
-    require_writable(arguments.output)
-    with Reporter(not arguments.quiet) as reporter:
-        pace = ProgressMeter(
-            reporter.show, Progress("sampling", 0, recipe.attempts, unit="attempts at most")
-        )
-        sampled = SceneSampler(recipe, library, station).sample(0, refused=pace.step)
+    core.require_writable(arguments.output)
+    attempts, quiet = recipe.attempts, arguments.quiet
+    with show_progress("sampling", "attempts at most", attempts, quiet=quiet) as pace:
+        sampled = generation.SceneSampler(recipe, library, station).sample(0, refused=pace.step)
     if sampled.accepted:
         save_scene(sampled.scene.document, arguments.output)
     _print_refused(Counter(sampled.refused))
@@ -252,17 +245,14 @@ def _sample_many(
     arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> int:
     """Fills a folder."""
-    from burg_drake.core import Progress, ProgressMeter, Reporter
-    from burg_drake.generation import sample_scenes
-
-    with Reporter(not arguments.quiet) as reporter:
-        paces: list[ProgressMeter] = []
+    with core.Reporter(not arguments.quiet) as reporter:
+        paces: list[core.ProgressMeter] = []
 
         def begin(known: int) -> None:
-            event = Progress("starting", known, arguments.count, unit="scenes")
-            paces.append(ProgressMeter(reporter.show, event, "sampling"))
+            event = core.Progress("starting", known, arguments.count, unit="scenes")
+            paces.append(core.ProgressMeter(reporter.show, event, "sampling"))
 
-        found = sample_scenes(
+        found = generation.sample_scenes(
             recipe,
             library,
             station,
@@ -275,7 +265,7 @@ def _sample_many(
     return _print_folder(found, arguments)
 
 
-def _print_folder(found: SampledFolder, arguments: argparse.Namespace) -> int:
+def _print_folder(found: generation.SampledFolder, arguments: argparse.Namespace) -> int:
     refused: Counter[str] = Counter()
     for row in found.rows.values():
         refused.update(row.refused)
@@ -309,21 +299,21 @@ def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
     for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
             option = "-n" if name == "objects" else f"--{name.replace('_', '-')}"
-            raise InvalidInputError(f"--again takes the recipe of its scene: leave out {option}")
+            raise core.InvalidInputError(
+                f"--again takes the recipe of its scene: leave out {option}"
+            )
 
 
 def _reproduce_scene(arguments: argparse.Namespace) -> int:
     """Makes a scene again, and says whether it is the same."""
-    from burg_drake.core import require_writable
-    from burg_drake.generation import sample_again
     from burg_drake.scene import load_scene, save_scene
 
     scene = load_scene(arguments.again)
     require_another_file(scene.path, arguments.output)
     if Path(arguments.output).suffix.lower() not in (".yaml", ".yml"):
-        raise InvalidInputError(f"-o {arguments.output} has to be a scene file (.yaml)")
-    require_writable(arguments.output)
-    again = sample_again(scene, force=arguments.force)
+        raise core.InvalidInputError(f"-o {arguments.output} has to be a scene file (.yaml)")
+    core.require_writable(arguments.output)
+    again = generation.sample_again(scene, force=arguments.force)
     for line in again.differences:
         print_warning(f"{scene.path}: {line}")
     if again.scene is None:
@@ -336,7 +326,9 @@ def _reproduce_scene(arguments: argparse.Namespace) -> int:
     return 0 if again.same else 1
 
 
-def _with_references(again: ReproducedScene, scene: Scene, folder: Path) -> SceneDocument:
+def _with_references(
+    again: generation.ReproducedScene, scene: Scene, folder: Path
+) -> SceneDocument:
     """A scene's document whose references start from a folder."""
     from dataclasses import replace
 
@@ -354,7 +346,7 @@ def _print_refused(refused: Counter[str]) -> None:
         print_remark(f"{count} refused: {reason}")
 
 
-def _refusal_text(sampled: SampledScene, recipe: SceneRecipe) -> str:
+def _refusal_text(sampled: generation.SampledScene, recipe: SceneRecipe) -> str:
     """Why no attempt was accepted, and what helps."""
     text = f"none of {sampled.attempts} attempts was accepted"
     if sampled.missing:

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import argparse
 
-from burg_drake.apps.options.arguments import Parser, add_output, examples_text
+from burg_drake import core
+from burg_drake.apps import options
 
 
-def add_schema_options(parser: Parser) -> None:
+def add_schema_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake schema`."""
-    from burg_drake.core import DOCUMENT_KINDS
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake schema", "burg-drake schema scene -o scene.json", "burg-drake schema -o schemas"
     )
     parser.add_argument(
         "document",
         metavar="DOCUMENT",
         nargs="?",
-        choices=list(DOCUMENT_KINDS),
-        help=f"one kind of document: {', '.join(DOCUMENT_KINDS)}",
+        choices=list(core.DOCUMENT_KINDS),
+        help=f"one kind of document: {', '.join(core.DOCUMENT_KINDS)}",
     )
-    add_output(
+    options.add_output(
         parser,
         "PATH",
         "file for the schema of one kind, which is printed otherwise; without DOCUMENT, a"
@@ -32,24 +31,20 @@ def add_schema_options(parser: Parser) -> None:
 
 def run_schema(arguments: argparse.Namespace) -> int:
     """Lists the kinds of documents, or writes or prints schemas."""
-    from burg_drake.core import atomic_write, schema_text, write_schemas
-
     kind, output = arguments.document, arguments.output
     if kind is None and output is None:
         _print_kinds()
     elif kind is None:
-        print(f"wrote {len(write_schemas(output))} schemas to {output}")
+        print(f"wrote {len(core.write_schemas(output))} schemas to {output}")
     elif output is None:
-        print(schema_text(kind), end="")
+        print(core.schema_text(kind), end="")
     else:
-        atomic_write(output, schema_text(kind))
+        core.atomic_write(output, core.schema_text(kind))
     return 0
 
 
 def _print_kinds() -> None:
-    from burg_drake.core import DOCUMENT_KINDS, TextTable, json_schema
-
-    table = TextTable().names("document").texts("what it is")
-    for kind in DOCUMENT_KINDS:
-        table.row(kind, json_schema(kind)["description"].partition(". ")[0].rstrip("."))
+    table = core.TextTable().names("document").texts("what it is")
+    for kind in core.DOCUMENT_KINDS:
+        table.row(kind, core.json_schema(kind)["description"].partition(". ")[0].rstrip("."))
     table.show()

@@ -8,13 +8,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_page_options,
-    add_station,
-    examples_text,
-    scene_names,
-)
+from burg_drake.apps import options
 from burg_drake.apps.terminal import (
     ignore_interrupts,
     open_in_browser,
@@ -28,9 +22,9 @@ if TYPE_CHECKING:
     from burg_drake.ui import ServedPage
 
 
-def add_setup_options(parser: Parser) -> None:
+def add_setup_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake setup`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake setup",
         "burg-drake setup my_scene.yaml --station my_station.yaml",
         "burg-drake setup my_library",
@@ -43,11 +37,11 @@ def add_setup_options(parser: Parser) -> None:
         metavar="SCENE|LIBRARY",
         nargs="?",
         default=default_library,
-        help=f"scene to edit, or library for a new scene: a path, or built-in: {scene_names()},"
-        f" {default_library} (default: %(default)s)",
+        help="scene to edit, or library for a new scene: a path, or built-in:"
+        f" {options.scene_names()}, {default_library} (default: %(default)s)",
     )
-    add_station(parser)
-    add_page_options(
+    options.add_station(parser)
+    options.add_page_options(
         parser, "others can open it by the address that is printed, good for one browser"
     )
 

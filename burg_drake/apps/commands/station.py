@@ -5,43 +5,42 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options.arguments import Parser, add_view_options, examples_text
+from burg_drake import core, motion
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_warning
-from burg_drake.core import TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.motion import ArmFigures, ReachabilityMap, StationReport
     from burg_drake.scene import Scene
     from burg_drake.station import Station
 
 
-def add_station_list_options(parser: Parser) -> None:
+def add_station_list_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake station list`."""
-    parser.epilog = examples_text("burg-drake station list")
+    parser.epilog = options.examples_text("burg-drake station list")
 
 
-def add_station_check_options(check: Parser) -> None:
+def add_station_check_options(check: options.Parser) -> None:
     """Adds the options of `burg-drake station check`."""
-    check.epilog = examples_text(
+    check.epilog = options.examples_text(
         "burg-drake station check panda_bin",
         "burg-drake station check my_station.yaml --scene my_scene.yaml",
     )
     _add_station_argument(check)
 
 
-def add_station_show_options(show: Parser) -> None:
+def add_station_show_options(show: options.Parser) -> None:
     """Adds the options of `burg-drake station show`."""
-    show.epilog = examples_text(
+    show.epilog = options.examples_text(
         "burg-drake station show panda_shelf",
         "burg-drake station show panda_tabletop --scene tabletop_six --html station.html",
         "burg-drake station show my_station.yaml --camera board",
     )
     _add_station_argument(show)
     show.add_argument("--camera", metavar="NAME", help="look through this camera")
-    add_view_options(show)
+    options.add_view_options(show)
 
 
-def _add_station_argument(parser: Parser) -> None:
+def _add_station_argument(parser: options.Parser) -> None:
     parser.add_argument(
         "station",
         metavar="STATION",
@@ -56,11 +55,10 @@ def _add_station_argument(parser: Parser) -> None:
 
 def run_station_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in station."""
-    from burg_drake.core import builtin_names
     from burg_drake.station import load_station
 
-    table = TextTable().texts("station", "description")
-    for station in map(load_station, builtin_names("stations")):
+    table = core.TextTable().texts("station", "description")
+    for station in map(load_station, core.builtin_names("stations")):
         table.row(station.name, station.document.description)
     table.show()
     return 0
@@ -70,7 +68,7 @@ def run_station_check(arguments: argparse.Namespace) -> int:
     """Prints what a station can do; what makes it useless is an error."""
     station, scene, report = _inspect_station(arguments)
     print(f"{station.name}: {station.path} can be used")
-    table = TextTable().texts("", "")
+    table = core.TextTable().texts("", "")
     for name, text in _station_lines(station, scene, report):
         table.row(name, text)
     table.show()
@@ -82,7 +80,6 @@ def run_station_check(arguments: argparse.Namespace) -> int:
 def run_station_show(arguments: argparse.Namespace) -> int:
     """Shows a station; what its author should know goes to stderr."""
     from burg_drake.apps.terminal import open_view, present_view
-    from burg_drake.motion import empty_scene
     from burg_drake.visualization import show_station
 
     meshcat = open_view(arguments)
@@ -91,7 +88,7 @@ def run_station_show(arguments: argparse.Namespace) -> int:
         print_warning(f"{station.path}: {warning}")
     arm = report.arm
     legend = show_station(
-        scene or empty_scene(),
+        scene or motion.empty_scene(),
         station,
         meshcat,
         reachability=arm.reachability if arm else None,
@@ -106,8 +103,9 @@ def run_station_show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _inspect_station(arguments: argparse.Namespace) -> tuple[Station, Scene | None, StationReport]:
-    from burg_drake.motion import inspect_station
+def _inspect_station(
+    arguments: argparse.Namespace,
+) -> tuple[Station, Scene | None, motion.StationReport]:
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station
 
@@ -115,15 +113,14 @@ def _inspect_station(arguments: argparse.Namespace) -> tuple[Station, Scene | No
     if getattr(arguments, "camera", None) is not None:
         station.camera(arguments.camera)  # before all that takes time
     scene = None if arguments.scene is None else load_scene(arguments.scene)
-    return station, scene, inspect_station(station, scene)
+    return station, scene, motion.inspect_station(station, scene)
 
 
 def _station_lines(
-    station: Station, scene: Scene | None, report: StationReport
+    station: Station, scene: Scene | None, report: motion.StationReport
 ) -> list[tuple[str, str]]:
     """What is printed about a station, by name."""
     from burg_drake.evaluation import motion_text
-    from burg_drake.motion import format_share
 
     low, high = (round(1e3 * width) + 0 for width in report.hand.opening)
     hand = station.hand
@@ -137,11 +134,11 @@ def _station_lines(
     for name, share in report.seen.items():
         camera = station.document.cameras[name]
         size = f"{camera.width} x {camera.height} pixels"
-        lines.append((f"camera {name}", f"{size}, sees {format_share(share)} of the board"))
+        lines.append((f"camera {name}", f"{size}, sees {motion.format_share(share)} of the board"))
     return lines
 
 
-def _arm_lines(station: Station, arm: ArmFigures) -> list[tuple[str, str]]:
+def _arm_lines(station: Station, arm: motion.ArmFigures) -> list[tuple[str, str]]:
     document = station.document.arm
     assert document is not None and station.arm_model is not None
     x, y, z = document.X_WA.translation
@@ -163,8 +160,9 @@ def _arm_lines(station: Station, arm: ArmFigures) -> list[tuple[str, str]]:
     return lines
 
 
-def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tuple[str, str]]:
-    from burg_drake.motion import format_share
+def _board_lines(
+    scene: Scene | None, reach: motion.ReachabilityMap | None
+) -> list[tuple[str, str]]:
     from burg_drake.scene import Board
 
     width, height = (1e3 * extent for extent in (scene.board if scene else Board()).size)
@@ -174,22 +172,22 @@ def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tup
         return lines
     for k, z in enumerate(reach.heights):
         text = (
-            f"{format_share(reach.covered_from_above[k])} reached from straight above,"
-            f" {format_share(reach.covered[k])} with any orientation,"
-            f" {format_share(reach.share[k].mean())} of all orientations"
+            f"{motion.format_share(reach.covered_from_above[k])} reached from straight above,"
+            f" {motion.format_share(reach.covered[k])} with any orientation,"
+            f" {motion.format_share(reach.share[k].mean())} of all orientations"
         )
         lines.append((f"  {100 * z:g} cm above", text))
     return lines
 
 
-def add_hand_list_options(parser: Parser) -> None:
+def add_hand_list_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake hand list`."""
-    parser.epilog = examples_text("burg-drake hand list")
+    parser.epilog = options.examples_text("burg-drake hand list")
 
 
-def add_hand_check_options(check: Parser) -> None:
+def add_hand_check_options(check: options.Parser) -> None:
     """Adds the options of `burg-drake hand check`."""
-    check.epilog = examples_text(
+    check.epilog = options.examples_text(
         "burg-drake hand check wsg_50", "burg-drake hand check my_hand.yaml"
     )
     check.add_argument(
@@ -199,11 +197,10 @@ def add_hand_check_options(check: Parser) -> None:
 
 def run_hand_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in hand."""
-    from burg_drake.core import builtin_names
     from burg_drake.station import load_hand
 
-    table = TextTable().texts("hand", "description")
-    for hand in map(load_hand, builtin_names("models/hands")):
+    table = core.TextTable().texts("hand", "description")
+    for hand in map(load_hand, core.builtin_names("models/hands")):
         table.row(hand.name, hand.description)
     table.show()
     return 0

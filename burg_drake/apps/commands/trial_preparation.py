@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
+from burg_drake import core, experiment
+from burg_drake.apps import options
 from burg_drake.apps.commands.trial_records import (
     add_moved_run_option,
     add_show_simulated_option,
     add_trials_argument,
 )
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_output,
-    add_quiet,
-    add_retry_failed,
-    add_station,
-    add_workers,
-    examples_text,
-)
-from burg_drake.apps.options.settings_options import add_settings_options, settings_from
-from burg_drake.apps.terminal import print_note_lines, print_remark
-from burg_drake.core import require_writable, shorten_text
-
-if TYPE_CHECKING:
-    from burg_drake.experiment import ExportedMotion, TrialSheet, TriedRuns
+from burg_drake.apps.terminal import print_note_lines, print_remark, print_warning
 
 
-def add_trials_plan_options(parser: Parser) -> None:
+def add_trials_plan_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials plan`."""
-    from burg_drake.experiment import SelectionSettings
-
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials plan runs/first --per-object 10 -o trials.yaml",
         "burg-drake trials plan runs/many --scenes 5 --balance margin:clearance -o t.yaml",
         "burg-drake trials plan runs/a runs/b --balance stage --among clear --seed 7 -o t.yaml",
@@ -43,50 +28,41 @@ def add_trials_plan_options(parser: Parser) -> None:
     )
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
     choice = ("per_object", "balance", "bins", "among", "success", "scenes", "blocks")
-    add_settings_options(parser, SelectionSettings, *choice)
+    options.add_settings_options(parser, experiment.SelectionSettings, *choice)
     parser.add_argument(
         "--robustness",
         metavar="TABLE",
         help="table of robustness (default: robustness.csv in the run's folder)",
     )
-    add_settings_options(parser, SelectionSettings, "seed")
-    add_output(parser, "FILE", "trials file to write (.yaml)")
+    options.add_settings_options(parser, experiment.SelectionSettings, "seed")
+    options.add_output(parser, "FILE", "trials file to write (.yaml)")
 
 
 def run_trials_plan(arguments: argparse.Namespace) -> int:
     """Chooses, writes, and prints what was chosen and what it will tell."""
-    from burg_drake.experiment import (
-        SelectionSettings,
-        detectable_difference_sentence,
-        plan_trials,
-        power_table,
-    )
-
-    require_writable(arguments.output)
-    sheet = plan_trials(
+    core.require_writable(arguments.output)
+    sheet = experiment.plan_trials(
         arguments.runs,
-        settings=settings_from(arguments, SelectionSettings),
+        settings=options.settings_from(arguments, experiment.SelectionSettings),
         robustness=arguments.robustness,
         out=arguments.output,
     )
     _print_choice(sheet)
-    power_table(sheet).show()
-    print(detectable_difference_sentence(len(sheet.trials)))
+    experiment.power_table(sheet).show()
+    print(experiment.detectable_difference_sentence(len(sheet.trials)))
     print_note_lines(sheet.notes)
     print(f"wrote {len(sheet.trials)} trials to {arguments.output}")
     return 0
 
 
-def _print_choice(sheet: TrialSheet) -> None:
+def _print_choice(sheet: experiment.TrialSheet) -> None:
     """Chosen grasps by object and stratum, summed over the runs."""
-    from burg_drake.core import TextTable
-
     chosen: Counter[tuple[str, str]] = Counter()
     there: Counter[tuple[str, str]] = Counter()
     for stratum in sheet.strata.values():
         chosen[stratum.object, stratum.label] += stratum.selected
         there[stratum.object, stratum.label] += stratum.population
-    table = TextTable("Chosen for the robot").names("object").texts("stratum")
+    table = core.TextTable("Chosen for the robot").names("object").texts("stratum")
     table.numbers("chosen", "there are")
     for held, label in sorted(there):
         counts = (chosen[held, label], there[held, label])
@@ -95,9 +71,9 @@ def _print_choice(sheet: TrialSheet) -> None:
     table.show()
 
 
-def add_trials_sheet_options(parser: Parser) -> None:
+def add_trials_sheet_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials sheet`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials sheet trials.yaml -o sheet.html",
         "burg-drake trials sheet trials.yaml -o sheet.html --show-simulated",
         "",
@@ -106,7 +82,7 @@ def add_trials_sheet_options(parser: Parser) -> None:
     )
     add_trials_argument(parser)
     add_moved_run_option(parser)
-    add_output(parser, "FILE", "page to write (.html)")
+    options.add_output(parser, "FILE", "page to write (.html)")
     add_show_simulated_option(parser)
     parser.add_argument(
         "--no-printouts", action="store_true", help="do not write the boards to print"
@@ -115,37 +91,31 @@ def add_trials_sheet_options(parser: Parser) -> None:
 
 def run_trials_sheet(arguments: argparse.Namespace) -> int:
     """Writes the page, and the printed boards."""
-    from burg_drake.core import atomic_write, require_writable
-    from burg_drake.experiment import SheetOptions, TrialPictures, TriedRuns, sheet_page
-
-    require_writable(arguments.output)
-    runs = TriedRuns(arguments.trials, dict(arguments.moved))
+    core.require_writable(arguments.output)
+    runs = experiment.TriedRuns(arguments.trials, dict(arguments.moved))
     page = Path(arguments.output)
     printouts = {} if arguments.no_printouts else _write_printouts(runs, page)
-    options = SheetOptions(show_simulated=arguments.show_simulated, printouts=printouts)
-    atomic_write(page, sheet_page(runs, TrialPictures(runs), options))
+    layout = experiment.SheetOptions(show_simulated=arguments.show_simulated, printouts=printouts)
+    core.atomic_write(page, experiment.sheet_page(runs, experiment.TrialPictures(runs), layout))
     print(f"wrote {page}: {len(runs.sheet.trials)} trials")
     return 0
 
 
-def _write_printouts(runs: TriedRuns, page: Path) -> dict[int, str]:
+def _write_printouts(runs: experiment.TriedRuns, page: Path) -> dict[int, str]:
     """Writes the board of each scene; returns the files' names by block."""
-    from burg_drake.core import BurgError
-    from burg_drake.experiment import trials_by_block
     from burg_drake.printout import PrintSettings, print_board
 
     names: dict[int, str] = {}
     written: dict[str, str] = {}
-    for block, trials in trials_by_block(runs.sheet).items():
+    for block, trials in experiment.trials_by_block(runs.sheet).items():
         scene = runs.of(trials[0]).scene
         if scene.content not in written:
             taken = f"_{block}" if f"{page.stem}_{scene.name}.pdf" in written.values() else ""
             name = f"{page.stem}_{scene.name}{taken}.pdf"
             try:
                 print_board(scene, PrintSettings(instructions=True)).save(page.with_name(name))
-            except BurgError as error:
-                message = f"burg-drake: warning: no printed board of {scene.name}: {error}"
-                print(message, file=sys.stderr)
+            except core.BurgError as error:
+                print_warning(f"no printed board of {scene.name}: {error}")
                 continue
             written[scene.content] = name
             print(f"wrote {page.with_name(name)}")
@@ -153,11 +123,11 @@ def _write_printouts(runs: TriedRuns, page: Path) -> dict[int, str]:
     return names
 
 
-def add_trials_export_options(parser: Parser) -> None:
+def add_trials_export_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials export`."""
     from burg_drake.evaluation import PlanFormat
 
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials export trials.yaml -o plans/",
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
@@ -165,26 +135,24 @@ def add_trials_export_options(parser: Parser) -> None:
         " where an interrupted one stopped. Exit code 1 if a trial could not be planned.",
     )
     add_trials_argument(parser)
-    add_output(parser, "DIR", "folder to write, 1.5 MB per motion")
+    options.add_output(parser, "DIR", "folder to write, 1.5 MB per motion")
     parser.add_argument(
         "--format",
         choices=get_args(PlanFormat),
         default="json",
         help="JSON like ROS's JointTrajectory, or CSV tables (default: %(default)s)",
     )
-    add_station(parser, "station with the arm (default: that of each run)", default=None)
+    options.add_station(parser, "station with the arm (default: that of each run)", default=None)
     add_moved_run_option(parser)
-    add_workers(parser)
-    add_retry_failed(parser, "trials")
-    add_quiet(parser)
+    options.add_workers(parser)
+    options.add_retry_failed(parser, "trials")
+    options.add_quiet(parser)
     parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_trials_export(arguments: argparse.Namespace) -> int:
     """Plans and writes; 1 if a trial could not be judged."""
-    from burg_drake.experiment import MOTION_INDEX_FILE, export_trials
-
-    rows = export_trials(
+    rows = experiment.export_trials(
         arguments.trials,
         arguments.output,
         format=arguments.format,
@@ -197,26 +165,25 @@ def run_trials_export(arguments: argparse.Namespace) -> int:
     _print_unplanned_trials(rows)
     written = sum(bool(row.file) for row in rows)
     print(
-        f"{written} of {len(rows)} motions are in {arguments.output}, listed in {MOTION_INDEX_FILE}"
+        f"{written} of {len(rows)} motions are in {arguments.output}, listed in"
+        f" {experiment.MOTION_INDEX_FILE}"
     )
     failed = [row for row in rows if row.reason and not row.file]
     if failed:
         first = failed[0]
         print_remark(
             f"{len(failed)} trials have no motion because a computation failed, such"
-            f" as {first.number}: {shorten_text(first.reason, 200)}"
+            f" as {first.number}: {core.shorten_text(first.reason, 200)}"
         )
     return 1 if failed else 0
 
 
-def _print_unplanned_trials(rows: list[ExportedMotion]) -> None:
+def _print_unplanned_trials(rows: list[experiment.ExportedMotion]) -> None:
     """Trials that the arm cannot execute, and why."""
-    from burg_drake.core import TextTable
-
     hindered = [row for row in rows if not row.file and not row.reason]
     if not hindered:
         return
-    table = TextTable("The arm cannot execute").numbers("trial").texts("grasp", "because of")
+    table = core.TextTable("The arm cannot execute").numbers("trial").texts("grasp", "because of")
     for row in hindered:
         table.row(str(row.number), row.grasp, f"{row.answer} {row.blocker}".strip())
     counts = Counter(row.answer for row in hindered)

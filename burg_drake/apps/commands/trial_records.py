@@ -9,44 +9,36 @@ import argparse
 import contextlib
 from collections.abc import Sequence
 from datetime import date, datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from burg_drake.apps.options.arguments import (
-    Parser,
-    add_depth_unit,
-    add_intrinsics,
-    add_measured_board,
-    examples_text,
-    print_scale_from_options,
-)
-from burg_drake.apps.options.values import not_negative, positive_int
+from burg_drake import core, experiment
+from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark
-from burg_drake.core import InvalidInputError, quote_value
 
 if TYPE_CHECKING:
     from burg_drake.cameras import PlacementCheck
-    from burg_drake.experiment import MissingValues, RealTrial, TrialBook, TrialSheet
 
 
-def add_trials_argument(parser: Parser) -> None:
+def add_trials_argument(parser: options.Parser) -> None:
     """The argument TRIALS."""
     parser.add_argument("trials", metavar="TRIALS", help="trials file of `trials plan`")
 
 
-def add_moved_run_option(parser: Parser) -> None:
+def add_moved_run_option(parser: options.Parser) -> None:
     """The option --run, for folders that have moved."""
     parser.add_argument(
         "--run",
         dest="moved",
         metavar="KEY=FOLDER",
-        type=_parse_moved_run,
+        type=partial(options.key_and_value, form="KEY=FOLDER"),
         action="append",
         default=[],
         help="folder of a run, if it has moved",
     )
 
 
-def add_show_simulated_option(parser: Parser, more: str = "") -> None:
+def add_show_simulated_option(parser: options.Parser, more: str = "") -> None:
     """The option --show-simulated, of verbs that operators look at.
 
     Args:
@@ -60,7 +52,7 @@ def add_show_simulated_option(parser: Parser, more: str = "") -> None:
     )
 
 
-def print_damage(book: TrialBook) -> bool:
+def print_damage(book: experiment.TrialBook) -> bool:
     """Prints damaged lines of the journal to standard error. Returns True if there are any."""
     damage = book.damage()
     if damage:
@@ -68,16 +60,9 @@ def print_damage(book: TrialBook) -> bool:
     return bool(damage)
 
 
-def _parse_moved_run(text: str) -> tuple[str, str]:
-    key, equals, folder = text.partition("=")
-    if not key or not equals or not folder:
-        raise argparse.ArgumentTypeError(f"{quote_value(text)} is not KEY=FOLDER")
-    return key, folder
-
-
-def add_trials_record_options(parser: Parser) -> None:
+def add_trials_record_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials record`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials record trials.yaml 17 --outcome lifted",
         "burg-drake trials record trials.yaml next --outcome slipped --note 'wet fingers'",
         "burg-drake trials record trials.yaml 17 --photo photo.png --intrinsics K.yaml",
@@ -101,9 +86,9 @@ def add_trials_record_options(parser: Parser) -> None:
     )
     robot = parser.add_argument_group("what the robot measured at the end")
     robot.add_argument(
-        "--width-mm", metavar="MM", type=not_negative, help="distance between the pads"
+        "--width-mm", metavar="MM", type=options.not_negative, help="distance between the pads"
     )
-    robot.add_argument("--effort-n", metavar="N", type=not_negative, help="gripping force")
+    robot.add_argument("--effort-n", metavar="N", type=options.not_negative, help="gripping force")
     _add_photo_options(parser.add_argument_group("photo of the scene before the trial"))
     add_moved_run_option(parser)
     how = parser.add_mutually_exclusive_group()
@@ -115,11 +100,13 @@ def add_trials_record_options(parser: Parser) -> None:
 
 def _add_photo_options(group: Any) -> None:
     group.add_argument("--photo", metavar="FILE", help="photo, copied to photos/")
-    add_intrinsics(group, "intrinsics of the camera; the placement of objects is then measured")
+    options.add_intrinsics(
+        group, "intrinsics of the camera; the placement of objects is then measured"
+    )
     group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
-    add_depth_unit(group)
+    options.add_depth_unit(group)
     group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")
-    add_measured_board(group)
+    options.add_measured_board(group)
     group.add_argument(
         "--placement", metavar="FILE", help="placement file of `camera placement`, if there is one"
     )
@@ -127,17 +114,10 @@ def _add_photo_options(group: Any) -> None:
 
 def run_trials_record(arguments: argparse.Namespace) -> int:
     """Measures and records; 1 if the photo has no board."""
-    from burg_drake.experiment import (
-        TrialBook,
-        parse_real_outcome,
-        save_photo_and_placement,
-        summarize_placements,
-    )
-
     _require_consistent_record_options(arguments)
     if arguments.outcome is not None:
-        parse_real_outcome(arguments.outcome)
-    book = TrialBook(arguments.trials)
+        experiment.parse_real_outcome(arguments.outcome)
+    book = experiment.TrialBook(arguments.trials)
     sheet = book.sheet()
     trial = book.trial(_resolve_trial_number(arguments.number, sheet))
     entry = _entry_from_options(arguments)
@@ -146,12 +126,12 @@ def run_trials_record(arguments: argparse.Namespace) -> int:
     found = check is not None and not check.reason
     if arguments.photo or check is not None:
         kept = check if found else None
-        photo = save_photo_and_placement(
+        photo = experiment.save_photo_and_placement(
             arguments.trials, trial.number, photo=arguments.photo, check=kept
         )
         entry |= {"photo": photo} if photo else {}
     if check is not None and found:
-        entry["placement"] = summarize_placements(check)
+        entry["placement"] = experiment.summarize_placements(check)
     recorded = _record_trial(book, arguments, trial, entry)
     if arguments.photo and not (arguments.intrinsics or arguments.placement):
         print("no placement was measured: --intrinsics FILE of the camera is missing")
@@ -164,12 +144,13 @@ def run_trials_record(arguments: argparse.Namespace) -> int:
 
 
 def _record_trial(
-    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
-) -> RealTrial:
+    book: experiment.TrialBook,
+    arguments: argparse.Namespace,
+    trial: experiment.RealTrial,
+    entry: dict[str, Any],
+) -> experiment.RealTrial:
     """Records it. `next` is the first open trial at this very moment; but if there is evidence it
     is the one that the evidence is about, or none."""
-    from burg_drake.experiment import TrialChanged
-
     how = {"correct": arguments.correct, "again": arguments.again}
     if arguments.number != "next":
         return book.record(trial.number, **how, **entry)
@@ -177,14 +158,14 @@ def _record_trial(
         return book.record("next", **how, **entry)
     try:
         return book.record(trial.number, expected=trial, **how, **entry)
-    except TrialChanged as error:
+    except experiment.TrialChanged as error:
         kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
         ) from error
 
 
-def _resolve_trial_number(text: str, sheet: TrialSheet) -> int | Literal["next"]:
+def _resolve_trial_number(text: str, sheet: experiment.TrialSheet) -> int | Literal["next"]:
     max_digits = 9
     if text == "next":
         return "next"
@@ -192,7 +173,9 @@ def _resolve_trial_number(text: str, sheet: TrialSheet) -> int | Literal["next"]
         return int(text)
     numbers = [trial.number for trial in sheet.trials]
     span = f", {min(numbers)} to {max(numbers)}," if numbers else ""
-    raise InvalidInputError(f"{quote_value(text)}: give the number of a trial{span} or next")
+    raise core.InvalidInputError(
+        f"{core.quote_value(text)}: give the number of a trial{span} or next"
+    )
 
 
 def _parse_moment(text: str) -> str:
@@ -204,7 +187,7 @@ def _parse_moment(text: str) -> str:
         return (moment if moment.tzinfo else moment.astimezone()).isoformat()
     except (ValueError, OverflowError) as error:
         raise argparse.ArgumentTypeError(
-            f"{quote_value(text)} is not a time; give ISO 8601 such as 2026-05-04T16:30"
+            f"{core.quote_value(text)} is not a time; give ISO 8601 such as 2026-05-04T16:30"
         ) from error
 
 
@@ -216,15 +199,17 @@ def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
         for name in photo_options:
             if getattr(arguments, name) is not None:
                 option = name.replace("_", "-")
-                raise InvalidInputError(f"--{option} is for photos; add --photo FILE")
+                raise core.InvalidInputError(f"--{option} is for photos; add --photo FILE")
     elif arguments.depth and not arguments.intrinsics:
-        raise InvalidInputError("--depth needs --intrinsics FILE of its camera")
+        raise core.InvalidInputError("--depth needs --intrinsics FILE of its camera")
     if arguments.placement and arguments.intrinsics:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             "--placement is already a measurement; leave out either it or --intrinsics"
         )
     if not (_entry_from_options(arguments) or arguments.photo or arguments.placement):
-        raise InvalidInputError("nothing to record; give --outcome, --note or --photo, for example")
+        raise core.InvalidInputError(
+            "nothing to record; give --outcome, --note or --photo, for example"
+        )
 
 
 def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -240,16 +225,14 @@ def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _placement_check(
-    arguments: argparse.Namespace, sheet: TrialSheet, trial: RealTrial
+    arguments: argparse.Namespace, sheet: experiment.TrialSheet, trial: experiment.RealTrial
 ) -> PlacementCheck | None:
     """The placement check, of a file or of the photo, if one is wanted."""
-    from burg_drake.experiment import measure_placement, require_same_scene, require_scene_of_check
-
     if arguments.placement:
         from burg_drake.cameras import load_placement
 
         check = load_placement(arguments.placement)
-        require_scene_of_check(check, sheet, trial, arguments.placement)
+        experiment.require_scene_of_trial(check.scene, sheet, trial, arguments.placement)
         return check
     if not arguments.photo or not arguments.intrinsics:
         return None
@@ -257,29 +240,30 @@ def _placement_check(
 
     if arguments.scene:
         scene = load_scene(arguments.scene)
-        require_same_scene(scene, sheet, trial)
+        experiment.require_scene_of_trial(scene, sheet, trial, arguments.scene)
     else:
-        from burg_drake.experiment import load_source_run
-
-        run = load_source_run(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
+        run = experiment.load_source_run(
+            sheet, arguments.trials, trial.run, moved=dict(arguments.moved)
+        )
         scene = run.scene()
-    return measure_placement(
+    return experiment.measure_placement(
         scene,
         arguments.photo,
         arguments.intrinsics,
         depth=arguments.depth,
         depth_unit=arguments.depth_unit,
-        scale=print_scale_from_options(arguments),
+        scale=options.print_scale_from_options(arguments),
     )
 
 
-def _warn_of_width(arguments: argparse.Namespace, sheet: TrialSheet, trial: RealTrial) -> None:
+def _warn_of_width(
+    arguments: argparse.Namespace, sheet: experiment.TrialSheet, trial: experiment.RealTrial
+) -> None:
     """Says that a width is beyond what the hand opens, where the run can tell."""
-    from burg_drake.core import BurgError
-    from burg_drake.experiment import load_source_run
-
-    with contextlib.suppress(BurgError):
-        run = load_source_run(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
+    with contextlib.suppress(core.BurgError):
+        run = experiment.load_source_run(
+            sheet, arguments.trials, trial.run, moved=dict(arguments.moved)
+        )
         hand = run.station().hand
         if arguments.width_mm > 1e3 * hand.opening[1]:
             print_remark(
@@ -288,7 +272,9 @@ def _warn_of_width(arguments: argparse.Namespace, sheet: TrialSheet, trial: Real
             )
 
 
-def _print_recorded(trial: RealTrial, sheet: TrialSheet, check: PlacementCheck | None) -> None:
+def _print_recorded(
+    trial: experiment.RealTrial, sheet: experiment.TrialSheet, check: PlacementCheck | None
+) -> None:
     from burg_drake.apps.commands.camera_placement import placement_table
 
     if check is not None:
@@ -304,9 +290,9 @@ def _print_recorded(trial: RealTrial, sheet: TrialSheet, check: PlacementCheck |
         print("all trials have an outcome")
 
 
-def add_trials_show_options(parser: Parser) -> None:
+def add_trials_show_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials show`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials show trials.yaml",
         "burg-drake trials show trials.yaml --all",
         "",
@@ -320,9 +306,7 @@ def add_trials_show_options(parser: Parser) -> None:
 
 def run_trials_show(arguments: argparse.Namespace) -> int:
     """Prints; 1 if entries are missing, or the journal is damaged."""
-    from burg_drake.experiment import TrialBook
-
-    book = TrialBook(arguments.trials)
+    book = experiment.TrialBook(arguments.trials)
     sheet = book.sheet()
     for key, run in sheet.runs.items():
         print(f"run {key}: {run.hash}, scene {run.scene.name}, mode {run.mode}, in {run.path}")
@@ -339,24 +323,25 @@ def run_trials_show(arguments: argparse.Namespace) -> int:
     return 1 if damage or any(found.values for found in lacking) else 0
 
 
-def _print_progress(sheet: TrialSheet, simulated: bool) -> None:
+def _print_progress(sheet: experiment.TrialSheet, simulated: bool) -> None:
     """How many trials of each object are done, and how they ended."""
-    from burg_drake.core import TextTable
-    from burg_drake.experiment import is_success
-
-    table = TextTable().names("object")
+    table = core.TextTable().names("object")
     table.numbers("trials", "done", "tried")
     table.numbers(*(["success\nin simulation"] if simulated else []), "success\non the robot")
     success = sheet.selection.success
 
-    def row(name: str, trials: Sequence[RealTrial], *, bold: bool = False) -> None:
+    def row(name: str, trials: Sequence[experiment.RealTrial], *, bold: bool = False) -> None:
         outcomes = [t.outcome for t in trials if t.outcome is not None]
         counts = (
             len(trials),
             len(outcomes),
             sum(outcome.attempted for outcome in outcomes),
-            *([sum(is_success(t.simulated, success) for t in trials)] if simulated else []),
-            sum(is_success(outcome, success) for outcome in outcomes),
+            *(
+                [sum(experiment.is_success(t.simulated, success) for t in trials)]
+                if simulated
+                else []
+            ),
+            sum(experiment.is_success(outcome, success) for outcome in outcomes),
         )
         table.row(name, *map(str, counts), bold=bold)
 
@@ -366,10 +351,8 @@ def _print_progress(sheet: TrialSheet, simulated: bool) -> None:
     table.show()
 
 
-def _print_trials(trials: Sequence[RealTrial], simulated: bool) -> None:
-    from burg_drake.core import TextTable
-
-    table = TextTable().numbers("trial", "block").texts("grasp", "outcome", "note")
+def _print_trials(trials: Sequence[experiment.RealTrial], simulated: bool) -> None:
+    table = core.TextTable().numbers("trial", "block").texts("grasp", "outcome", "note")
     table.texts(*(["simulated"] if simulated else []))
     for trial in trials:
         outcome = "" if trial.outcome is None else trial.outcome.value
@@ -378,7 +361,7 @@ def _print_trials(trials: Sequence[RealTrial], simulated: bool) -> None:
     table.show()
 
 
-def _print_missing_entries(path: str, lacking: Sequence[MissingValues]) -> None:
+def _print_missing_entries(path: str, lacking: Sequence[experiment.MissingValues]) -> None:
     """What the journal has and the file has not."""
     for found in lacking:
         if found.values:
@@ -396,9 +379,9 @@ def _print_missing_entries(path: str, lacking: Sequence[MissingValues]) -> None:
         )
 
 
-def add_trials_restore_options(parser: Parser) -> None:
+def add_trials_restore_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake trials restore`."""
-    parser.epilog = examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake trials restore trials.yaml",
         "burg-drake trials restore trials.yaml --number 17",
         "burg-drake trials restore trials.yaml --number 17 --keep",
@@ -409,7 +392,7 @@ def add_trials_restore_options(parser: Parser) -> None:
     parser.add_argument(
         "--number",
         metavar="N",
-        type=positive_int,
+        type=options.positive_int,
         action="append",
         help="number of a trial (default: all); repeatable",
     )
@@ -420,9 +403,7 @@ def add_trials_restore_options(parser: Parser) -> None:
 
 def run_trials_restore(arguments: argparse.Namespace) -> int:
     """Restores, and says what; 1 if the journal is damaged."""
-    from burg_drake.experiment import TrialBook
-
-    book = TrialBook(arguments.trials)
+    book = experiment.TrialBook(arguments.trials)
     for number in arguments.number or ():
         book.trial(number)
     done = (book.keep if arguments.keep else book.restore)(arguments.number)

@@ -312,7 +312,7 @@ def add_workers(
 
 
 MAX_PAGE_CONNECTIONS = 32
-"""Connections at a time, each with its own thread. A browser opens two to six."""
+"""Connections at a time. A browser opens two to six."""
 
 
 def add_view_options(parser: Parser) -> None:
@@ -361,8 +361,22 @@ def add_intrinsics(
     )
 
 
-def add_live_camera(parser: Any) -> None:
-    """The options --intrinsics and --fps, of verbs that follow what a camera sees."""
+def add_live_camera(parser: Any, more: str, default: str | None = None) -> None:
+    """The options --camera, --intrinsics, --fps and --measured-mm, of verbs that follow what a
+    camera sees.
+
+    Args:
+        parser: gets them.
+        more: follows the kinds of cameras in the help.
+        default: the camera.
+    """
+    parser.add_argument(
+        "--camera",
+        metavar="SOURCE",
+        default=default,
+        help="camera number, stream address, video, image, folder of images, or"
+        f" sim:STATION/CAMERA{more}",
+    )
     add_intrinsics(
         parser,
         "intrinsics of the camera, by burg-drake camera calibrate; simulated cameras need none",
@@ -370,6 +384,7 @@ def add_live_camera(parser: Any) -> None:
     parser.add_argument(
         "--fps", type=positive, metavar="N", help="images per second to request from the camera"
     )
+    add_measured_board(parser)
 
 
 def add_depth_unit(parser: Any) -> None:

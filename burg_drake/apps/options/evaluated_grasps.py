@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from burg_drake import core, evaluation
 from burg_drake.apps.options.arguments import Parser, add_only
 from burg_drake.apps.options.grasp_files import (
     POSE_FRAMES,
@@ -16,11 +17,8 @@ from burg_drake.apps.options.grasp_files import (
 )
 from burg_drake.apps.options.settings_options import add_settings_options, fields_from_options
 from burg_drake.apps.options.values import input_file, renaming
-from burg_drake.core import FieldError, InvalidInputError, option_name
 
 if TYPE_CHECKING:
-    from burg_drake.core import GraspSet
-    from burg_drake.evaluation import GivenGrasps
     from burg_drake.scene import Scene
     from burg_drake.station import GraspMotion, Station
 
@@ -33,16 +31,18 @@ def add_sampling_options(parser: Parser, default: int, which: Any = None) -> Non
         default: number of grasps for each object.
         which: group in which the number of grasps is an alternative, such as to grasps of a file.
     """
-    from burg_drake.evaluation import EvaluationSettings
-
     add_settings_options(
-        which or parser, EvaluationSettings, "grasps_per_object", unset=True, shown_default=default
+        which or parser,
+        evaluation.EvaluationSettings,
+        "grasps_per_object",
+        unset=True,
+        shown_default=default,
     )
     parser.set_defaults(default_grasps=default)
-    add_settings_options(parser, EvaluationSettings, "blind")
+    add_settings_options(parser, evaluation.EvaluationSettings, "blind")
     add_only(parser, "grasps")
-    add_settings_options(parser, EvaluationSettings, "approach_angle_deg", unset=True)
-    add_settings_options(parser, EvaluationSettings, "seed")
+    add_settings_options(parser, evaluation.EvaluationSettings, "approach_angle_deg", unset=True)
+    add_settings_options(parser, evaluation.EvaluationSettings, "seed")
 
 
 def grasps_per_object(arguments: argparse.Namespace) -> int:
@@ -58,17 +58,15 @@ def refuse_sampling_options_with_file(arguments: argparse.Namespace) -> None:
     """
     for name in ("blind", "approach_angle", "until_balanced"):
         if getattr(arguments, name, None) and arguments.grasps is not None:
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
             )
 
 
-def print_shortfalls(sampled: Mapping[str, GraspSet], asked: int) -> None:
+def print_shortfalls(sampled: Mapping[str, core.GraspSet], asked: int) -> None:
     """A line for each object with fewer grasps than asked, that says why."""
-    from burg_drake.evaluation import shortfall_note
-
     for name, grasps in sampled.items():
-        note = shortfall_note(name, asked, grasps.provenance, len(grasps))
+        note = evaluation.shortfall_note(name, asked, grasps.provenance, len(grasps))
         if note:
             print(f"note: {note}")
 
@@ -116,36 +114,35 @@ def require_grasp_file(arguments: argparse.Namespace) -> None:
     names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
     for name in (*names, "scene_id", "gripper_link", "correction"):
         if getattr(arguments, name) and arguments.grasps is None:
-            raise InvalidInputError(
+            raise core.InvalidInputError(
                 f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
             )
 
 
 def read_grasps_from_options(
     arguments: argparse.Namespace, scene: Scene, station: Station
-) -> GivenGrasps:
+) -> evaluation.GivenGrasps:
     """The grasps of the file that --grasps names, on the instances of a scene."""
-    from burg_drake.evaluation import FileReading, MisplacedGraspsError, find_mistake, read_grasps
     from burg_drake.formats import read_poses
 
     poses = arguments.camera_pose
     try:
-        return read_grasps(
+        return evaluation.read_grasps(
             scene,
             arguments.grasps,
             gripper_for(arguments, station),
-            format=FileReading(arguments.grasps_format, arguments.correction),
+            format=evaluation.FileReading(arguments.grasps_format, arguments.correction),
             objects=dict(arguments.grasps_object),
             frame=POSE_FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
             X_SF=read_poses(poses) if poses else None,
             object_ids=arguments.object_ids,
             scene_id=arguments.scene_id,
         )
-    except MisplacedGraspsError as error:
-        mistake = find_mistake(error.grasps, station, scene)
+    except evaluation.MisplacedGraspsError as error:
+        mistake = evaluation.find_mistake(error.grasps, station, scene)
         if mistake is None:
             raise
-        raise InvalidInputError(f"{error}. {mistake.text()}") from error
+        raise core.InvalidInputError(f"{error}. {mistake.text()}") from error
 
 
 def add_motion_options(parser: Parser) -> None:
@@ -175,16 +172,16 @@ def motion_from_options(arguments: argparse.Namespace, station: Station) -> Gras
     given = motion_fields_from_options(arguments)
     try:
         return replace(station.document.motion, **given)  # type: ignore[arg-type]
-    except FieldError as error:
+    except core.FieldError as error:
         options = ", ".join(motion_option(field) for field in given)
-        raise InvalidInputError(f"{error} ({options})") from error
+        raise core.InvalidInputError(f"{error} ({options})") from error
 
 
 def motion_option(field: str) -> str:
     """The option of a field of `GraspMotion`."""
     from burg_drake.station import GraspMotion
 
-    return option_name(GraspMotion, field)
+    return core.option_name(GraspMotion, field)
 
 
 def refuse_standoff_without_arm(arguments: argparse.Namespace, mode: str) -> None:
@@ -195,7 +192,7 @@ def refuse_standoff_without_arm(arguments: argparse.Namespace, mode: str) -> Non
     """
     approaches = mode != "hand" or getattr(arguments, "approach", False)
     if not approaches and arguments.standoff_mm is not None:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             "--standoff-mm is the length of the approach; in mode 'hand' the trial begins at the"
             " grasp: leave it out, or give --approach, or --mode reach or arm"
         )

@@ -8,20 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake import core, evaluation, formats
 from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser, add_station
 from burg_drake.apps.options.values import input_file
-from burg_drake.core import (
-    InvalidInputError,
-    UnknownNameError,
-    is_resolved,
-    list_names,
-    require_writable,
-    suggest_names,
-)
 
 if TYPE_CHECKING:
-    from burg_drake.core import GraspSet
-    from burg_drake.formats import GraspFormat, Gripper
     from burg_drake.objects import ObjectLibrary
     from burg_drake.scene import Scene
     from burg_drake.station import Station
@@ -105,7 +96,7 @@ def parse_object_ids(text: str) -> dict[int, str]:
 
 def gripper_for(
     arguments: argparse.Namespace, station: Station | None = None, path: str | None = None
-) -> Gripper:
+) -> formats.Gripper:
     """The hand of a station, or else the one that --hand or a file names, with the link of
     --gripper-link."""
     if station is None:
@@ -132,45 +123,39 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
     Raises:
         UnknownNameError: it is not there.
     """
-    from burg_drake.evaluation import station_reference
     from burg_drake.station import load_station
 
     if arguments.station is not None:
         return load_station(arguments.station)
-    reference = station_reference(path)
-    if reference is not None and not is_resolved(reference, "stations"):
-        raise UnknownNameError(
+    reference = evaluation.station_reference(path)
+    if reference is not None and not core.is_resolved(reference, "stations"):
+        raise core.UnknownNameError(
             f"{path} names a station that is not there: {reference}; give --station"
         )
     try:
         return load_station(reference or DEFAULT_STATION)
-    except UnknownNameError as error:
-        raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
+    except core.UnknownNameError as error:
+        raise core.UnknownNameError(f"{path} names a station: {error}; give --station") from error
 
 
-def gripper_by_name(hand: str) -> Gripper:
+def gripper_by_name(hand: str) -> formats.Gripper:
     """What formats know of a hand; of the Panda's without a look into its model."""
-    from burg_drake.formats import PANDA_GRIPPER
-
     if hand == DEFAULT_HAND:
-        return PANDA_GRIPPER
+        return formats.PANDA_GRIPPER
     from burg_drake.station import gripper_of, locate_hand
 
     return gripper_of(*locate_hand(hand))
 
 
-def _gripper_of_file(path: str | None) -> Gripper:
+def _gripper_of_file(path: str | None) -> formats.Gripper:
     """The hand that a file or a run says its grasps are for, else the default."""
-    from burg_drake.core import BurgError
-    from burg_drake.evaluation import hand_reference
-
-    reference = None if path is None else hand_reference(path)
+    reference = None if path is None else evaluation.hand_reference(path)
     if reference is None:
         return gripper_by_name(DEFAULT_HAND)
     try:
         return gripper_by_name(reference)
-    except BurgError as error:
-        raise UnknownNameError(
+    except core.BurgError as error:
+        raise core.UnknownNameError(
             f"the hand that {path} names cannot be used; give another (--hand): {error}"
         ) from error
 
@@ -204,17 +189,16 @@ def open_grasp_source(reference: str) -> GraspSource:
         UnknownNameError: there is neither.
         DocumentError: its document does not fit the schema.
     """
-    from burg_drake.core import builtin_names, expand_home
     from burg_drake.objects import LIBRARY_FILE, load_library
     from burg_drake.scene import load_scene
 
-    scenes, libraries = builtin_names("scenes"), builtin_names("models")
-    path = expand_home(reference)
+    scenes, libraries = core.builtin_names("scenes"), core.builtin_names("models")
+    path = core.expand_home(reference)
     is_library = path.is_dir() or path.name == LIBRARY_FILE or reference in libraries
     if not is_library and reference not in scenes and not path.exists():
-        raise UnknownNameError(
+        raise core.UnknownNameError(
             f"{reference} is neither a scene nor an object library;"
-            f" {suggest_names(reference, [*scenes, *libraries])}"
+            f" {core.suggest_names(reference, [*scenes, *libraries])}"
         )
     if is_library:
         return GraspSource(load_library(reference))
@@ -233,7 +217,9 @@ def add_source_options(parser: Parser) -> None:
     )
 
 
-def load_grasp_source(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> GraspSource:
+def load_grasp_source(
+    arguments: argparse.Namespace, grasps: core.GraspSet, path: str
+) -> GraspSource:
     """The objects of a grasp file.
 
     Args:
@@ -246,34 +232,32 @@ def load_grasp_source(arguments: argparse.Namespace, grasps: GraspSet, path: str
             far from their objects.
         UnknownNameError: what is named is not there, or lacks an object of the grasps.
     """
-    from burg_drake.evaluation import require_near
-
     named = [arguments.scene, arguments.library]
     named += [grasps.provenance.get(key) for key in ("scene", "library")]
     reference = next((name for name in named if name), None)
     if reference is None:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{path} does not say where its objects are; give --scene or --library"
         )
     try:
         from_file = reference not in (arguments.scene, arguments.library)
-        if from_file and not is_resolved(str(reference), "scenes", "models"):
-            raise UnknownNameError(str(reference))
+        if from_file and not core.is_resolved(str(reference), "scenes", "models"):
+            raise core.UnknownNameError(str(reference))
         source = open_grasp_source(str(reference))
-    except UnknownNameError as error:
+    except core.UnknownNameError as error:
         if reference in (arguments.scene, arguments.library):
             raise
-        raise UnknownNameError(
+        raise core.UnknownNameError(
             f"{path} says that its objects are in {reference}, which is not there; give --scene or"
             " --library"
         ) from error
     for name in sorted(set(grasps.object.tolist())):
         if name not in source.library.objects:
-            raise UnknownNameError(
+            raise core.UnknownNameError(
                 f"{path} has grasps of object {name!r}, which is not in library"
-                f" {source.library.root}; {suggest_names(name, source.library.objects)}"
+                f" {source.library.root}; {core.suggest_names(name, source.library.objects)}"
             )
-    require_near(grasps, source.library, path)
+    evaluation.require_near(grasps, source.library, path)
     return source
 
 
@@ -288,7 +272,7 @@ class GraspOutput:
     """
 
     path: Path
-    format: GraspFormat
+    format: formats.GraspFormat
     is_folder: bool
 
     def require_fits(self, objects: Collection[str]) -> None:
@@ -297,17 +281,16 @@ class GraspOutput:
         Raises:
             InvalidInputError: they do not fit.
         """
-        if self.format.one_object and not self.is_folder and len(set(objects)) > 1:
-            raise InvalidInputError(
+        names = sorted(set(objects))
+        if self.format.one_object and not self.is_folder and len(names) > 1:
+            raise core.InvalidInputError(
                 f"a file of {self.format.title} holds grasps of one object, and these are of"
-                f" {len(set(objects))} ({list_names(sorted(set(objects)))}); choose one, or give a"
-                f" folder for a file per object: {self.path.with_suffix('')}/"
+                f" {len(names)} ({core.list_names(names)}); choose one, or give a folder for a file"
+                f" per object: {self.path.with_suffix('')}/"
             )
 
-    def write(self, grasps: GraspSet, gripper: Gripper) -> None:
+    def write(self, grasps: core.GraspSet, gripper: formats.Gripper) -> None:
         """Writes, and prints what was written and what the format has no place for."""
-        from burg_drake.formats import write_each_object
-
         as_what = "" if self.format.name == "burg_drake" else f" as {format_title(self.format)}"
         said = f"wrote {len(grasps)} grasps to {self.path}{as_what}"
         if not self.is_folder:
@@ -315,12 +298,12 @@ class GraspOutput:
             print(said)
             print_notes(notes)
             return
-        written = write_each_object(grasps, self.path, self.format, gripper)
+        written = formats.write_each_object(grasps, self.path, self.format, gripper)
         print(said)
-        print(f"  {list_names([path.name for path in written])}")
+        print(f"  {core.list_names([path.name for path in written])}")
         for note in dict.fromkeys(note for notes in written.values() for note in notes):
             files = [path.name for path, notes in written.items() if note in notes]
-            where = f"{list_names(files)}: " if len(files) < len(written) else ""
+            where = f"{core.list_names(files)}: " if len(files) < len(written) else ""
             print_notes([f"{where}{note}"])
 
 
@@ -344,26 +327,24 @@ def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> 
             another frame.
         UnknownNameError: there is no such format.
     """
-    from burg_drake.formats import format_by_suffix, format_named
-
     out = Path(path)
     is_folder = out.is_dir() or path.endswith("/") or not out.suffix
     if is_folder and target is None:
-        raise InvalidInputError(f"{out} is a folder; say in which format to write (--to)")
+        raise core.InvalidInputError(f"{out} is a folder; say in which format to write (--to)")
     try:
-        format = format_named(target) if target else format_by_suffix(out)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{error} (--to)") from error
+        format = formats.format_named(target) if target else formats.format_by_suffix(out)
+    except core.InvalidInputError as error:
+        raise core.InvalidInputError(f"{error} (--to)") from error
     if frame is not None and format.frame != frame:
-        raise InvalidInputError(
+        raise core.InvalidInputError(
             f"{format.title} has grasps in the {format.frame} frame; write a .h5 file, then convert"
             " it with `burg-drake grasps convert`"
         )
-    require_writable(out / "grasps" if is_folder else out)
+    core.require_writable(out / "grasps" if is_folder else out)
     return GraspOutput(out, format, is_folder)
 
 
-def format_title(format: GraspFormat) -> str:
+def format_title(format: formats.GraspFormat) -> str:
     """A format's name and title."""
     return format.name if format.title == format.name else f"{format.name} ({format.title})"
 

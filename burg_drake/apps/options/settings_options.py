@@ -8,15 +8,10 @@ from collections.abc import Callable
 from dataclasses import MISSING, Field
 from typing import Any, TypeVar
 
+from burg_drake import core
 from burg_drake.apps.options.values import MAX_COUNT, number, two_numbers, whole_number
-from burg_drake.core import Setting, declared_fields, option_name, shorten_text
 
 Settings = TypeVar("Settings")
-
-
-def option_destination(settings: type, name: str) -> str:
-    """What the parsed arguments call a field."""
-    return option_name(settings, name)[2:].replace("-", "_")
 
 
 def add_settings_options(
@@ -32,7 +27,7 @@ def add_settings_options(
             help does not tell a default.
         shown_default: the default that the help tells all the same.
     """
-    known = declared_fields(settings)
+    known = core.declared_fields(settings)
     options_of = {name: declaration.option(name) for name, (_, declaration) in known.items()}
     for name in names or tuple(known):
         field, declaration = known[name]
@@ -48,7 +43,7 @@ def add_settings_options(
         parser.add_argument(*declaration.flags, option, **options)
 
 
-def _value_options(field: Field[Any], declaration: Setting) -> dict[str, Any]:
+def _value_options(field: Field[Any], declaration: core.Setting) -> dict[str, Any]:
     """What `add_argument` has to know of an option that takes a value."""
     if declaration.choices:
         return {"choices": declaration.choices}
@@ -60,7 +55,7 @@ def _value_options(field: Field[Any], declaration: Setting) -> dict[str, Any]:
     return found
 
 
-def default_text(field: Field[Any], declaration: Setting) -> Any:
+def default_text(field: Field[Any], declaration: core.Setting) -> Any:
     """The default of a field as people would give it; None if it has none."""
     value = None if field.default is MISSING else field.default
     if declaration.unit is None or value is None:
@@ -91,8 +86,9 @@ def settings_from(
 def fields_from_options(arguments: argparse.Namespace, settings: type) -> dict[str, Any]:
     """The values of fields, in SI, that options give."""
     given: dict[str, Any] = {}
-    for name, (field, declaration) in declared_fields(settings).items():
-        value = getattr(arguments, option_destination(settings, name), None)
+    for name, (field, declaration) in core.declared_fields(settings).items():
+        destination = core.option_name(settings, name)[2:].replace("-", "_")
+        value = getattr(arguments, destination, None)
         if value is None:
             continue
         unit = declaration.unit
@@ -104,7 +100,7 @@ def fields_from_options(arguments: argparse.Namespace, settings: type) -> dict[s
     return given
 
 
-def _value_parser(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
+def _value_parser(field: Field[Any], declaration: core.Setting) -> Callable[[str], Any]:
     """What reads the value of an option."""
     kind = str(field.type).partition(" ")[0]
     if kind == "int":
@@ -117,7 +113,7 @@ def _value_parser(field: Field[Any], declaration: Setting) -> Callable[[str], An
     return str
 
 
-def parse_in_range(text: str, declaration: Setting) -> float:
+def parse_in_range(text: str, declaration: core.Setting) -> float:
     """A number within the bounds of a setting; finite, unless that may be infinite.
 
     Raises:
@@ -131,11 +127,11 @@ def parse_in_range(text: str, declaration: Setting) -> float:
     if high is None:
         what = f"above {above:g}" if above is not None else f"below {low:g}"
         raise argparse.ArgumentTypeError(
-            f"{shorten_text(text)} is {'not ' if above is not None else ''}{what}"
+            f"{core.shorten_text(text)} is {'not ' if above is not None else ''}{what}"
         )
     unit = "" if declaration.unit is None else f" {declaration.unit.name}"
     lowest = -math.inf if low is None else low
     bounds = f"above {above:g}, at most" if above is not None else f"from {lowest:g} to"
     raise argparse.ArgumentTypeError(
-        f"{shorten_text(text)} is not {declaration.noun} {bounds} {high:g}{unit}"
+        f"{core.shorten_text(text)} is not {declaration.noun} {bounds} {high:g}{unit}"
     )

@@ -10,6 +10,7 @@ import math
 import re
 import stat
 import tempfile
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from burg_drake.core import (
     quote_value,
     read_pipe,
     shorten_text,
+    suggest_names,
 )
 
 MAX_COUNT = 10_000_000
@@ -142,6 +144,19 @@ def named_positive(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"{name}: {error}") from error
 
 
+def key_and_value(text: str, form: str) -> tuple[str, str]:
+    """`KEY=VALUE`, neither of them empty.
+
+    Args:
+        text: the value of the option.
+        form: what it should be, for the message, such as `KEY=FOLDER`.
+    """
+    key, _, value = text.partition("=")
+    if not key or not value:
+        raise argparse.ArgumentTypeError(f"{quote_value(text)} is not {form}")
+    return key, value
+
+
 def unit(text: str) -> tuple[str, str]:
     """`NAME=UNIT`, or `UNIT` for all (then the name is empty)."""
     from burg_drake.objects import UNITS
@@ -188,6 +203,23 @@ def names(text: str) -> list[str]:
             f"{quote_value(text)} has no name; give A, or A,B for several"
         )
     return found
+
+
+def some_of(text: str, known: Sequence[str], what: str) -> list[str]:
+    """`A` or `A,B`: some of the known names, each once and in their order.
+
+    Args:
+        text: the value of the option.
+        known: what may be named.
+        what: one of them is, for the message, such as `a test`.
+    """
+    given = [name.strip() for name in text.split(",") if name.strip()] or [text]
+    for name in given:
+        if name not in known:
+            raise argparse.ArgumentTypeError(
+                f"{name!r} is not {what}; {suggest_names(name, known)}"
+            )
+    return [name for name in known if name in given]
 
 
 def measured_mm(text: str) -> tuple[float, float]:

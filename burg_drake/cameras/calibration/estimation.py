@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,9 +26,9 @@ from burg_drake.cameras.calibration.lens_fit import (
     parameter_names,
 )
 from burg_drake.cameras.calibration.lens_uncertainty import (
+    CalibrationAccuracy,
     LensHypothesis,
-    Promise,
-    calibration_promise,
+    calibration_accuracy,
     camera_covariance,
     camera_error,
     image_grid,
@@ -182,9 +183,15 @@ class Calibration:
         return np.concatenate([used.view.corners for used in self.views])
 
     @cached_property
-    def promise(self) -> Promise:
+    def accuracy(self) -> CalibrationAccuracy:
         """To how many pixels the camera is known, and where it is not."""
-        return calibration_promise(self.intrinsics, self.hypotheses, self.corners)
+        return calibration_accuracy(self.intrinsics, self.hypotheses, self.corners)
+
+    @property
+    def promise(self) -> CalibrationAccuracy:
+        """Deprecated name of `accuracy`; it goes in 0.3."""
+        warnings.warn("promise is accuracy since 0.1", DeprecationWarning, stacklevel=2)
+        return self.accuracy
 
     @property
     def rms(self) -> float:
@@ -286,11 +293,13 @@ def calibrate_views(
         chosen.hypotheses,
         fit.bulge,
     )
-    promise = calibration.promise
-    # Of exact corners it would be rounded to nothing.
-    known_to = max(round(promise.known_to, 3), 1e-3) if np.isfinite(promise.known_to) else None
-    promised = replace(calibration.intrinsics, known_to=known_to, except_at=promise.except_at)
-    return replace(calibration, intrinsics=promised)
+    accuracy, known_to = calibration.accuracy, None
+    if np.isfinite(accuracy.error_bound):
+        known_to = max(round(accuracy.error_bound, 3), 1e-3)  # above 0 with exact corners, too
+    intrinsics = replace(
+        calibration.intrinsics, known_to=known_to, except_at=accuracy.excepted_parts
+    )
+    return replace(calibration, intrinsics=intrinsics)
 
 
 def _select_usable_views(

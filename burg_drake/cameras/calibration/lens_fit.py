@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.calibration.charuco_target import CharucoTarget, CharucoView
-from burg_drake.cameras.intrinsics import Intrinsics, LensModel, fisheye_lens
+from burg_drake.cameras.intrinsics import Intrinsics, LensModel
 from burg_drake.core import Array, InvalidInputError
 
 FOCAL_LENGTH_GUESSES = np.geomspace(0.25, 3.0, 11)
@@ -77,46 +77,24 @@ def lens_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array,
 
     Args:
         intrinsics: of the camera.
-        p_CQ: (N, 3) points in its frame [m].
+        p_CQ: (N, 3) points before it, in its frame [m].
 
     Returns:
         `(pixels, by_pose, by_camera)`: (N, 2); (N, 2, 6) by a small rotation [rad] of the points
         about the camera's axes and a translation [m]; (N, 2, P) by fx, fy, cx, cy and the
         coefficients, of which a perspective model has 5 at least.
     """
+    zero, points = np.zeros(3), np.ascontiguousarray(p_CQ, dtype=float).reshape(-1, 1, 3)
+    k = np.array(intrinsics.distortion)
     if intrinsics.is_fisheye:
-        return _fisheye_derivatives(intrinsics, p_CQ)
-    k = np.zeros(max(len(intrinsics.distortion), 5))
-    k[: len(intrinsics.distortion)] = intrinsics.distortion
-    flat = np.ascontiguousarray(p_CQ, dtype=float)
-    pixels, J = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), intrinsics.K, k)
-    J = np.asarray(J).reshape(len(flat), 2, -1)
-    return np.asarray(pixels).reshape(-1, 2), J[..., :6], J[..., 6:]
-
-
-def _fisheye_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
-    lens, focal = fisheye_lens(intrinsics.distortion), np.array(intrinsics.focal)
-    aside = np.maximum(np.linalg.norm(p_CQ[:, :2], axis=1), 1e-12)
-    angle = np.arctan2(aside, p_CQ[:, 2])
-    toward = p_CQ[:, :2] / aside[:, None]
-    square = aside**2 + p_CQ[:, 2] ** 2
-    radius, slope = lens.radius(angle), lens.slope(angle)
-    by_angle = np.column_stack([toward * (p_CQ[:, 2] / square)[:, None], -aside / square])
-    across = np.eye(2) - toward[:, :, None] * toward[:, None]
-    by_point = toward[:, :, None] * (slope[:, None] * by_angle)[:, None]
-    by_point[:, :, :2] += across * (radius / aside)[:, None, None]
-    by_point *= focal[:, None]
-    bent = toward * radius[:, None]
-    by_camera = np.zeros((len(p_CQ), 2, 8))
-    by_camera[:, [0, 1], [0, 1]] = bent
-    by_camera[:, [0, 1], [2, 3]] = 1.0
-    within = np.minimum(angle, lens.max_angle)
-    powers = within[:, None] ** (3 + 2 * np.arange(4))
-    by_camera[:, :, 4:] = focal[:, None] * toward[:, :, None] * powers[:, None]
-    # A rotation w moves a point p by w x p.
-    by_turn = np.cross(p_CQ[:, None], by_point)
-    by_pose = np.concatenate([by_turn, by_point], axis=2)
-    return bent * focal + intrinsics.center, by_pose, by_camera
+        pixels, J = cv2.fisheye.projectPoints(points, zero, zero, intrinsics.K, k)
+        pose, camera = slice(8, 14), slice(8)
+    else:
+        k = np.pad(k, (0, max(5 - len(k), 0)))
+        pixels, J = cv2.projectPoints(points, zero, zero, intrinsics.K, k)
+        pose, camera = slice(6), slice(6, None)
+    J = np.asarray(J).reshape(len(points), 2, -1)
+    return np.asarray(pixels).reshape(-1, 2), J[..., pose], J[..., camera]
 
 
 BEND_TERMS = 3
@@ -335,7 +313,7 @@ class _LensFitProblem:
         # Huber's: r^2 up to the limit c, then 2 c r - c^2.
         loss = np.sum(weights * length**2 * (2.0 - weights))
         cost = float(loss + CORNER_SD_PX**2 * np.sum(lens_prior(intrinsics, bends)[0] ** 2))
-        if not (np.isfinite(cost) and (intrinsics.is_fisheye or (p_CQ[:, 2] > 0.0).all())):
+        if not (np.isfinite(cost) and (p_CQ[:, 2] > 0.0).all()):
             cost = np.inf
         by_rise = np.einsum("nki,ni->nk", by_pose[..., 3:], X[:, :3, 2])
         by_bends = by_rise[:, :, None] * self.rise[:, None]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +146,7 @@ def camera_error(
         pixels: (N, 2) places [pixels].
 
     Returns:
-        (N,) root mean square distance [pixels].
+        (N,) root mean square distance [pixels]; infinite where a fisheye looks aside or back.
     """
     # Corners at which two models are rotated onto each other.
     seen = corners[:: max(1, len(corners) // 400)]
@@ -157,6 +159,7 @@ def camera_error(
         off, J = columns[..., 0], columns[..., 1:]
         variance = np.einsum("nip,pq,niq->n", J, hypothesis.covariance, J)
         total += hypothesis.weight * (np.sum(off**2, axis=1) + np.maximum(variance, 0.0))
+    total[camera.rays(pixels)[:, 2] <= 0.0] = np.inf
     return np.asarray(np.sqrt(total))
 
 
@@ -194,23 +197,54 @@ MAX_FISHEYE_ANGLE = np.radians(85.0)
 """Radians from a fisheye's axis; beyond, no accuracy is given."""
 
 
-@dataclass(frozen=True, eq=False)
 class Promise:
-    """How far apart the true and the calibrated camera show the same, in 19 of 20 cases at most.
+    """Deprecated name of `CalibrationAccuracy`; it goes in 0.3."""
+
+    error_bound: Any
+    excepted_parts: Any
+
+    def __new__(cls, *args: Any, **fields: Any) -> Any:
+        """Makes a `CalibrationAccuracy`."""
+        if cls is Promise:
+            _warn_of_old_name("Promise is CalibrationAccuracy")
+        return super().__new__(CalibrationAccuracy)
+
+    @property
+    def known_to(self) -> float:
+        """Deprecated name of `error_bound`."""
+        _warn_of_old_name("known_to is error_bound")
+        return float(self.error_bound)
+
+    @property
+    def except_at(self) -> tuple[str, ...]:
+        """Deprecated name of `excepted_parts`."""
+        _warn_of_old_name("except_at is excepted_parts")
+        return tuple(self.excepted_parts)
+
+
+def _warn_of_old_name(what: str) -> None:
+    warnings.warn(f"{what} since 0.1", DeprecationWarning, stacklevel=3)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationAccuracy(Promise):
+    """Bounds of the distance at which the true and the calibrated camera show the same point.
+
+    In 19 of 20 cases the distance is smaller.
 
     Attributes:
-        parts: that bound by part of the image [pixels]; without parts that look farther than 85
-            degrees off the axis all over.
-        unknown: share of the image where it is more than 3 pixels.
+        parts: the bound in each part of the image [pixels]; without parts that look farther than
+            85 degrees off the axis all over.
+        unknown: share of the image where the bound is more than 3 pixels.
     """
 
     parts: dict[str, float]
     unknown: float
 
     @property
-    def except_at(self) -> tuple[str, ...]:
-        """Parts that nothing is promised of or that are known much worse than the middle, or than
-        the best part if the middle is one of those; the worst first."""
+    def excepted_parts(self) -> tuple[str, ...]:
+        """Parts without a bound, or with one much larger than that of the middle, or of the best
+        part if the middle has none; the worst first."""
         bounds = {name: self.parts.get(name, np.inf) for name in IMAGE_PARTS}
         best = self.parts.get("middle", min(self.parts.values()))
         # Parts with a larger error relative to the best part are named.
@@ -219,14 +253,14 @@ class Promise:
         return tuple(sorted(worse, key=lambda name: -bounds[name]))
 
     @property
-    def known_to(self) -> float:
-        """The bound in all other parts [pixels]; infinite if there are none."""
-        excepted = self.except_at
+    def error_bound(self) -> float:
+        """The largest bound of all other parts [pixels]; infinite if there are none."""
+        excepted = self.excepted_parts
         held = [bound for name, bound in self.parts.items() if name not in excepted]
         return max(held, default=np.inf)
 
     def bound(self, name: str) -> str:
-        """That of a part, as text."""
+        """The bound of a part, as text."""
         if name not in self.parts:
             return f"beyond {np.degrees(MAX_FISHEYE_ANGLE):.0f} degrees"
         bound = self.parts[name]
@@ -235,19 +269,19 @@ class Promise:
         return f"more than {MAX_REPORTED_ERROR_PX:g}"
 
     def __str__(self) -> str:
-        bounds = {name: self.bound(name) for name in self.except_at}
-        return f"known {describe_accuracy(self.known_to, self.except_at, bounds)}"
+        bounds = {name: self.bound(name) for name in self.excepted_parts}
+        return f"known {describe_accuracy(self.error_bound, self.excepted_parts, bounds)}"
 
 
-def calibration_promise(
+def calibration_accuracy(
     camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array
-) -> Promise:
-    """What a calibration promises; see `camera_error`."""
+) -> CalibrationAccuracy:
+    """The accuracy of a calibrated camera; see `camera_error`."""
     # Columns and rows of the places where the error is computed.
     pixels = image_grid(camera, 17, 13)
     pixels = pixels[camera.rays(pixels)[:, 2] > np.cos(MAX_FISHEYE_ANGLE)]
     if not len(pixels):  # of views that tell nothing
-        return Promise(dict.fromkeys(IMAGE_PARTS, np.inf), 1.0)
+        return CalibrationAccuracy(dict.fromkeys(IMAGE_PARTS, np.inf), 1.0)
     error = camera_error(camera, hypotheses, corners, pixels)
     bound = np.nan_to_num(BOUND_SIGMAS * error, nan=np.inf)
     part = image_part_indices(pixels, (camera.width, camera.height))
@@ -256,4 +290,4 @@ def calibration_promise(
         for k, name in enumerate(IMAGE_PARTS)
         if (part == k).any()
     }
-    return Promise(parts, float((~(bound <= MAX_KNOWN_ERROR_PX)).mean()))
+    return CalibrationAccuracy(parts, float((~(bound <= MAX_KNOWN_ERROR_PX)).mean()))

@@ -18,7 +18,7 @@ from burg_drake.cameras.calibration.estimation import (
 from burg_drake.cameras.calibration.lens_uncertainty import (
     MAX_KNOWN_ERROR_PX,
     NOTABLE_ERROR_PX,
-    Promise,
+    CalibrationAccuracy,
     corner_coverage,
     unseen_parts,
 )
@@ -33,8 +33,8 @@ MIN_GOOD_VIEWS = 10  # Views of a good calibration, at least.
 
 def wanted_views(calibration: Calibration) -> tuple[str, ...]:
     """What to do with the target, in a few words each; none if there are views enough."""
-    camera, promise = calibration.intrinsics, calibration.promise
-    bound = promise.parts
+    camera, accuracy = calibration.intrinsics, calibration.accuracy
+    bound = accuracy.parts
     views = [used.view for used in calibration.views]
     unseen = unseen_parts(corner_coverage(views, (camera.width, camera.height)))
     worst_first = sorted(bound, key=lambda name: -bound[name])
@@ -42,22 +42,22 @@ def wanted_views(calibration: Calibration) -> tuple[str, ...]:
     poor = [name for name in worst_first if not (name in unseen or bound[name] <= NOTABLE_ERROR_PX)]
     lines = []
     if hidden:
-        lines.append(f"move the target into and across the {_list_parts(hidden, promise)}")
+        lines.append(f"move the target into and across the {_list_parts(hidden, accuracy)}")
     lines += _missing_tilts(calibration.views)
     lines += _missing_distances(calibration)
     if poor:
-        lines.append(f"show more of the target at the {_list_parts(poor, promise)}")
+        lines.append(f"show more of the target at the {_list_parts(poor, accuracy)}")
     count = len(calibration.views)
     if not lines and count < MIN_GOOD_VIEWS:
         lines = [f"take more views from all sides; {count} are too few"]
     return tuple(lines)
 
 
-def _list_parts(names: Sequence[str], promise: Promise) -> str:
+def _list_parts(names: Sequence[str], accuracy: CalibrationAccuracy) -> str:
     """Parts of the image and what is known of them; the first is the worst."""
     first, *others = names
-    text = f"{first} of the image, where the error may be {promise.bound(first)} pixels"
-    return ", ".join([text, *(f"then the {name} ({promise.bound(name)})" for name in others)])
+    text = f"{first} of the image, where the error may be {accuracy.bound(first)} pixels"
+    return ", ".join([text, *(f"then the {name} ({accuracy.bound(name)})" for name in others)])
 
 
 def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
@@ -90,7 +90,7 @@ def _missing_distances(calibration: Calibration) -> list[str]:
 
 def calibration_advice(calibration: Calibration) -> list[str]:
     """What would make a calibration better, a sentence each; empty if it is good."""
-    views, promise = calibration.views, calibration.promise
+    views, accuracy = calibration.views, calibration.accuracy
     lines = list(wanted_views(calibration))
     if len(views) < MIN_GOOD_VIEWS:
         lines.insert(0, f"{len(views)} views are too few; take 15 to 30")
@@ -99,18 +99,18 @@ def calibration_advice(calibration: Calibration) -> list[str]:
             f"the reprojection error of {calibration.rms:.2f} pixels is large: is the target flat,"
             " do its squares and markers have the given sizes, and was the focus fixed?"
         )
-    if not promise.known_to <= NOTABLE_ERROR_PX or excludes_most_parts(promise.except_at):
-        lines.append(f"the camera is {promise}")
+    if not accuracy.error_bound <= NOTABLE_ERROR_PX or excludes_most_parts(accuracy.excepted_parts):
+        lines.append(f"the camera is {accuracy}")
     return lines
 
 
 def is_useless(calibration: Calibration) -> bool:
     """Images that this camera model is used for would be misread by pixels."""
-    promise = calibration.promise
-    bounds = promise.parts.values()
+    accuracy = calibration.accuracy
+    bounds = accuracy.parts.values()
     parts = sum(not bound <= MAX_KNOWN_ERROR_PX for bound in bounds) / len(bounds)
     # Fraction of the image, or of its parts.
-    known = promise.known_to <= MAX_KNOWN_ERROR_PX and max(promise.unknown, parts) < 0.5
+    known = accuracy.error_bound <= MAX_KNOWN_ERROR_PX and max(accuracy.unknown, parts) < 0.5
     return not known or calibration.rms > MAX_KNOWN_ERROR_PX
 
 
@@ -165,4 +165,4 @@ class ViewCollector:
         wanted = wanted_views(calibration)
         if wanted:
             return wanted[0], False
-        return f"enough, the camera is {calibration.promise}", True
+        return f"enough, the camera is {calibration.accuracy}", True

@@ -122,7 +122,7 @@ class DepthAligner:
         """See `SilhouetteAligner.misfit`: distances that the object or the empty board has not."""
         surface_tolerance = 4e-3  # Metres beyond noise within which a pixel belongs to the surface.
         at = window.pixels()
-        own = self.view.cast(shape, q, at)
+        own = self.view.hits(shape, q, at)[1]
         seen, hides = sample_nearest(self._depth, at, 0.0), sample_nearest(others, at, 0.0)
         covered = np.isfinite(own)
         tolerance = MIN_HEIGHT_SIGMAS * self.noise_sd + surface_tolerance

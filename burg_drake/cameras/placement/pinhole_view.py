@@ -49,29 +49,9 @@ class ImageWindow:
         v, u = np.mgrid[: self.shape[0], : self.shape[1]]
         return self.image(np.stack([u, v], axis=-1))
 
-    def raster(self, pixels: Array) -> Array:
-        """(..., 2) raster coordinates of image points."""
-        return (pixels - (self.left - 0.5, self.top - 0.5)) * self.scale - 0.5
-
     def image(self, raster: Array) -> Array:
         """(..., 2) image points of raster coordinates."""
         return (raster + 0.5) / self.scale + (self.left - 0.5, self.top - 0.5)
-
-
-def window_around(pixels: Array, margin: float, size: tuple[int, int], scale: float) -> ImageWindow:
-    """The window of an image around some of its points; empty if all are outside.
-
-    Args:
-        pixels: (N, 2).
-        margin: around them [pixels].
-        size: width and height of the image.
-        scale: of the window's raster.
-    """
-    low = np.floor(pixels.min(axis=0) - margin).astype(int)
-    high = np.ceil(pixels.max(axis=0) + margin).astype(int) + 1
-    low, high = np.clip(low, 0, size), np.clip(high, 0, size)
-    width, height = np.maximum(high - low, 0)
-    return ImageWindow(int(low[0]), int(low[1]), int(width), int(height), scale)
 
 
 MIN_POINT_DEPTH = 1e-3
@@ -115,10 +95,6 @@ class PinholeView:
         y = np.stack([zero, fy / z, -fy * p_CQ[:, 1] / z**2], axis=-1)
         return np.stack([x, y], axis=1) @ self.X_CS[:3, :3]
 
-    def cast(self, shape: TargetShape, q: Array, pixels: Array) -> Array:
-        """(...,) depth of a displaced shape at image points; see `hits`."""
-        return self.hits(shape, q, pixels)[1]
-
     def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[Indices, Array]:
         """What of a displaced shape is seen at image points.
 
@@ -151,8 +127,8 @@ class PinholeView:
         return np.asarray(transform_points(X_SC, p_CQ.reshape(-1, 3)).reshape(p_CQ.shape))
 
     def buffer(self, shape: TargetShape, q: Array, window: ImageWindow) -> Array:
-        """Depth of a displaced shape at the pixels of a window's raster; see `cast`."""
-        return self.cast(shape, q, window.pixels())
+        """Depth of a displaced shape at the pixels of a window's raster; see `hits`."""
+        return self.hits(shape, q, window.pixels())[1]
 
     def window(self, shape: TargetShape, q: Array, margin: float) -> ImageWindow:
         """The part of the image around a displaced shape."""
@@ -160,8 +136,12 @@ class PinholeView:
         return self.window_of(pixels, margin)
 
     def window_of(self, pixels: Array, margin: float) -> ImageWindow:
-        """The part of the image around some of its points (N, 2)."""
-        return window_around(pixels, margin, self.size, 1.0)
+        """The part of the image around some of its points (N, 2); empty if all are outside."""
+        low = np.floor(pixels.min(axis=0) - margin).astype(int)
+        high = np.ceil(pixels.max(axis=0) + margin).astype(int) + 1
+        low, high = np.clip(low, 0, self.size), np.clip(high, 0, self.size)
+        width, height = np.maximum(high - low, 0)
+        return ImageWindow(int(low[0]), int(low[1]), int(width), int(height))
 
     def depth(self, placed: Iterable[tuple[TargetShape, Array]]) -> Array:
         """(H, W) depth of the nearest of several displaced shapes; infinity where there is none, 0
@@ -323,7 +303,7 @@ def visible_outline(view: PinholeView, shape: TargetShape, q: Array, others: Arr
     ).all(1)
     kept &= sample_nearest(others, pixels, np.inf) > p_CQ[:, 2] - OCCLUSION_DEPTH_STEP
     beside = pixels[kept, None] + OUTLINE_TEST_OFFSETS_PX[:, None] * normal[kept, None]
-    covered = np.isfinite(view.cast(shape, q, beside))
+    covered = np.isfinite(view.hits(shape, q, beside)[1])
     kept[kept] = ~covered[:, 0] & ~covered[:, 1] & covered[:, 2]
     p_SQ, pixels, normal = p_SQ[kept], pixels[kept], normal[kept]
     J = np.einsum("ni,nij->nj", normal, view.jacobian(p_SQ))

@@ -90,7 +90,7 @@ class SilhouetteAligner:
             That, and the object's silhouette [raster pixels].
         """
         at = window.pixels()
-        own = np.isfinite(self.view.cast(shape, q, at))
+        own = np.isfinite(self.view.hits(shape, q, at)[1])
         free = np.isinf(sample_nearest(others, at, 0.0))
         evidence = np.where(free, sample_nearest(self.evidence, at, 0.0), 0.0)
         return float(np.maximum(np.where(own, -evidence, evidence), 0.0).sum()), float(own.sum())

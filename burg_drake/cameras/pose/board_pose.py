@@ -18,8 +18,9 @@ from burg_drake.cameras.pose.marker_detection import (
     MIN_FOREIGN_MARKERS,
     Detection,
     MarkerDetector,
-    find_foreign_markers,
-    format_ids,
+    format_marker_count,
+    misplaced_reason,
+    no_markers_reason,
 )
 from burg_drake.cameras.pose.sheet_deviations import (
     MIN_SCALE_DEVIATION,
@@ -108,12 +109,16 @@ class BoardPose:
         """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
         if len(seen.duplicated) >= MIN_FOREIGN_MARKERS:
+            # Nothing tells on which of the sheets the objects belong.
             return BoardEstimate(
-                reason=_two_copies_reason(f"{len(seen.duplicated)} markers appear twice")
+                reason=f"two copies of this board in sight: {len(seen.duplicated)} markers appear"
+                " twice; remove or cover one of them"
             )
         if not len(seen.index):
-            reason = self._mirrored_reason(grey, seen) or self._no_markers_reason(grey, seen)
-            return BoardEstimate(reason=reason)
+            reason = self._mirrored_reason(grey, seen)
+            return BoardEstimate(
+                reason=reason or no_markers_reason(grey, self._layout, seen.candidates)
+            )
         coarse = estimate_coarse_pose(self._p_SQ[seen.index], seen.corners, self.intrinsics)
         wrong = self._copy_reason(seen, coarse) or self._other_board_reason(seen, coarse)
         if wrong:
@@ -151,7 +156,7 @@ class BoardPose:
             # Radians. Poses that differ by less are merged with a larger covariance.
             if turn > 0.03:
                 return None, (
-                    f"{_format_marker_count(len(found))} in sight: two poses fit equally well; move"
+                    f"{format_marker_count(len(found))} in sight: two poses fit equally well; move"
                     " closer or show more of the board"
                 )
             apart = pose_difference(best.X_SC, rounds[1].X_SC)
@@ -160,7 +165,7 @@ class BoardPose:
         # Fraction of the camera's distance from the board.
         if known > 0.05 * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
             return None, (
-                f"{_format_marker_count(len(found))} in sight: the position of the camera is only"
+                f"{format_marker_count(len(found))} in sight: the position of the camera is only"
                 f" known to {1e3 * known:.0f} mm; move closer or show more of the board"
             )
         own = np.isin(self._edges.marker[best.views.which], found)
@@ -240,20 +245,6 @@ class BoardPose:
         error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
         return used, self.intrinsics.project(p_C) + shift[:, None], error
 
-    def _no_markers_reason(self, grey: Bytes, seen: Detection) -> str:
-        """Why no marker of the board was found."""
-        layout = self._layout
-        other = find_foreign_markers(grey, layout) if seen.candidates else None
-        if other is None:
-            return "no marker of the board in sight"
-        start = f"another board: {_format_marker_count(len(other.ids))} of {other.dictionary}"
-        if other.dictionary == layout.dictionary:
-            return (
-                f"{start} with ids {format_ids(other.ids)} in sight, but this one has"
-                f" {layout.ids[0]} to {layout.ids[-1]}; is first_id right?"
-            )
-        return f"{start} in sight, but this one has {layout.dictionary}"
-
     def _mirrored_reason(self, grey: Bytes, seen: Detection) -> str:
         """That more markers can be read in the mirrored image, if so."""
         if seen.candidates < MIN_FOREIGN_MARKERS:
@@ -268,8 +259,8 @@ class BoardPose:
         )
 
     def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """That markers beside the board stand as on another print of it, or on a board with
-        another first id; empty if none do."""
+        """That markers beside the board stand as on another print of it, or on a board whose rows
+        go on there; empty if none do."""
         min_copy_markers = 3  # Markers of a second print of the board.
         rest = ~coarse.inliers
         if not coarse.X_SC or rest.sum() < min_copy_markers:
@@ -284,27 +275,11 @@ class BoardPose:
         low, high = self._p_SQ.min(axis=(0, 1))[:2], self._p_SQ.max(axis=(0, 1))[:2]
         if ((at > low) & (at < high)).all(axis=1).any():
             return ""
-        if self._continue_rows(seen.index[rest][copy.inliers], at):
-            return _misplaced_reason(len(seen.index), int(coarse.inliers.sum()))
-        return _two_copies_reason(
-            f"{_format_marker_count(len(at))} belong to a second print next to it"
+        return (
+            f"two copies of this board in sight, or another board: {int(coarse.inliers.sum())} of"
+            f" {format_marker_count(len(seen.index))} are where this one has them, and {len(at)}"
+            " fit beside it; remove or cover one copy, or correct columns, rows and first_id"
         )
-
-    def _continue_rows(self, index: Indices, at: Array) -> bool:
-        """Whether markers stand where the board's rows would have them if they went on past its
-        columns, as on a board with another first id.
-
-        Args:
-            index: (N,) of the markers.
-            at: (N, 2) where they are on the sheet [m].
-        """
-        middles = self._p_SQ.mean(axis=1)[:, :2]
-        columns = len(np.unique(np.round(middles[:, 0], 9)))
-        pitch = (self._layout.side + self.board.markers.spacing) * np.array(self.scale)
-        column, row = ((at - middles[0]) / pitch * [1.0, -1.0]).T
-        off = np.abs(column - np.round(column)) + np.abs(row - np.round(row))
-        follows = np.round(row) * columns + np.round(column) == index
-        return bool(follows.all() and off.max() < 0.2)  # Marker pitches along both axes.
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
@@ -314,7 +289,7 @@ class BoardPose:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
-            return _misplaced_reason(n, fit)
+            return misplaced_reason(n, fit)
         return ""
 
     def _wrong_print_reason(self, refined: RefinedPose) -> str:
@@ -390,20 +365,3 @@ def _residual_doubt(error: float) -> str:
             " board is flat"
         )
     return ""
-
-
-def _misplaced_reason(count: int, fit: int) -> str:
-    """That markers stand as another board has them."""
-    return (
-        f"another board: only {fit} of {_format_marker_count(count)} in sight are where this one"
-        " has them; are columns, rows and first_id right?"
-    )
-
-
-def _two_copies_reason(seen: str) -> str:
-    """Why no pose is given: nothing tells on which of the sheets the objects belong."""
-    return f"two copies of this board in sight: {seen}; remove or cover one of them"
-
-
-def _format_marker_count(count: int) -> str:
-    return "1 marker" if count == 1 else f"{count} markers"

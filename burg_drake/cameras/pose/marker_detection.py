@@ -254,6 +254,33 @@ def format_ids(ids: tuple[int, ...] | list[int]) -> str:
     return ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
 
 
+def no_markers_reason(grey: Bytes, layout: MarkerLayout, candidates: int) -> str:
+    """Why no marker of a board was found in an image (H, W) with some candidates."""
+    other = find_foreign_markers(grey, layout) if candidates else None
+    if other is None:
+        return "no marker of the board in sight"
+    start = f"another board: {format_marker_count(len(other.ids))} of {other.dictionary}"
+    if other.dictionary == layout.dictionary:
+        return (
+            f"{start} with ids {format_ids(other.ids)} in sight, but this one has"
+            f" {layout.ids[0]} to {layout.ids[-1]}; is first_id right?"
+        )
+    return f"{start} in sight, but this one has {layout.dictionary}"
+
+
+def misplaced_reason(count: int, fit: int) -> str:
+    """Why markers are not this board's, of which only some stand where they should."""
+    return (
+        f"another board: only {fit} of {format_marker_count(count)} in sight are where this one"
+        " has them; are columns, rows and first_id right?"
+    )
+
+
+def format_marker_count(count: int) -> str:
+    """A number of markers as text."""
+    return "1 marker" if count == 1 else f"{count} markers"
+
+
 def find_foreign_markers(grey: Bytes, layout: MarkerLayout) -> ForeignMarkers | None:
     """Looks for markers that a board does not have: of its dictionary, and of common others.
 

@@ -16,7 +16,7 @@ from burg_drake.core import ClusterError, MissingDependencyError, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.bundle import Bundle
 from burg_drake.evaluation.cluster.document import (
-    Cluster,
+    ClusterDocument,
     read_cluster,
     require_safe_address,
     start_jobqueue,
@@ -84,8 +84,11 @@ class DaskExecutor:
             ClusterError: a worker has other versions of what decides, or the scheduler is lost.
         """
         from burg_drake.evaluation.cluster.dispatch import Dispatch
+        from burg_drake.evaluation.cluster.jobs import grasp_jobs
 
-        yield from Dispatch(self.client, self.limits, self.maintain).run(jobs, on_failure)
+        # A thread has one chunk under way and one that waits.
+        dispatch = Dispatch(self.client, self.maintain, chunks_per_thread=2)
+        yield from dispatch.run(grasp_jobs(jobs, self.limits, on_failure))
 
 
 def map_on_cluster(
@@ -112,9 +115,11 @@ def map_on_cluster(
     Raises:
         ClusterError: a worker has other versions of what decides, or the scheduler is lost.
     """
-    from burg_drake.evaluation.cluster.cluster_map import ClusterMap
+    from burg_drake.evaluation.cluster.dispatch import Dispatch
+    from burg_drake.evaluation.cluster.jobs import CallJob
 
-    yield from ClusterMap(executor.client, function, bundle, pack, executor.maintain).run(work)
+    jobs = iter([CallJob(function, work, bundle, pack)])
+    yield from Dispatch(executor.client, executor.maintain).run(jobs)
 
 
 @contextlib.contextmanager
@@ -143,17 +148,17 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
     with quiet, _silence_dask_log(), contextlib.ExitStack() as stack:
         maintain: Callable[[], None] | None = None
         where: Any
-        security = _tls_security(distributed, asked)
-        if asked.local:
-            nodes = LocalNodes(asked.local)
+        security: Any = None
+        if isinstance(asked, int):
+            nodes = LocalNodes(asked)
             stack.callback(nodes.close)
             where, maintain = nodes.address, nodes.restart_workers
-        elif asked.document is not None and asked.document.jobqueue is not None:
+        elif asked.jobqueue is not None:
+            security = _tls_security(distributed, asked)
             where = stack.enter_context(start_jobqueue(asked, security))
             security = where.security
         else:
-            assert asked.document is not None
-            where = asked.document.address
+            where, security = asked.address, _tls_security(distributed, asked)
         client = _make_client(distributed, where, security)
         stack.callback(_close_client, client)
         yield DaskExecutor(client, limits, maintain)
@@ -231,11 +236,9 @@ def _close_client(client: Any) -> None:
         client.close(timeout=SCHEDULER_TIMEOUT)
 
 
-def _tls_security(distributed: Any, cluster: Cluster) -> Any:
+def _tls_security(distributed: Any, document: ClusterDocument) -> Any:
     """TLS of the files that the cluster file names, or else of Dask's configuration."""
-    document, files = cluster.document, cluster.tls
-    if document is None or (document.jobqueue is not None and files is None):
-        return None
+    files = document.tls
     if files is not None:
         parts = {
             f"tls_{role}_{part}": getattr(files, part)

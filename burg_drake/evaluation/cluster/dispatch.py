@@ -1,49 +1,28 @@
-"""Sends bundles and chunks of grasps to the workers of a cluster, and collects their verdicts."""
+"""Sends bundles, chunks of grasps and calls to the workers of a cluster, and collects results."""
 
 from __future__ import annotations
 
 import queue
 import time
 import uuid
-from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from distributed import KilledWorker
 
-from burg_drake.core import (
-    BurgError,
-    ClusterError,
-    Outcome,
-    SimulationError,
-    Stage,
-    Verdict,
-    one_line,
-)
-from burg_drake.evaluation.candidates import Candidate
+from burg_drake.core import BurgError, ClusterError, one_line
 from burg_drake.evaluation.cluster.bundle import Bundle
+from burg_drake.evaluation.cluster.jobs import ClusterJob, ClusterWorker, SentChunk
 from burg_drake.evaluation.cluster.members import (
     CONNECTION_ERRORS,
-    ChunkSettings,
-    ClusterWorker,
     ClusterWorkers,
-    SentChunk,
-    SentJob,
-    SentTask,
     WorkerWait,
     lost_scheduler_error,
     scheduler_errors,
 )
-from burg_drake.evaluation.cluster.worker_tasks import (
-    Chunk,
-    ChunkAnswers,
-    Supervisor,
-    judge_chunk,
-    unpack_on_worker,
-)
-from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, WorkerLimits
+from burg_drake.evaluation.cluster.worker_tasks import Supervisor, run_task, unpack_on_worker
 
 DELIVERY_ATTEMPTS = 3
 """Number of times that a worker is sent a plugin or a bundle."""
@@ -89,34 +68,64 @@ def send_bundle(
 
 WORKER_POLL_INTERVAL = 1.0
 """Seconds between checks for new and lost workers."""
-SentT = TypeVar("SentT", bound=SentTask)
 
 
-class ClusterRun(ABC, Generic[SentT]):
-    """Tasks of one run under way on a cluster.
+class Dispatch:
+    """Work of one run under way on a cluster.
 
     Attributes:
         client: of Dask.
         cluster: the workers.
+        chunks_per_thread: chunks that a worker has at a time, those that wait included.
         name: of the plugin that runs tasks on a worker.
-        sent: tasks that workers have, by the key of their future.
+        jobs: those under way.
+        sent: chunks that workers have, by the key of their future.
     """
 
-    def __init__(self, client: Any, maintain: Callable[[], None]) -> None:
+    def __init__(
+        self, client: Any, maintain: Callable[[], None], chunks_per_thread: int = 1
+    ) -> None:
         self.client = client
         self.cluster = ClusterWorkers(client)
+        self.chunks_per_thread = chunks_per_thread
         self.name = f"burg-drake-{uuid.uuid4().hex}"
-        self.sent: dict[str, SentT] = {}
+        self.jobs: list[ClusterJob] = []
+        self.sent: dict[str, SentChunk] = {}
         self._maintain = maintain
+        self._coming: Iterator[ClusterJob | None] = iter(())
+        self._exhausted = False
+        self._answering: set[str] = set()
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._last_poll = -WORKER_POLL_INTERVAL
         self._waiting = WorkerWait(client)
 
-    @abstractmethod
-    def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Any]:
-        """Takes back the tasks of a lost worker, and yields the results of those given up."""
+    def run(self, jobs: Iterator[ClusterJob | None]) -> Generator[Any, None, None]:
+        """Yields the results of jobs as they come.
 
-    def begin(self, plugin: Any) -> None:
+        Args:
+            jobs: asked for one after the other, when workers run out of work. None says that no
+                job is ready yet, and that there are others to work on meanwhile.
+
+        Raises:
+            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+        """
+        self._coming = jobs
+        self.begin()
+        try:
+            while True:
+                if self.poll_is_due():
+                    yield from self.update_workers()
+                yield from self.hand_out(self.cluster.workers)
+                if not self.sent and not any(job.left for job in self.jobs):
+                    if self.open_next_job() is not None:
+                        continue
+                    if self._exhausted:
+                        return
+                yield from self.collect()
+        finally:
+            self.end()
+
+    def begin(self) -> None:
         """Registers the plugin of the run on all workers and on those that join later. A worker
         that dies meanwhile is no reason to stop.
 
@@ -127,7 +136,7 @@ class ClusterRun(ABC, Generic[SentT]):
         for attempt in range(1, DELIVERY_ATTEMPTS + 1):
             self.cluster.update()  # refuses workers that do not know the plugin
             try:
-                self.client.register_plugin(plugin, name=self.name)
+                self.client.register_plugin(Supervisor(self.name), name=self.name)
                 return
             except CONNECTION_ERRORS as error:
                 if self.client.status != "running" or attempt == DELIVERY_ATTEMPTS:
@@ -140,7 +149,7 @@ class ClusterRun(ABC, Generic[SentT]):
         if self.client.status != "running":
             return
         try:
-            self.client.cancel([sent.future for sent in self.sent.values()], force=True)
+            self.client.cancel([chunk.future for chunk in self.sent.values()], force=True)
             self.client.unregister_worker_plugin(self.name)
         except CONNECTION_ERRORS:
             pass  # the scheduler is lost, and its workers end with it
@@ -154,7 +163,8 @@ class ClusterRun(ABC, Generic[SentT]):
         self._last_poll = -WORKER_POLL_INTERVAL
 
     def update_workers(self) -> Iterator[Any]:
-        """Takes on new workers, and yields the results that `handle_lost_worker` gives."""
+        """Takes on new workers, and takes the work of lost ones back; yields the results of what is
+        given up."""
         self._maintain()
         for worker in self.cluster.update():
             yield from self.handle_lost_worker(worker)
@@ -164,120 +174,45 @@ class ClusterRun(ABC, Generic[SentT]):
         else:
             self._waiting.go_on()
 
-    def submit(
-        self, function: Callable[[Any], Any], argument: Any, sent: SentT, worker: ClusterWorker
-    ) -> None:
-        """Has a worker call a function."""
-        with scheduler_errors(self.client):
-            future = self.client.submit(
-                function,
-                argument,
-                key=f"{type(argument).__name__}-{uuid.uuid4().hex}",
-                pure=False,
-                retries=0,
-                workers=[worker.address],
-                allow_other_workers=False,
-            )
-        sent.worker, sent.future = worker, future
-        self.sent[future.key] = sent
+    def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Any]:
+        """Takes back the chunks of a lost worker; the items of those under way are sent alone."""
+        suspects = [chunk for chunk in worker.chunks if not chunk.done][: worker.threads]
+        for chunk in list(worker.chunks):
+            self.forget(chunk)
+            chunk.future.cancel()
+            if chunk in suspects:
+                yield from chunk.job.suspect(chunk)
+            else:
+                chunk.job.take_back(chunk)
 
-        def finish(future: Any) -> None:  # in another thread
-            sent.done = True
-            self._ended.put(future)
+    def hand_out(self, addresses: Collection[str]) -> Iterator[Any]:
+        """Gives workers as many chunks as they have room for; those with the least come first.
 
-        future.add_done_callback(finish)
+        Args:
+            addresses: of the workers; others are left alone.
 
-    def wait_for_tasks(self) -> list[SentT]:
-        """Waits a while for a task that ends, and returns all that have ended."""
-        try:
-            futures = [self._ended.get(timeout=WORKER_POLL_INTERVAL)]
-        except queue.Empty:
-            return []
-        while not self._ended.empty():
-            futures.append(self._ended.get())
-        return [self.sent[f.key] for f in futures if f.key in self.sent]
-
-    def read_answer(self, sent: SentT, timeout: float) -> Any:
-        """The answer of a task that has ended; None if it was cancelled.
-
-        Raises:
-            KilledWorker: its worker was lost.
-            OSError: it does not come within the time-out [s]; see `retry_answer`.
-            ClusterError: the task failed.
+        Yields:
+            Results of items that cannot be sent.
         """
-        try:
-            return sent.future.result(timeout=timeout)
-        except (KilledWorker, OSError):
-            raise
-        except CancelledError:  # by the loss of the scheduler, or by somebody else
-            return None
-        except Exception as error:
-            raise ClusterError(f"worker {sent.worker.address}: {one_line(error)}") from error
-
-    def retry_answer(self, sent: SentT) -> None:
-        """Reads an answer again later: its worker is busy, or the next check shows its loss.
-
-        Raises:
-            ClusterError: the scheduler is lost.
-        """
-        if self.client.status != "running":
-            raise lost_scheduler_error(self.client)
-        if sent.worker.address in self.cluster.workers:
-            self._ended.put(sent.future)
-        self.poll_soon()
-
-
-class Dispatch(ClusterRun[SentChunk]):
-    """Jobs under way on a cluster.
-
-    Attributes:
-        limits: of the workers' children.
-        jobs: those under way.
-    """
-
-    def __init__(self, client: Any, limits: WorkerLimits, maintain: Callable[[], None]) -> None:
-        super().__init__(client, maintain)
-        self.limits = limits
-        self.jobs: list[SentJob] = []
-        self._coming: Iterator[Job | None] = iter(())
-        self._on_failure: OnFailure | None = None
-        self._exhausted = False
-
-    def run(
-        self, jobs: Iterable[Job | None], on_failure: OnFailure | None
-    ) -> Generator[Answer, None, None]:
-        """See `executor.Executor.judge`."""
-        self._coming, self._on_failure = iter(jobs), on_failure
-        self.begin(Supervisor(self.name))
-        try:
-            while True:
-                if self.poll_is_due():
-                    yield from self.update_workers()
-                self.hand_out()
-                if not self.sent and not any(job.left for job in self.jobs):
-                    if self.open_next_job() is not None:
-                        continue
-                    if self._exhausted:
-                        return
-                yield from self.collect()
-        finally:
-            self.end()
-
-    def hand_out(self) -> None:
-        """Gives every worker as many chunks as it has room for; those with the least come first."""
+        places = max(1, self.chunks_per_thread * self.cluster.threads)
+        there = self.cluster.workers
         while True:
-            workers = [worker for worker in self.cluster.workers.values() if worker.room > 0]
-            for worker in workers:
+            idle = [
+                worker
+                for worker in (there[address] for address in addresses if address in there)
+                if len(worker.chunks) < self.chunks_per_thread * worker.threads
+            ]
+            for worker in idle:
                 worker.job = self.choose(worker)
-            workers = [worker for worker in workers if worker.job is not None]
-            if not workers:
+            idle = [worker for worker in idle if worker.job is not None]
+            if not idle:
                 return
-            least = min(worker.load for worker in workers)
-            for worker in workers:
+            least = min(worker.load for worker in idle)
+            for worker in idle:
                 if worker.load <= least and worker.job is not None and worker.job.left:
-                    self.send(worker.job.take_chunk(max(1, self.cluster.threads)), worker)
+                    yield from self.send(worker.job.take_chunk(places), worker)
 
-    def choose(self, worker: ClusterWorker) -> SentJob | None:
+    def choose(self, worker: ClusterWorker) -> ClusterJob | None:
         """The job that a worker goes on with: its own, the next one, or one that others work on."""
         if worker.job is not None and worker.job.left:
             return worker.job
@@ -288,112 +223,47 @@ class Dispatch(ClusterRun[SentChunk]):
         open_jobs = [job for job in self.jobs if job.left]
         return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
 
-    def open_next_job(self) -> SentJob | None:
+    def open_next_job(self) -> ClusterJob | None:
         """The next job, if one is ready."""
         for job in self._coming:
-            if job is None:  # none is ready yet
-                return None
-            if job.candidates:
-                try:
-                    self.jobs.append(SentJob(job))
-                except BurgError as error:
-                    self._report_failure(JobFailed(job, error))
-                    continue
-                return self.jobs[-1]
+            if job is not None:  # otherwise none is ready yet
+                self.jobs.append(job)
+            return job
         self._exhausted = True
         return None
 
-    def send(self, chunk: SentChunk, worker: ClusterWorker) -> None:
-        """Sends a chunk to a worker."""
-        packed = Chunk(self.name, chunk.job.recipe, chunk.grasps, self.limits)
-        self.submit(judge_chunk, packed, chunk, worker)
-        chunk.job.sent += 1
-        worker.chunks.append(chunk)
-
-    def collect(self) -> Iterator[Answer]:
-        """Waits a while for answers, and passes on all that have come."""
-        result_timeout = 3.0  # Seconds; the worker may be lost by now.
-        missing: dict[str, tuple[SentJob, list[str]]] = {}
-        for chunk in self.wait_for_tasks():
-            try:
-                answers: ChunkAnswers = self.read_answer(chunk, result_timeout) or ChunkAnswers(
-                    ended=True
-                )
-            except KilledWorker:
-                self.forget(chunk)
-                yield from self.suspect_grasps(chunk)
-                continue
-            except OSError:
-                self.retry_answer(chunk)
-                continue
-            self.forget(chunk)
-            if answers.ended:
-                chunk.take_back()
-                self.poll_soon()
-            elif answers.missing:
-                chunk.take_back()
-                place = missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))
-                place[1].append(chunk.worker.address)
-            elif not chunk.job.failed:
-                yield from self.handle_answers(chunk, answers)
-        for job, addresses in missing.values():
-            there = [a for a in dict.fromkeys(addresses) if a in self.cluster.workers]
-            assert job.bundle is not None
-            what = f"the scene {job.job.key!r}"
-            send_bundle(self.client, job.bundle, what, job.deliveries, there)
-
-    def handle_answers(self, chunk: SentChunk, answers: ChunkAnswers) -> Iterator[Answer]:
-        """Passes the verdicts of a chunk on."""
-        job = chunk.job
-        judged = set()
-        for place, verdict in answers.verdicts:
-            judged.add(place)
-            yield job.job, chunk.grasps[place], verdict
-            job.crashes_in_a_row = job.crashes_in_a_row + 1 if place in answers.crashing else 0
-            if job.crashes_in_a_row >= self.limits.hopeless:
-                self.fail(
-                    job,
-                    SimulationError(
-                        f"{self.limits.hopeless} grasps in a row could not be simulated;"
-                        f" the reason of the last one: {verdict.reason}"
-                    ),
-                )
-        if answers.error is not None:
-            self.fail(job, answers.error)
-        open_ones = [grasp for k, grasp in enumerate(chunk.grasps) if k not in judged]
-        yield from self.suspect_grasps(chunk, open_ones, "gave no answer about it")
-
-    def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Answer]:
-        """Takes back the chunks of a lost worker; the grasps of those under way are sent alone."""
-        suspects = [chunk for chunk in worker.chunks if not chunk.done][: worker.threads]
-        for chunk in list(worker.chunks):
-            self.forget(chunk)
-            chunk.future.cancel()
-            if chunk in suspects:
-                yield from self.suspect_grasps(chunk)
-            else:
-                chunk.take_back()
-
-    def suspect_grasps(
-        self,
-        chunk: SentChunk,
-        grasps: Sequence[Candidate] | None = None,
-        what: str = "were lost while working on it",
-    ) -> Iterator[Answer]:
-        """Sends grasps again that a lost worker had or that it left out, or gives them up.
-
-        Args:
-            chunk: that it had.
-            grasps: those of the chunk; all if None.
-            what: the last workers did, for the verdict's reason.
-        """
-        for grasp in chunk.suspect(chunk.grasps if grasps is None else grasps):
-            reason = (
-                f"{ChunkSettings.max_losses} workers of the cluster {what}, one after the other"
+    def send(self, chunk: SentChunk, worker: ClusterWorker) -> Iterator[Any]:
+        """Sends a chunk to a worker; yields the results of items that cannot be sent."""
+        try:
+            task = chunk.job.task(self.name, chunk.items)
+        except BurgError as error:
+            for item in chunk.items:
+                yield chunk.job.failure(item, error)
+            return
+        with scheduler_errors(self.client):
+            chunk.future = self.client.submit(
+                run_task,
+                task,
+                key=f"{type(task).__name__}-{uuid.uuid4().hex}",
+                pure=False,
+                retries=0,
+                workers=[worker.address],
+                allow_other_workers=False,
             )
-            failed = Outcome.SIMULATION_FAILED
-            verdict = Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True)
-            yield chunk.job.job, grasp, verdict
+        chunk.worker = worker
+        self.note_sent(chunk)
+
+        def finish(future: Any) -> None:  # in another thread
+            chunk.done = True
+            self._ended.put(future)
+
+        chunk.future.add_done_callback(finish)
+
+    def note_sent(self, chunk: SentChunk) -> None:
+        """Notes that a worker has a chunk."""
+        self.sent[chunk.future.key] = chunk
+        chunk.worker.chunks.append(chunk)
+        chunk.job.sent += 1
 
     def forget(self, chunk: SentChunk) -> None:
         """Notes that no worker has a chunk any more."""
@@ -401,13 +271,75 @@ class Dispatch(ClusterRun[SentChunk]):
         chunk.worker.chunks.remove(chunk)
         chunk.job.sent -= 1
 
-    def fail(self, job: SentJob, error: BurgError) -> None:
-        """Gives a job up, and reports that once."""
-        if not job.failed:
-            job.give_up()
-            self._report_failure(JobFailed(job.job, error))
+    def collect(self) -> Iterator[Any]:
+        """Waits a while for answers, and yields the results of all that have come."""
+        missing: dict[str, tuple[ClusterJob, list[str]]] = {}
+        ended = self.wait_for_chunks()
+        for chunk in ended:
+            self.forget(chunk)
+        yield from self.hand_out(self._answering)  # they go on while results are on their way
+        for chunk in ended:
+            job, address = chunk.job, chunk.worker.address
+            try:
+                answer = self.read_answer(chunk)
+            except KilledWorker:
+                yield from job.suspect(chunk)
+                continue
+            except OSError:
+                self.retry_answer(chunk)
+                continue
+            if answer is None or answer.ended:
+                job.take_back(chunk)
+                self.poll_soon()
+            elif answer.missing:
+                job.take_back(chunk)
+                assert job.bundle is not None
+                missing.setdefault(job.bundle.name, (job, []))[1].append(address)
+            else:
+                self._answering.add(address)
+                if not job.failed:
+                    yield from job.read_answer(chunk, answer)
+        for job, addresses in missing.values():
+            there = [a for a in dict.fromkeys(addresses) if a in self.cluster.workers]
+            assert job.bundle is not None
+            send_bundle(self.client, job.bundle, job.what, job.deliveries, there)
 
-    def _report_failure(self, failure: JobFailed) -> None:
-        if self._on_failure is None:
-            raise failure.error
-        self._on_failure(failure)
+    def wait_for_chunks(self) -> list[SentChunk]:
+        """Waits a while for a chunk whose task ends, and returns all whose tasks have ended."""
+        try:
+            futures = [self._ended.get(timeout=WORKER_POLL_INTERVAL)]
+        except queue.Empty:
+            return []
+        while not self._ended.empty():
+            futures.append(self._ended.get())
+        return [self.sent[f.key] for f in futures if f.key in self.sent]
+
+    def read_answer(self, chunk: SentChunk) -> Any:
+        """The answer of a task that has ended; None if it was cancelled.
+
+        Raises:
+            KilledWorker: its worker was lost.
+            OSError: it does not come within the time-out; see `retry_answer`.
+            ClusterError: the task failed.
+        """
+        try:
+            return chunk.future.result(timeout=chunk.job.result_timeout)
+        except (KilledWorker, OSError):
+            raise
+        except CancelledError:  # by the loss of the scheduler, or by somebody else
+            return None
+        except Exception as error:
+            raise ClusterError(f"worker {chunk.worker.address}: {one_line(error)}") from error
+
+    def retry_answer(self, chunk: SentChunk) -> None:
+        """Reads an answer again later: its worker is busy, or the next check shows its loss.
+
+        Raises:
+            ClusterError: the scheduler is lost.
+        """
+        if self.client.status != "running":
+            raise lost_scheduler_error(self.client)
+        self.note_sent(chunk)
+        if chunk.worker.address in self.cluster.workers:
+            self._ended.put(chunk.future)
+        self.poll_soon()

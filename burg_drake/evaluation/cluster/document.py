@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -137,26 +137,14 @@ class ClusterDocument:
             raise FieldError(f"scale is {self.scale}; give 1 or more", "scale")
 
 
-@dataclass(frozen=True)
-class Cluster:
-    """A cluster as people name it.
-
-    Attributes:
-        local: number of workers on this machine; 0 if the document says where they are.
-        document: the document; made of an address if that was given.
-        tls: paths of the document's files.
-    """
-
-    local: int = 0
-    document: ClusterDocument | None = None
-    tls: TlsFiles | None = None
-
-
-def read_cluster(text: str) -> Cluster:
+def read_cluster(text: str) -> int | ClusterDocument:
     """The cluster that a text names.
 
     Args:
         text: `local:4`, the address of a scheduler, or the path of a cluster file.
+
+    Returns:
+        Number of workers on this machine; or a document, with the paths of its TLS files.
 
     Raises:
         InvalidInputError: it is none of them.
@@ -167,10 +155,10 @@ def read_cluster(text: str) -> Cluster:
     if found := LOCAL_CLUSTER_PATTERN.fullmatch(text):
         if int(found[1]) < 1:
             raise InvalidInputError(f"{text} has no workers; give local:1 or more")
-        return Cluster(local=int(found[1]))
+        return int(found[1])
     if "://" in text:
         require_safe_address(text)
-        return Cluster(document=ClusterDocument(address=text))
+        return ClusterDocument(address=text)
     if Path(text).suffix not in (".yaml", ".yml"):
         raise InvalidInputError(
             f"{quote_value(text)} is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
@@ -182,8 +170,8 @@ def read_cluster(text: str) -> Cluster:
         ca, cert, key = (
             str(resolve_reference(file, base=path.parent)) for file in (tls.ca, tls.cert, tls.key)
         )
-        tls = TlsFiles(ca=ca, cert=cert, key=key)
-    return Cluster(document=document, tls=tls)
+        document = replace(document, tls=TlsFiles(ca=ca, cert=cert, key=key))
+    return document
 
 
 def require_safe_address(address: str, prefix: str = "") -> None:
@@ -231,11 +219,11 @@ def _is_loopback(host: str) -> bool:
         return False
 
 
-def start_jobqueue(cluster: Cluster, security: Any) -> Any:
+def start_jobqueue(document: ClusterDocument, security: Any) -> Any:
     """Starts a scheduler here and asks the batch system for workers.
 
     Args:
-        cluster: with a `jobqueue`.
+        document: with a `jobqueue`.
         security: of the document's TLS files; None for temporary certificates.
 
     Returns:
@@ -255,8 +243,7 @@ def start_jobqueue(cluster: Cluster, security: Any) -> Any:
         "oar": "OARCluster",
         "moab": "MoabCluster",
     }
-    document = cluster.document
-    assert document is not None and document.jobqueue is not None
+    assert document.jobqueue is not None
     try:
         import dask_jobqueue
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""Workers of a cluster that may be used, and the grasps of jobs that each of them has."""
+"""Workers of a cluster that may be used: their versions and addresses, and the loss of any."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import contextlib
 import functools
 import time
 import uuid
-from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,124 +21,9 @@ from burg_drake.core import (
     one_line,
     software_versions,
 )
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.bundle import Bundle, make_recipe
 from burg_drake.evaluation.cluster.document import require_safe_address
-from burg_drake.evaluation.executor import Job
+from burg_drake.evaluation.cluster.jobs import ClusterWorker
 from burg_drake.station import ENGINES
-
-
-class ChunkSettings:
-    """How many grasps travel together, and how often a grasp is sent."""
-
-    max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
-    per_thread = 2  # Chunks that a worker's thread has: one under way and one that waits.
-    max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
-
-
-@dataclass(eq=False)
-class SentJob:
-    """A job under way.
-
-    Attributes:
-        job: the job.
-        waiting: grasps that no worker has.
-        suspects: grasps at which a worker was lost, with the number of workers; each of them is
-            sent alone.
-        sent: number of chunks that workers have.
-        crashes_in_a_row: grasps that ended their children since one was judged.
-        failed: whether it is given up.
-        deliveries: how often its bundle was sent, by the worker's address.
-    """
-
-    job: Job
-    waiting: deque[Candidate] = field(default_factory=deque)
-    suspects: deque[tuple[Candidate, int]] = field(default_factory=deque)
-    sent: int = 0
-    crashes_in_a_row: int = 0
-    failed: bool = False
-    deliveries: Counter[str] = field(default_factory=Counter)
-    bundle: Bundle | None = field(init=False, default=None)
-
-    def __post_init__(self) -> None:
-        self.recipe, self.bundle = make_recipe(self.job.make_judge)
-        self.waiting.extend(self.job.candidates)
-
-    @property
-    def left(self) -> int:
-        """Number of grasps that no worker has."""
-        return len(self.waiting) + len(self.suspects)
-
-    def take_chunk(self, threads: int) -> SentChunk:
-        """Takes grasps for a chunk, fewer as the end comes near.
-
-        Args:
-            threads: number of threads that share the grasps that are left.
-        """
-        if self.suspects:
-            grasp, losses = self.suspects.popleft()
-            return SentChunk(self, (grasp,), losses)
-        share = -(-len(self.waiting) // (ChunkSettings.per_thread * threads))
-        size = min(ChunkSettings.max_grasps, share)
-        return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
-
-    def give_up(self) -> None:
-        """Drops the grasps that no worker has."""
-        self.failed = True
-        self.waiting.clear()
-        self.suspects.clear()
-
-
-@dataclass(eq=False)
-class SentTask:
-    """A task that a worker has.
-
-    Attributes:
-        worker: the worker.
-        future: of Dask.
-        done: whether the worker has done it; the answer may be lost with it nonetheless.
-    """
-
-    worker: ClusterWorker = field(init=False)
-    future: Any = field(init=False)
-    done: bool = field(init=False, default=False)
-
-
-@dataclass(eq=False)
-class SentChunk(SentTask):
-    """Grasps that a worker has.
-
-    Attributes:
-        job: whose grasps they are.
-        grasps: the grasps.
-        losses: workers that were lost at the one grasp.
-    """
-
-    job: SentJob
-    grasps: tuple[Candidate, ...]
-    losses: int = 0
-
-    def take_back(self) -> None:
-        """Returns the grasps to their job, as none of them was judged."""
-        if self.job.failed:
-            return
-        if self.losses:
-            self.job.suspects.appendleft((self.grasps[0], self.losses))
-        else:
-            self.job.waiting.extendleft(reversed(self.grasps))
-
-    def suspect(self, grasps: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Returns grasps to their job, as each of them may have caused the loss of a worker.
-
-        Returns:
-            Grasps at which too many workers were lost.
-        """
-        if self.job.failed:
-            return ()
-        if self.losses + 1 >= ChunkSettings.max_losses:
-            return grasps
-        self.job.suspects.extend((grasp, self.losses + 1) for grasp in grasps)
-        return ()
 
 
 @functools.cache
@@ -202,33 +85,6 @@ CONNECTION_ERRORS = (
     asyncio.CancelledError,
 )
 """Errors that are raised when the other side is gone."""
-
-
-@dataclass(eq=False)
-class ClusterWorker:
-    """A worker.
-
-    Attributes:
-        address: where it is.
-        threads: number of chunks that it works on at a time.
-        chunks: those that it has, the first ones first.
-        job: the one that it works on.
-    """
-
-    address: str
-    threads: int
-    chunks: list[SentChunk] = field(default_factory=list)
-    job: SentJob | None = None
-
-    @property
-    def room(self) -> int:
-        """Number of chunks that it may get."""
-        return ChunkSettings.per_thread * self.threads - len(self.chunks)
-
-    @property
-    def load(self) -> float:
-        """Chunks a thread."""
-        return len(self.chunks) / self.threads
 
 
 class ClusterWorkers:

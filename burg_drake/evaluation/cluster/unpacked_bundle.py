@@ -93,17 +93,23 @@ def _remove_unused(every: Path) -> None:
 
 
 @dataclass(frozen=True)
-class PickledJudgeFactory:
-    """A factory that is unpickled where it is called.
+class JudgeRecipe:
+    """Builds a judge; a factory that is unpickled where it is called.
 
     Attributes:
         make_judge: a factory, pickled.
-        folder: of the bundle, which what is pickled apart in the factory is told; None if it has
-            nothing of the kind.
+        bundle: name of the bundle whose folder the factory is to be told; empty if it needs none.
+        folder: of that bundle on this machine.
     """
 
     make_judge: bytes
+    bundle: str = ""
     folder: Path | None = None
+
+    @cached_property
+    def key(self) -> str:
+        """Names the judge."""
+        return hashlib.sha256(self.make_judge).hexdigest()
 
     def __call__(self) -> Judge:
         factory: Callable[[], Judge] = _Unpacker(self.make_judge, self.folder).load()
@@ -119,32 +125,3 @@ class _Unpacker(pickle.Unpickler):
 
     def persistent_load(self, value: Any) -> Any:
         return replace(value, folder=self._folder)
-
-
-@dataclass(frozen=True)
-class JudgeRecipe:
-    """How to build a judge.
-
-    Attributes:
-        make_judge: a factory, pickled.
-        bundle: name of the bundle whose folder the factory is to be told; empty if it needs none.
-    """
-
-    make_judge: bytes
-    bundle: str = ""
-
-    @cached_property
-    def key(self) -> str:
-        """Names the judge."""
-        return hashlib.sha256(self.make_judge).hexdigest()
-
-    def load(self, place: Path) -> PickledJudgeFactory | None:
-        """The factory for this machine; None if the bundle is not here yet.
-
-        Args:
-            place: see `unpack`.
-        """
-        if not self.bundle:
-            return PickledJudgeFactory(self.make_judge)
-        folder = bundle_folder(place, self.bundle)
-        return None if folder is None else PickledJudgeFactory(self.make_judge, folder)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from distributed import WorkerPlugin, get_worker
 
@@ -20,44 +22,129 @@ CHILD_IDLE_TIMEOUT = 60.0
 """Seconds after which a child without work ends, as its driver may be gone."""
 
 
-@dataclass(frozen=True)
-class Chunk:
-    """Grasps for a worker.
+@dataclass(frozen=True, kw_only=True)
+class TaskAnswer:
+    """Result of a task, or why there is none.
 
     Attributes:
-        run: name of the plugin whose child judges them.
-        recipe: how to build the judge.
-        grasps: of one job.
-        limits: what the child may take.
-    """
-
-    run: str
-    recipe: JudgeRecipe
-    grasps: tuple[Candidate, ...]
-    limits: WorkerLimits
-
-
-@dataclass(frozen=True)
-class ChunkAnswers:
-    """Verdicts of a chunk, or why there are none.
-
-    Attributes:
-        verdicts: in the order of completion, with the place of the grasp in the chunk.
-        crashing: places of the grasps at which the child crashes.
         missing: whether the bundle is not on this machine, and nothing was done.
         ended: whether the worker closes or the run has ended, and nothing is known.
-        error: why the judge could not be built, if so.
+        error: what the call has raised or what has ended its process, or why the judge of the
+            grasps could not be built.
     """
 
-    verdicts: Sequence[tuple[int, Verdict]] = ()
-    crashing: frozenset[int] = frozenset()
     missing: bool = False
     ended: bool = False
     error: BurgError | None = None
 
 
-class RunPlugin(WorkerPlugin):
-    """What a worker keeps for one run: child processes, which end when nobody needs them.
+@dataclass(frozen=True)
+class ChunkAnswers(TaskAnswer):
+    """Verdicts of a chunk.
+
+    Attributes:
+        verdicts: in the order of completion, with the place of the grasp in the chunk.
+        crashing: places of the grasps at which the child crashes.
+    """
+
+    verdicts: Sequence[tuple[int, Verdict]] = ()
+    crashing: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class CallAnswer(TaskAnswer):
+    """Result of a call.
+
+    Attributes:
+        result: of the function, pickled.
+    """
+
+    result: bytes = b""
+
+
+@dataclass(frozen=True)
+class ClusterTask(ABC):
+    """Work for a worker.
+
+    Attributes:
+        run: name of the plugin whose child does it.
+        bundle: name of the bundle that it needs; empty if it needs none.
+    """
+
+    run: str
+    bundle: str
+
+    @abstractmethod
+    def do(self, children: Supervisor, folder: Path | None) -> TaskAnswer:
+        """Has a child do it.
+
+        Args:
+            children: of this worker.
+            folder: of the bundle; None if none is needed.
+        """
+
+
+@dataclass(frozen=True)
+class GraspChunk(ClusterTask):
+    """Grasps for a worker.
+
+    Attributes:
+        recipe: how to build the judge.
+        grasps: of one job.
+        limits: what the child may take.
+    """
+
+    recipe: JudgeRecipe
+    grasps: tuple[Candidate, ...]
+    limits: WorkerLimits
+
+    def do(self, children: Supervisor, folder: Path | None) -> ChunkAnswers:
+        """See `ClusterTask.do`."""
+        make_judge = replace(self.recipe, folder=folder)
+        return children.judge(Job(self.recipe.key, make_judge, self.grasps), self.limits)
+
+
+@dataclass(frozen=True)
+class ClusterCall(ClusterTask):
+    """A call for a worker.
+
+    Attributes:
+        work: the function and its first argument, pickled; the second one is the bundle's folder.
+    """
+
+    work: bytes
+
+    def do(self, children: Supervisor, folder: Path | None) -> CallAnswer:
+        """See `ClusterTask.do`."""
+        assert folder is not None
+        return children.call(self.work, folder)
+
+
+class _Child(Protocol):
+    """A child process, which is started when it has work."""
+
+    def stop(self) -> None:
+        """Ends it at once, and what another thread waits for."""
+
+    def release(self) -> None:
+        """Lets it end by itself, as it is idle."""
+
+
+class _CallingChild:
+    """A child that calls functions. What ends its process is not tried again."""
+
+    def __init__(self) -> None:
+        self._pool = WorkerPool(1, retries=0, own_group=True)
+        self.stop, self.release = self._pool.kill_workers, self._pool.shutdown
+
+    def call(self, work: bytes, folder: Path) -> bytes:
+        """Makes a call; see `ClusterCall`."""
+        return self._pool.submit(call_pickled, work, folder).result()
+
+
+class Supervisor(WorkerPlugin):
+    """Children of a worker for one run: each judges grasps with a judge of its own, or calls
+    functions. They end with the run, or when nobody has needed them for a while.
 
     Attributes:
         name: of the run.
@@ -73,102 +160,105 @@ class RunPlugin(WorkerPlugin):
         """Called by Dask as the worker starts, or as the plugin is registered."""
         self._lock = threading.Lock()
         self._stopped = False
-
-
-def _start_idle_timer(function: Callable[..., None], *arguments: Any) -> threading.Timer:
-    """Calls a function after the idle time-out, unless the timer is cancelled."""
-    timer = threading.Timer(CHILD_IDLE_TIMEOUT, function, arguments)
-    timer.daemon = True
-    timer.start()
-    return timer
-
-
-class Supervisor(RunPlugin):
-    """Children of a worker that judge grasps, each with a judge of its own."""
-
-    def setup(self, worker: Any) -> None:
-        """Called by Dask as the worker starts, or as the plugin is registered."""
-        super().setup(worker)
-        self._pools: list[JudgePool] = []
-        self._idle: list[JudgePool] = []
-        self._timers: dict[int, threading.Timer] = {}
+        self._busy: list[_Child] = []
+        self._idle: dict[_Child, threading.Timer] = {}
 
     def teardown(self, worker: Any) -> None:
         """Called by Dask as the worker closes, or as the run ends."""
         with self._lock:
             self._stopped = True
-            for timer in self._timers.values():
-                timer.cancel()
-            for pool in self._pools:
-                pool.stop()
-            idle, self._idle = self._idle, []
-        for pool in idle:
-            pool.kill()
+            for child in self._busy:
+                child.stop()
+            idle, self._idle = self._idle, {}
+        for child, timer in idle.items():
+            timer.cancel()
+            child.stop()
 
     def judge(self, job: Job, limits: WorkerLimits) -> ChunkAnswers:
         """Has a child judge the grasps of a job."""
-        pool = self._take_pool(limits)
-        if pool is None:
-            return ChunkAnswers(ended=True)
         failed: list[JobFailed] = []
         places = {id(grasp): k for k, grasp in enumerate(job.candidates)}
-        pool.crashing.clear()
-        try:
-            found = [
-                (places[id(grasp)], verdict) for _, grasp, verdict in pool.run([job], failed.append)
-            ]
-        except SimulationError:
-            if not pool.stopped:
-                raise
-            return ChunkAnswers(ended=True)
-        finally:
-            self._return_pool(pool)
-        ids = [grasp.id for grasp in job.candidates]
+        with self._child(lambda: JudgePool(1, limits)) as pool:
+            if pool is None:
+                return ChunkAnswers(ended=True)
+            pool.crashing.clear()
+            try:
+                found = [
+                    (places[id(grasp)], verdict)
+                    for _, grasp, verdict in pool.run([job], failed.append)
+                ]
+            except SimulationError:
+                if not pool.stopped:
+                    raise
+                return ChunkAnswers(ended=True)
+            crashing = set(pool.crashing)
         return ChunkAnswers(
             found,
-            frozenset(ids.index(id) for id in pool.crashing),
+            frozenset(k for k, grasp in enumerate(job.candidates) if grasp.id in crashing),
             error=failed[0].error if failed else None,
         )
 
-    def _take_pool(self, limits: WorkerLimits) -> JudgePool | None:
-        with self._lock:
-            if self._stopped:
-                return None
-            if self._idle:
-                pool = self._idle.pop()
-                self._timers.pop(id(pool)).cancel()
-            else:
-                pool = JudgePool(1, limits)
-                self._pools.append(pool)
-            return pool
+    def call(self, work: bytes, folder: Path) -> CallAnswer:
+        """Has a child make a call; see `ClusterCall`."""
+        with self._child(_CallingChild) as child:
+            if child is None:
+                return CallAnswer(ended=True)
+            try:
+                return CallAnswer(child.call(work, folder))
+            except Exception as error:
+                if self._stopped:
+                    return CallAnswer(ended=True)
+                if isinstance(error, BurgError):
+                    return CallAnswer(error=error)
+                return CallAnswer(error=SimulationError(one_line(error)))
 
-    def _return_pool(self, pool: JudgePool) -> None:
+    @contextmanager
+    def _child(self, make: Callable[[], Any]) -> Iterator[Any]:
+        """An idle child, or a new one, until the block is left; None if the run has ended."""
         with self._lock:
-            if self._stopped:
+            child = None
+            if not self._stopped:
+                if self._idle:
+                    child, timer = self._idle.popitem()
+                    timer.cancel()
+                else:
+                    child = make()
+                self._busy.append(child)
+        try:
+            yield child
+        finally:
+            with self._lock:
+                if child is not None and not self._stopped:
+                    self._busy.remove(child)
+                    self._idle[child] = timer = threading.Timer(
+                        CHILD_IDLE_TIMEOUT, self._end_if_idle, [child]
+                    )
+                    timer.daemon = True
+                    timer.start()
+
+    def _end_if_idle(self, child: _Child) -> None:
+        with self._lock:
+            if self._idle.pop(child, None) is None:
                 return
-            self._idle.append(pool)
-            self._timers[id(pool)] = _start_idle_timer(self._end_if_idle, pool)
-
-    def _end_if_idle(self, pool: JudgePool) -> None:
-        with self._lock:
-            if pool not in self._idle:
-                return
-            self._idle.remove(pool)
-            self._pools.remove(pool)
-            del self._timers[id(pool)]
-        pool.release()
+        child.release()
 
 
-def judge_chunk(chunk: Chunk) -> ChunkAnswers:
+def call_pickled(work: bytes, folder: Path) -> bytes:
+    """Makes a call; runs in the child."""
+    function, argument = pickle.loads(work)
+    return pickle.dumps(function(argument, folder))
+
+
+def run_task(task: ClusterTask) -> TaskAnswer:
     """The task of Dask."""
     worker = get_worker()
-    make_judge = chunk.recipe.load(bundle_place(worker))
-    if make_judge is None:
-        return ChunkAnswers(missing=True)
-    supervisor: Supervisor | None = worker.plugins.get(chunk.run)
-    if supervisor is None:
-        return ChunkAnswers(ended=True)
-    return supervisor.judge(Job(chunk.recipe.key, make_judge, chunk.grasps), chunk.limits)
+    folder = None
+    if task.bundle:
+        folder = bundle_folder(bundle_place(worker), task.bundle)
+        if folder is None:
+            return TaskAnswer(missing=True)
+    supervisor: Supervisor | None = worker.plugins.get(task.run)
+    return TaskAnswer(ended=True) if supervisor is None else task.do(supervisor, folder)
 
 
 def unpack_on_worker(data: bytes, name: str, dask_worker: Any = None) -> None:
@@ -179,122 +269,3 @@ def unpack_on_worker(data: bytes, name: str, dask_worker: Any = None) -> None:
 def bundle_place(worker: Any) -> Path:
     """A folder that all workers of a machine share."""
     return Path(worker.local_directory).parent
-
-
-@dataclass(frozen=True)
-class ClusterCall:
-    """A call for a worker.
-
-    Attributes:
-        run: name of the plugin whose child makes it.
-        bundle: name of the bundle whose folder the function is told.
-        work: the function and its first argument, pickled.
-    """
-
-    run: str
-    bundle: str
-    work: bytes
-
-
-@dataclass(frozen=True)
-class CallAnswer:
-    """Result of a call, or why there is none.
-
-    Attributes:
-        result: of the function, pickled.
-        error: that it has raised, or that has ended its process.
-        missing: whether the bundle is not on this machine, and nothing was done.
-        ended: whether the worker closes or the run has ended, and nothing is known.
-    """
-
-    result: bytes = b""
-    error: BurgError | None = None
-    missing: bool = False
-    ended: bool = False
-
-
-class CallChildren(RunPlugin):
-    """Children of a worker that call functions, one for each of its threads."""
-
-    def setup(self, worker: Any) -> None:
-        """Called by Dask as the worker starts, or as the plugin is registered."""
-        super().setup(worker)
-        self._threads: int = worker.state.nthreads
-        self._pool: WorkerPool | None = None
-        self._calls = 0
-        self._timer: threading.Timer | None = None
-
-    def teardown(self, worker: Any) -> None:
-        """Called by Dask as the worker closes, or as the run ends."""
-        with self._lock:
-            self._stopped = True
-            if self._timer is not None:
-                self._timer.cancel()
-            pool, self._pool = self._pool, None
-        if pool is not None:
-            pool.kill_workers()
-
-    def call(self, work: bytes, folder: Path) -> CallAnswer:
-        """Has a child make a call. What ends the child is not tried again.
-
-        Args:
-            work: see `ClusterCall`.
-            folder: of the bundle.
-        """
-        pool = self._begin_call()
-        if pool is None:
-            return CallAnswer(ended=True)
-        try:
-            return CallAnswer(pool.submit(call_pickled, work, folder).result())
-        except Exception as error:
-            if self._stopped:
-                return CallAnswer(ended=True)
-            if isinstance(error, BurgError):
-                return CallAnswer(error=error)
-            return CallAnswer(error=SimulationError(one_line(error)))
-        finally:
-            self._end_call()
-
-    def _begin_call(self) -> WorkerPool | None:
-        with self._lock:
-            if self._stopped:
-                return None
-            if self._timer is not None:
-                self._timer.cancel()
-            self._calls += 1
-            if self._pool is None:
-                self._pool = WorkerPool(self._threads, retries=0, own_group=True)
-            return self._pool
-
-    def _end_call(self) -> None:
-        with self._lock:
-            self._calls -= 1
-            if self._calls == 0 and not self._stopped:
-                self._timer = _start_idle_timer(self._end_if_idle)
-
-    def _end_if_idle(self) -> None:
-        """Ends idle children, as their driver may be gone."""
-        with self._lock:
-            if self._calls:
-                return
-            pool, self._pool = self._pool, None
-        if pool is not None:
-            pool.shutdown()
-
-
-def call_pickled(work: bytes, folder: Path) -> bytes:
-    """Makes a call; runs in the child."""
-    function, argument = pickle.loads(work)
-    return pickle.dumps(function(argument, folder))
-
-
-def make_call(call: ClusterCall) -> CallAnswer:
-    """The task of Dask."""
-    worker = get_worker()
-    folder = bundle_folder(bundle_place(worker), call.bundle)
-    if folder is None:
-        return CallAnswer(missing=True)
-    children: CallChildren | None = worker.plugins.get(call.run)
-    if children is None:
-        return CallAnswer(ended=True)
-    return children.call(call.work, folder)

@@ -15,6 +15,7 @@ from burg_drake.core import (
     GraspSet,
     InvalidInputError,
     UnknownNameError,
+    distinct_texts,
     inverse,
     list_names,
     make_pose,
@@ -58,7 +59,7 @@ def require_near(
     Raises:
         InvalidInputError: the nearest grasp of an object is more than `MAX_BOX_DISTANCE` from it.
     """
-    for name in sorted(set(grasps.object.tolist()) & set(library.objects)):
+    for name in sorted(distinct_texts(grasps.object) & set(library.objects)):
         entry = library.entry(name)
         p_OG = grasps.X_OG[grasps.object == name, :3, 3]
         outside = np.maximum(0.0, np.maximum(entry.lower - p_OG, p_OG - np.array(entry.upper)))
@@ -370,11 +371,12 @@ def _select_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
 
 def _group_by_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     """Grasps in object frames by instance, in the scene's order."""
-    foreign = sorted(set(grasps.object.tolist()))
+    foreign = sorted(distinct_texts(grasps.object))
     names.require_used(foreign)
     sets: dict[str, list[GraspSet]] = {name: [] for name in names.scene.instances}
     for name in foreign:
-        chosen = without_instance(grasps.select(grasps.object == name))
+        chosen = grasps if len(foreign) == 1 else grasps.select(grasps.object == name)
+        chosen = without_instance(chosen)
         for instance in names.instances_of(name):
             object = names.scene.instance(instance).object
             sets[instance].append(with_objects_renamed(chosen, {name: object}))

@@ -157,11 +157,15 @@ def split_by_instance(grasps: GraspSet) -> dict[str, GraspSet]:
     given = grasps.provenance.get("parts")
     parts = given if isinstance(given, Mapping) else {}
     rest = without_instance(grasps)
+    names, begins = np.unique(owner, return_index=True)
     found = {}
-    for name in dict.fromkeys(owner.tolist()):
+    for name in names[np.argsort(begins)].tolist():
         part = parts.get(name)
         provenance = part if isinstance(part, Mapping) else {}
-        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
+        rows = np.flatnonzero(owner == name)
+        together = len(rows) == rows[-1] + 1 - rows[0]
+        own = rest.select(slice(rows[0], rows[-1] + 1) if together else rows)
+        found[name] = dataclasses.replace(own, provenance=provenance)
     return found
 
 

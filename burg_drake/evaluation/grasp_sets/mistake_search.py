@@ -152,7 +152,8 @@ def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...
     """
     if run.document.grasps.origin != "given":
         return ()
-    touched = np.isin(run.results["outcome"], CONTACT_OUTCOMES)
+    outcomes = run.rows().codes("outcome")
+    touched = np.isin(outcomes.names, CONTACT_OUTCOMES)[outcomes.codes]
     hints = []
     with contextlib.suppress(BurgError):
         scene, station = run.scene(), run.station()
@@ -261,14 +262,12 @@ class _MistakeSearch:
         self.format = format_of_set(first)
         self.correction = correction_of(first)
         self.total = sum(len(part) for part in grasps.values())
-        rows = [(name, part, k) for name, part in grasps.items() for k in _promising_rows(part)]
-        count = min(MistakeLimits.max_grasps, len(rows))
-        chosen = np.unique(np.linspace(0, len(rows) - 1, count).astype(int))
-        frames = {name: frames_of(part, gripper) for name, part in grasps.items()}
-        picked = [rows[i] for i in chosen]
-        self._name = np.array([name for name, _, _ in picked])
-        X_OG = np.stack([part.X_OG[k] for _, part, k in picked])
-        self._X_GF = np.stack([frames[name][k] for name, _, k in picked])
+        picked = _spread_rows(grasps)
+        self._name = np.repeat([*picked], [len(rows) for rows in picked.values()])
+        X_OG = np.concatenate([grasps[name].X_OG[rows] for name, rows in picked.items()])
+        self._X_GF = np.concatenate(
+            [frames_of(grasps[name], gripper)[rows] for name, rows in picked.items()]
+        )
         self._X_MG = X_OG
         if self._X_SM is not None:
             self._X_MG = inverse(self._X_SM) @ self._X_SO(self._name) @ X_OG
@@ -570,12 +569,28 @@ def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str
     return {name: grasps[name] for name in chosen.values()}
 
 
-def _promising_rows(grasps: GraspSet) -> list[int]:
+def _spread_rows(grasps: Mapping[str, GraspSet]) -> dict[str, NDArray[np.int64]]:
+    """Rows of the grasps to look at, by name of a set: spread evenly over all promising ones."""
+    promising = {name: _promising_rows(part) for name, part in grasps.items()}
+    total = sum(map(len, promising.values()))
+    count = min(MistakeLimits.max_grasps, total)
+    chosen = np.unique(np.linspace(0, total - 1, count).astype(int))
+    found, begin = {}, 0
+    for name, rows in promising.items():
+        mine = chosen[(chosen >= begin) & (chosen < begin + len(rows))] - begin
+        begin += len(rows)
+        if len(mine):
+            found[name] = rows[mine]
+    return found
+
+
+def _promising_rows(grasps: GraspSet) -> NDArray[np.int64]:
     """Grasps to look at: the successes, where scores are 0 and 1, or else the half with the highest
     scores, where there are so many; data sets have failures, and networks poor grasps."""
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
     success = score == 1.0
-    if set(score.tolist()) == {0.0, 1.0} and success.sum() >= MistakeLimits.min_fitting:
-        return [int(k) for k in np.flatnonzero(success)]
+    known = np.unique(score)
+    if np.array_equal(known, (0.0, 1.0)) and success.sum() >= MistakeLimits.min_fitting:
+        return np.flatnonzero(success)
     count = max(MistakeLimits.max_grasps, len(grasps) // 2)
-    return sorted(int(k) for k in np.argsort(-score, kind="stable")[:count])
+    return np.sort(np.argsort(-score, kind="stable")[:count])

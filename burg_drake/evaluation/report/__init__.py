@@ -1,4 +1,5 @@
 """The report of a run as one self-contained HTML page.
 
-Read `pages` first; the sections (`*_sections`) are put together of `page_elements` and `charts`.
+Read `report.html.jinja` first: it is the page, from top to bottom. `pages` gives it the values,
+which the sections (`*_sections`) compute.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,21 +19,13 @@ from burg_drake.core import (
     Outcome,
     Stage,
     display_unit,
-    format_count,
     format_percent,
 )
-from burg_drake.evaluation.outcome_counts import Summary, TextValues, code_texts, member_codes
+from burg_drake.evaluation.outcome_counts import Summary, member_codes
 from burg_drake.evaluation.report.outcome_sections import outcome_text
-from burg_drake.evaluation.report.page_elements import (
-    GROUP_CLASSES,
-    command,
-    folded_section,
-    number_cells,
-    section,
-    table,
-    table_row,
-)
-from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.report.page_elements import GROUP_CLASSES, ReportSection
+from burg_drake.evaluation.result_rows import ResultRows
+from burg_drake.evaluation.results_table import TextValues
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.motion import (
     ReachabilityMap,
@@ -44,9 +36,8 @@ from burg_drake.motion import (
 from burg_drake.scene import Scene
 from burg_drake.station import Station
 from burg_drake.visualization import (
-    Child,
     Html,
-    element,
+    PageTable,
     object_outlines,
     outcome_group,
     reachability_chart,
@@ -92,27 +83,39 @@ class Cause:
         outcome: the outcome.
         number: of grasps.
         objects, blockers: of these grasps, with their counts, most frequent first.
-        typical: row of the median one.
+        share: of all grasps.
+        replay: the command that shows the median one.
     """
 
     outcome: Outcome
     number: int
     objects: tuple[tuple[str, int], ...]
     blockers: tuple[tuple[str, int], ...]
-    typical: int
+    share: float
+    replay: str
+
+    @property
+    def name(self) -> str:
+        """The outcome for people."""
+        return outcome_text(self.outcome)
+
+    @property
+    def style(self) -> str:
+        """CSS class of the outcome's colour."""
+        return GROUP_CLASSES[outcome_group(self.outcome).name]
 
 
-def rows_of_run(columns: Columns, path: str) -> CauseRows:
+def rows_of_run(columns: ResultRows, path: str) -> CauseRows:
     """Those of a run in a folder."""
-    ids = columns["id"]
 
     def replay(row: int) -> str:
-        return shlex.join(["burg-drake", "replay", path, "--grasp", str(ids[row])])
+        (id,) = columns.cells("id", np.array([row])).tolist()
+        return shlex.join(["burg-drake", "replay", path, "--grasp", id])
 
     return CauseRows(
-        outcomes=member_codes(columns["outcome"], tuple(Outcome)),
-        objects=code_texts(columns["object"]),
-        blockers=code_texts(columns["blocker"]),
+        outcomes=member_codes(columns.codes("outcome"), tuple(Outcome)),
+        objects=columns.codes("object"),
+        blockers=columns.codes("blocker"),
         margins={name: columns[name] for name in CAUSE_MARGINS if name in columns},
         replay=replay,
     )
@@ -128,8 +131,9 @@ def find_causes(rows: CauseRows) -> list[Cause]:
         if len(mine) and outcome not in successes:
             objects = rows.objects.most_common(mine, max_named)
             blockers = rows.blockers.most_common(mine, max_named)
-            typical = typical_row(rows.margins, mine, outcome)
-            found.append(Cause(outcome, len(mine), objects, blockers, typical))
+            replay = rows.replay(typical_row(rows.margins, mine, outcome))
+            share = len(mine) / len(rows.outcomes)
+            found.append(Cause(outcome, len(mine), objects, blockers, share, replay))
     return sorted(found, key=lambda cause: -cause.number)
 
 
@@ -145,72 +149,43 @@ def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: 
     return int(rows[order[(len(rows) - 1) // 2]])
 
 
-def causes_section(rows: CauseRows) -> Html | None:
-    """Each cause with its meaning, how often, where, and the command that shows a typical grasp;
-    nothing where all grasps were lifted."""
-    causes = find_causes(rows)
-    if not causes:
-        return None
-    entries = (
-        _cause_entry(cause, len(rows.outcomes), rows.replay(cause.typical)) for cause in causes
-    )
-    return section(
-        "Why grasps fail",
-        "The most frequent cause comes first. The command shows a typical case: half of"
-        " the others are milder, half are worse.",
-        element("div", *entries, class_="causes"),
-    )
-
-
-def _cause_entry(cause: Cause, whole: int, replay: str) -> Html:
-    style = GROUP_CLASSES[outcome_group(cause.outcome).name]
-    where = [f"on {_counted_names(cause.objects)}"]
-    if cause.blockers:
-        where.append(f"in the way: {_counted_names(cause.blockers)}")
-    name = outcome_text(cause.outcome)
-    share = f"{format_count(cause.number)} ({format_percent(cause.number / whole)})"
-    return element(
-        "article",
-        element("h3", element("i", class_=style, aria_hidden="true"), name, element("span", share)),
-        element("p", f"{cause.outcome.meaning}; {'; '.join(where)}"),
-        command(replay),
-    )
-
-
-def _counted_names(named: tuple[tuple[str, int], ...]) -> str:
-    return ", ".join(f"{name} ({format_count(number)})" for name, number in named)
-
-
-def collision_section(columns: Columns) -> Html | None:
+def collision_section(columns: ResultRows) -> ReportSection | None:
     """What the open hand collided with at the start and how deep; nothing if it never did."""
-    collides = np.char.startswith(columns["outcome"], "collision_")
+    outcomes, blockers = columns.codes("outcome"), columns.codes("blocker")
+    overlap = columns["overlap"]
+    collision = [name.startswith("collision_") for name in outcomes.names]
+    collides = np.array(collision, dtype=bool)[outcomes.codes]
+    on_target = np.array([name == Outcome.COLLISION_TARGET for name in outcomes.names], dtype=bool)
     if not collides.any():
         return None
-    blockers = Counter(columns["blocker"][collides].tolist())
+    found = np.unique(blockers.codes[collides], return_index=True, return_counts=True)
+    order = np.lexsort((found[1], -found[2]))
     rows = []
-    for name, count in blockers.most_common():
-        mask = collides & (columns["blocker"] == name)
-        depth = columns["overlap"][mask] * 1e3
-        own = int((columns["outcome"][mask] == Outcome.COLLISION_TARGET).sum())
+    for place, count in zip(found[0][order].tolist(), found[2][order].tolist(), strict=True):
+        name = blockers.names[place]
+        mask = collides & (blockers.codes == place)
+        depth = overlap[mask] * 1e3
+        own = int(on_target[outcomes.codes[mask]].sum())
         cells = [
+            name,
             count,
             own or "·",
             count - own or "·",
             f"{np.median(depth):.1f} mm",
             f"{depth.max():.1f} mm",
         ]
-        rows.append(table_row(name, *number_cells(cells)))
+        rows.append(cells)
     head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
-    return folded_section(
+    return ReportSection(
         "Start collisions",
         "Bodies that the open hand overlaps at the grasp, and how far the hand would"
         " have to move back. Each grasp counts for one body, even if the hand overlaps"
         " several.",
-        table(head, rows, numbers=(1, 2, 3, 4, 5)),
+        PageTable(head, rows, (1, 2, 3, 4, 5)),
     )
 
 
-def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
+def disturbed_section(columns: ResultRows, disturbance: float) -> ReportSection | None:
     """Which objects were moved, turned and toppled in trials on others; nothing if all stayed where
     they were.
 
@@ -244,6 +219,7 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         mask = far >= min_displacement
         by, times = Counter(columns["instance"][mask].tolist()).most_common(1)[0]
         cells = [
+            name,
             int(np.isfinite(far).sum()),
             found[name],
             int((far > disturbance).sum()) or "·",
@@ -251,19 +227,19 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
             f"{far[mask].max() * 1e3:.1f} mm",
             _largest_turn(columns.get(TURNED_PREFIX + name), mask),
             toppled[name] or "·",
+            f"on {by} ({times})",
         ]
-        cause = element("td", f"on {by} ({times})")
-        rows.append(table_row(name, *number_cells(cells), cause))
-    return folded_section(
+        rows.append(cells)
+    return ReportSection(
         "What was disturbed",
         f"Objects that were moved by {min_displacement * 1e3:g} mm or more in trials on"
         " other objects, whatever the outcome. Displacement is that of the point that"
         " moved farthest. An object toppled if it stood before and lies at the end.",
-        table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7)),
+        PageTable(head, rows, (1, 2, 3, 4, 5, 6, 7)),
     )
 
 
-def _toppled(columns: Columns) -> Counter[str]:
+def _toppled(columns: ResultRows) -> Counter[str]:
     """In how many trials each object was toppled."""
     texts = columns.get("toppled", np.empty(0, dtype=np.str_))
     return Counter(name for text in texts[texts != ""].tolist() for name in text.split(", "))
@@ -275,7 +251,7 @@ def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
     return f"{math.degrees(known.max()):.1f}°" if len(known) else "·"
 
 
-def arm_section(summary: Summary, columns: Columns) -> Html | None:
+def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
     """What hindered the arm, and what was in its way; nothing if it was not asked."""
     # Outcomes between a clear hand and the trial.
     arm_outcomes = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
@@ -286,9 +262,8 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
     for outcome in arm_outcomes:
         count = summary.total.outcomes[outcome]
         if count:
-            cells = number_cells((count, format_percent(count / clear)))
-            cells += [element("td", outcome.meaning), element("td", _blockers(columns, outcome))]
-            rows.append(table_row(outcome_text(outcome), *cells))
+            share, blockers = format_percent(count / clear), _blockers(columns, outcome)
+            rows.append([outcome_text(outcome), count, share, outcome.meaning, blockers])
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"The open hand is clear at {clear} grasps. The arm can execute {planned} of them"
@@ -297,19 +272,18 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
         " the first thing that fails."
     )
     head = ["outcome", "grasps", "of clear", "what it means", "main obstacles"]
-    return folded_section(
-        "What stopped the arm", text, table(head, rows, numbers=(1, 2)) if rows else ""
-    )
+    found = PageTable(head, rows, (1, 2)) if rows else None
+    return ReportSection("What stopped the arm", text, found)
 
 
-def _blockers(columns: Columns, outcome: Outcome) -> str:
+def _blockers(columns: ResultRows, outcome: Outcome) -> str:
     named = columns["blocker"][(columns["outcome"] == outcome) & (columns["blocker"] != "")]
     found = Counter(named.tolist()).most_common(3)
     return ", ".join(f"{name} ({count})" for name, count in found)
 
 
-def execution_section(summary: Summary, columns: Columns) -> Html | None:
-    """How the arm executed its plans; nothing where it did not."""
+def execution_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
+    """How the arm executed its plans; None if it did not."""
     if "tracking_error" not in columns or not np.isfinite(columns["tracking_error"]).any():
         return None
     rows = []
@@ -323,8 +297,7 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
         values = columns[name][np.isfinite(columns[name])] * factor
         if len(values):
             figures = (np.median(values), np.quantile(values, 0.95), values.max())
-            cells: list[Child] = [len(values), *(f"{figure:.3g} {unit}" for figure in figures)]
-            rows.append(table_row(label, *number_cells(cells)))
+            rows.append([label, len(values), *(f"{figure:.3g} {unit}" for figure in figures)])
     touches = Counter(t for t in columns["touched"].tolist() if t)
     text = "How closely the simulated arm followed its plans within its torque limits."
     text += f" {summary.pushes}" if summary.pushes else ""
@@ -335,14 +308,31 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
             f" planned: {found}."
         )
     head = ["", "trials", "median", "95 %", "most"]
-    return section("Execution by the arm", text, table(head, rows, numbers=(1, 2, 3, 4)))
+    return ReportSection("Execution by the arm", text, PageTable(head, rows, (1, 2, 3, 4)))
 
 
 PICTURE_SETTINGS = ReachabilitySettings(spacing=0.043, redundant=(2, 6))
 """Half the points of the default, for a picture."""
 
 
-def reachability_section(run: Run) -> Html | None:
+@dataclass(frozen=True)
+class ReachCharts:
+    """Maps of the board without its objects.
+
+    Attributes:
+        charts: one for each height.
+        key: what their colours stand for.
+        orientations: number of orientations of the hand that were tried at each place.
+        max_tilt_deg: their largest tilt.
+    """
+
+    charts: Sequence[Html]
+    key: Html
+    orientations: int
+    max_tilt_deg: float
+
+
+def reachability_section(run: Run) -> ReachCharts | None:
     """The board without its objects, and where these stand on it; nothing for a run of the hand
     alone, nor if the files that it was judged with are gone or have changed."""
     if run.document.mode == "hand":
@@ -357,16 +347,8 @@ def reachability_section(run: Run) -> Html | None:
         reachability_chart(reachability, height, around)
         for height in range(len(reachability.heights))
     ]
-    count = len(reachability.tilt)
-    steepest = max(PICTURE_SETTINGS.tilts_deg)
-    return section(
-        "Reach of the arm",
-        f"Share of {count} hand orientations (straight down, and tilted by up to "
-        f"{steepest:g}° to all sides) in which the arm reaches each place over the board"
-        " without colliding with itself or the station. Outlines show where the objects"
-        " stand; they are not obstacles here. Paths to these poses are not checked.",
-        element("div", *charts, class_="charts"),
-        reachability_key(),
+    return ReachCharts(
+        charts, reachability_key(), len(reachability.tilt), max(PICTURE_SETTINGS.tilts_deg)
     )
 
 

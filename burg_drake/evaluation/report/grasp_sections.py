@@ -19,21 +19,22 @@ from burg_drake.core import (
     display_unit,
     format_column_value,
 )
-from burg_drake.evaluation.report.charts import HistogramSeries, Limit, mirrored_histogram
 from burg_drake.evaluation.report.page_elements import (
     GROUP_CLASSES,
     LIFTED_GROUP,
-    command,
-    folded_section,
-    group_legend,
-    number_cells,
+    ReportSection,
     present_groups,
-    section,
-    table,
 )
-from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.result_rows import ResultRows
 from burg_drake.evaluation.run_folder import Run
-from burg_drake.visualization import OUTCOME_GROUPS, Html, element
+from burg_drake.visualization import (
+    OUTCOME_GROUPS,
+    HistogramSeries,
+    Html,
+    Limit,
+    PageTable,
+    mirrored_histogram,
+)
 
 MAIN_MARGINS = ("clearance", "slip", "tilt", "others_moved")
 """Margins that tell most: tolerance to errors, firmness, disturbance of others."""
@@ -50,10 +51,10 @@ FURTHER_MARGINS = display_order(
 """All others that differ between executed grasps."""
 
 
-def margin_section(
+def margin_charts(
     columns: Mapping[str, Array], groups: NDArray[np.int8], trial: Mapping[str, float]
-) -> Html | None:
-    """The chosen margins; nothing where nothing was executed.
+) -> list[Html]:
+    """Distributions of the main margins; none if nothing was executed.
 
     Args:
         columns: (N,) by name, of grasps that came to a trial.
@@ -67,21 +68,10 @@ def margin_section(
         for name, limit in limiting_settings.items()
         if trial.get(limit, math.inf) < math.pi  # an angle or a length that limits nothing
     }
-    charts = _margin_charts(MAIN_MARGINS, columns, groups, limits)
-    if not charts:
-        return None
-    return section(
-        "Margins",
-        "Margins of all executed grasps: above the axis those that lifted their object,"
-        " below it all others, each half on its own scale. Dashed lines are medians."
-        " Slip and tilt are measured from the grip on, for grasps that both fingers"
-        " held.",
-        element("div", *charts, class_="charts"),
-        group_legend(present_groups(groups)),
-    )
+    return _margin_charts(MAIN_MARGINS, columns, groups, limits)
 
 
-def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> Html | None:
+def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> ReportSection | None:
     """All other margins; None if nothing was executed."""
     charts = _margin_charts(FURTHER_MARGINS, columns, groups, {})
     if not charts:
@@ -90,13 +80,13 @@ def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> H
         "Read these like the margins above. Forces and contact patches are those at the"
         " moment when the outcome was decided."
     )
-    return folded_section("Further margins", text, element("div", *charts, class_="charts"))
+    return ReportSection("Further margins", text, charts=charts)
 
 
 def executed_margins(
-    columns: Columns, groups: NDArray[np.int8]
+    columns: ResultRows, groups: NDArray[np.int8]
 ) -> tuple[dict[str, Array], NDArray[np.int8]]:
-    """What `margin_section` asks for, of a table of results and its groups (N,)."""
+    """What `margin_charts` asks for, of a table of results and its groups (N,)."""
     tried = columns["stage"] == Stage.EXECUTED.value
     names = [name for name in (*MAIN_MARGINS, *FURTHER_MARGINS) if name in columns]
     return {name: columns[name][tried] for name in names}, groups[tried]
@@ -132,7 +122,7 @@ def _margin_chart(
     )
 
 
-def best_section(run: Run) -> Html | None:
+def best_section(run: Run) -> ReportSection | None:
     """The best grasps and how to watch them; nothing where none was lifted."""
     per_object = 3  # Rows for each object.
     # Columns, with the decimals that tell the best grasps apart.
@@ -144,22 +134,21 @@ def best_section(run: Run) -> Html | None:
     rows = []
     for row in map(run.row, best):
         cells = [format_column_value(name, row[name], digits) for name, digits in decimals.items()]
-        id = element("td", element("code", row["id"], class_="copy"))
-        rows.append(element("tr", id, element("td", row["object"]), *number_cells(cells)))
+        rows.append([row["id"], row["object"], *cells])
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
-    return folded_section(
+    return ReportSection(
         "Best grasps",
         f"The {per_object} best grasps of each object: lifted, with the most room around the"
         " open hand (clearance), and so most likely to succeed when pose, mass and"
         " friction differ from the model. Among grasps with the same clearance (to 0.5"
         " mm) those with less slip, tilt and movement of other objects come first, then"
         " those with the larger contact patch. To watch a grasp, give its id:",
-        command(line),
-        table(head, rows, numbers=range(2, len(head))),
+        PageTable(head, rows, range(2, len(head)), "ids"),
+        command=line,
     )
 
 
-def failure_section(run: Run) -> Html | None:
+def failure_section(run: Run) -> ReportSection | None:
     """What could not be simulated and why; nothing if all could."""
     max_rows = 50  # Rows of the table of failures.
     failures = run.failures
@@ -167,8 +156,9 @@ def failure_section(run: Run) -> Html | None:
         return None
     rows = []
     for row in map(run.row, failures[:max_rows]):
-        cells = element("code", row["id"]), row["stage"], row["reason"]
-        rows.append(element("tr", *(element("td", cell) for cell in cells)))
+        rows.append([row["id"], row["stage"], row["reason"]])
     more = f" The first {max_rows} are listed." if len(failures) > max_rows else ""
     text = f"{len(failures)} grasps could not be simulated; they count as not executed.{more}"
-    return folded_section("Failures", text, table(["grasp", "stage", "reason"], rows))
+    return ReportSection(
+        "Failures", text, PageTable(["grasp", "stage", "reason"], rows, style="ids")
+    )

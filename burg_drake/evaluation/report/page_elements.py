@@ -3,23 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Outcome
 from burg_drake.evaluation.outcome_counts import member_codes
-from burg_drake.evaluation.report.charts import legend
+from burg_drake.evaluation.results_table import TextValues
 from burg_drake.visualization import (
     OUTCOME_GROUPS,
     Child as Child,
     Html as Html,
+    PageTable,
     contrast_ratio,
     element as element,
     html_document,
+    interval_mark as interval_mark,
     join as join,
+    nice_step as nice_step,
     page_style,
 )
+
+
+@dataclass(frozen=True)
+class ReportSection:
+    """A section of the report, mostly a table. Those at the end are folded on the screen.
+
+    Attributes:
+        title: its heading.
+        text: below the heading.
+        table: what the section shows ...
+        charts: ... or charts in place of it.
+        command: to be copied, above them.
+        facts: names and texts in a list.
+    """
+
+    title: str
+    text: str
+    table: PageTable | None = None
+    charts: Sequence[Html] = ()
+    command: str = ""
+    facts: Sequence[tuple[str, str]] = ()
+
 
 GROUP_CLASSES = {group.name: f"g{i}" for i, group in enumerate(OUTCOME_GROUPS)}
 """CSS class of each outcome group, as style.css uses it."""
@@ -33,12 +59,16 @@ _THEMED_COLOURS = {
 
 def style_sheet() -> str:
     """All styles of the page."""
-    sheet = page_style("burg_drake.evaluation.report", "style.css")
+    return page_style("burg_drake.evaluation.report", "style.css") + group_style()
+
+
+def group_style() -> Html:
+    """The rules of the colours of outcomes."""
     light = "".join(
         _group_rule(g.name, _THEMED_COLOURS.get(g.name, (g.hex,))[0]) for g in OUTCOME_GROUPS
     )
     dark = "".join(_group_rule(name, tones[1]) for name, tones in _THEMED_COLOURS.items())
-    return f"{sheet}{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n"
+    return Html(f"{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n")
 
 
 def _group_rule(group: str, colour: str) -> str:
@@ -81,11 +111,6 @@ def tiles(entries: list[tuple[str, Child, str]]) -> Html:
     return element("dl", *figures, class_="tiles")
 
 
-def closing_sections(*sections: Child) -> Html:
-    """The folded sections at the end; on paper they begin a new page."""
-    return element("div", *sections, class_="closer")
-
-
 def section(title: str, text: str, *content: Child) -> Html:
     """A part of the page with a heading and one sentence on what it shows."""
     return element("section", element("h2", title), element("p", text), *content)
@@ -113,11 +138,6 @@ def number_cells(values: Iterable[Child]) -> list[Html]:
     return [element("td", v, class_="number zero" if v == "·" else "number") for v in values]
 
 
-def table_row(name: Child, *cells: Child, style: str = "") -> Html:
-    """A row of a table under its name; `style` is a CSS class."""
-    return element("tr", element("th", name, scope="row"), *cells, class_=style or None)
-
-
 def command(line: str) -> Html:
     """A command to copy, broken between words only."""
     words = [element("span", word) for word in line.split(" ")]
@@ -137,7 +157,7 @@ LIFTED_GROUP = GROUP_INDICES[Outcome.LIFTED]
 """Index of the group of lifted grasps."""
 
 
-def group_indices(outcomes: NDArray[np.str_]) -> NDArray[np.int8]:
+def group_indices(outcomes: TextValues) -> NDArray[np.int8]:
     """Index into `OUTCOME_GROUPS` (N,) of each outcome (N,)."""
     return group_indices_of_codes(member_codes(outcomes, tuple(Outcome)))
 
@@ -148,13 +168,10 @@ def group_indices_of_codes(codes: NDArray[np.int8]) -> NDArray[np.int8]:
 
 
 def present_groups(groups: NDArray[np.int8]) -> list[int]:
-    """Indices of the groups that occur, best first; -1 is skipped."""
-    counts = np.bincount(groups[groups >= 0], minlength=len(OUTCOME_GROUPS))
-    return np.flatnonzero(counts).tolist()
+    """Indices of the groups that occur, best first."""
+    return [int(k) for k in np.unique(groups)]
 
 
-def group_legend(indices: Sequence[int]) -> Html:
-    """The colours of groups and their names."""
-    return legend(
-        [(GROUP_CLASSES[OUTCOME_GROUPS[k].name], OUTCOME_GROUPS[k].name) for k in indices]
-    )
+def group_legend(indices: Sequence[int]) -> list[tuple[str, str]]:
+    """CSS classes and names of groups."""
+    return [(GROUP_CLASSES[OUTCOME_GROUPS[k].name], OUTCOME_GROUPS[k].name) for k in indices]

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Outcome, Stage, atomic_write, format_count, format_percent
+from burg_drake.core import CONTESTED_CONFIDENCE, Outcome, Stage, atomic_write, format_count
 from burg_drake.evaluation.campaign_folder import LEDGER_FILE, SCENES_FOLDER, Campaign
-from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, TextValues
+from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, member_codes
 from burg_drake.evaluation.report.failure_sections import (
     CAUSE_MARGINS,
     CauseRows,
     arm_section,
-    causes_section,
     collision_section,
     disturbed_section,
     execution_section,
+    find_causes,
     reachability_section,
     rows_of_run,
 )
@@ -32,36 +32,35 @@ from burg_drake.evaluation.report.grasp_sections import (
     executed_margins,
     failure_section,
     further_margins,
-    margin_section,
+    margin_charts,
 )
 from burg_drake.evaluation.report.outcome_sections import (
-    GROUP_COLUMNS,
-    cascade_section,
-    certainty_section,
+    CERTAINTY_CLASSES,
+    CountedBar,
+    cascade_steps,
+    certainty_bars,
     cost_section,
     count_section,
-    group_row,
-    objects_section,
-    opening_section,
+    early_losses,
+    object_bars,
+    outcome_bar,
+    spread_sentences,
+    success_interval,
     worst_first,
 )
 from burg_drake.evaluation.report.page_elements import (
-    closing_sections,
-    command,
+    GROUP_CLASSES,
     group_indices,
     group_indices_of_codes,
-    header,
-    html_page,
-    number_cells,
-    section,
-    table,
-    table_row,
+    group_legend,
+    group_style,
+    present_groups,
 )
 from burg_drake.evaluation.report.pictures import (
     DRAWN_COLUMNS,
-    grasp_section,
+    instance_figures,
     object_pictures,
-    pictures_of,
+    scene_as_judged,
     scene_picture,
 )
 from burg_drake.evaluation.report.reproduction import (
@@ -75,7 +74,14 @@ from burg_drake.evaluation.run_folder import REPORT_FILE, Run
 from burg_drake.evaluation.run_summary import summarize
 from burg_drake.evaluation.table_parts import StoredRows
 from burg_drake.evaluation.trial_origin import engine_label
-from burg_drake.visualization import Child, Html, element
+from burg_drake.visualization import (
+    OUTCOME_GROUPS,
+    Html,
+    RankedShare,
+    interval_mark,
+    ranked_chart,
+    render_page,
+)
 
 
 def write_report(run: Run) -> None:
@@ -89,41 +95,63 @@ def write_report(run: Run) -> None:
 
 def report_page(run: Run) -> str:
     """The report as HTML."""
-    summary, columns = summarize(run), run.results
-    groups = group_indices(columns["outcome"])
-    disturbance = run.document.trial.get("disturbance", math.inf)
-    pictures, tried = pictures_of(run, groups), executed_margins(columns, groups)
-    title = f"{run.document.scene.name} on {run.document.station.name}"
-    return html_page(
-        f"Grasp evaluation: {title}",
-        header("Grasp evaluation", title, _about(run.document, run.document.grasps.count)),
-        _run_notice(run),
-        opening_section(summary),
-        scene_picture(pictures),
-        cascade_section(summary),
-        objects_section(summary),
-        certainty_section(summary, run.contested),
-        grasp_section(pictures),
-        causes_section(rows_of_run(columns, str(run.path))),
-        margin_section(*tried, run.document.trial),
-        reachability_section(run),
-        execution_section(summary, columns),
-        repeat_section(run),
-        closing_sections(
-            best_section(run),
-            count_section(summary),
-            arm_section(summary, columns),
-            collision_section(columns),
-            disturbed_section(columns, disturbance),
-            further_margins(*tried),
-            failure_section(run),
-            cost_section(summary),
-            provenance_section(run),
-        ),
+    summary, columns, document = summarize(run), run.rows(), run.document
+    groups = group_indices(columns.codes("outcome"))
+    disturbance = document.trial.get("disturbance", math.inf)
+    scene, tried = scene_as_judged(run), executed_margins(columns, groups)
+    closing = (
+        best_section(run),
+        count_section(summary),
+        arm_section(summary, columns),
+        collision_section(columns),
+        disturbed_section(columns, disturbance),
+        further_margins(*tried),
+        failure_section(run),
+        cost_section(summary),
+        provenance_section(run),
+    )
+    return _render_report(
+        summary,
+        title=f"{document.scene.name} on {document.station.name}",
+        about=_about(document, document.grasps.count),
+        notice=_run_notice(run),
+        scene_picture=scene_picture(scene, columns, groups) if scene else None,
+        scenes=None,
+        contested=run.contested,
+        pictures=instance_figures(scene, columns, groups) if scene else None,
+        causes=find_causes(rows_of_run(columns, str(run.path))),
+        margins=margin_charts(*tried, document.trial),
+        executed_groups=group_legend(present_groups(tried[1])),
+        reach=reachability_section(run),
+        execution=execution_section(summary, columns),
+        repeat=repeat_section(run),
+        closing=closing,
     )
 
 
-def _run_notice(run: Run) -> Html | None:
+def _render_report(summary: Summary, **values: object) -> str:
+    """The page of a run, of one scene or of many, from what differs between them."""
+    present = [g for g in OUTCOME_GROUPS if any(summary.total.outcomes[o] for o in g.outcomes)]
+    return render_page(
+        "evaluation/report/report.html.jinja",
+        group_style=group_style(),
+        interval_mark=interval_mark,
+        summary=summary,
+        interval_of_all=success_interval(summary, executed=False),
+        interval_of_executed=success_interval(summary, executed=True),
+        early_losses=early_losses(summary),
+        spread_sentences=spread_sentences(summary),
+        steps=cascade_steps(summary),
+        objects=object_bars(summary),
+        present_groups=[(GROUP_CLASSES[g.name], g.name) for g in present],
+        certainty=certainty_bars(summary),
+        certainty_legend=[(style, name) for name, style in CERTAINTY_CLASSES.items()],
+        contested_confidence=CONTESTED_CONFIDENCE,
+        **values,
+    )
+
+
+def _run_notice(run: Run) -> str:
     judged, mine = len(run.results["id"]), len(run.mine)
     parts = []
     if run.document.shard:
@@ -137,7 +165,7 @@ def _run_notice(run: Run) -> Html | None:
             f"This run is not complete: {judged} of {mine} grasps are judged. Run the"
             " command under “How to repeat it” again to continue it."
         )
-    return element("p", " ".join(parts), class_="notice") if parts else None
+    return " ".join(parts)
 
 
 def write_campaign_report(campaign: Campaign) -> None:
@@ -167,34 +195,36 @@ def campaign_page(campaign: Campaign) -> str:
     text_columns = ("id", "object", "blocker", "outcome", "stage")
     document, summary = campaign.document, summarize(campaign)
     number = len(campaign.names)
-    title = f"{format_count(number)} scene{'' if number == 1 else 's'} on {document.station.name}"
+    scenes = f"{format_count(number)} scene{'' if number == 1 else 's'}"
     names = {*MAIN_MARGINS, *FURTHER_MARGINS, *CAUSE_MARGINS, *text_columns, *DRAWN_COLUMNS}
     stored = campaign.rows(sorted(names))
-    outcomes = _member_indices(stored, "outcome", list(Outcome))
+    outcomes = member_codes(stored.codes("outcome"), tuple(Outcome))
     groups = group_indices_of_codes(outcomes)
-    executed = _member_indices(stored, "stage", list(Stage)) == list(Stage).index(Stage.EXECUTED)
+    stages = member_codes(stored.codes("stage"), tuple(Stage))
+    executed = stages == list(Stage).index(Stage.EXECUTED)
     tried = {n: stored.column(n)[executed] for n in (*MAIN_MARGINS, *FURTHER_MARGINS)}
-    return html_page(
-        f"Grasp evaluation: {title}",
-        header("Grasp evaluation of many scenes", title, _about(document)),
-        _campaign_notice(campaign, summary),
-        opening_section(summary),
-        scenes_section(
-            summary.scenes, partial(_report_link, campaign), partial(_report_command, campaign)
-        ),
-        cascade_section(summary),
-        objects_section(summary),
-        certainty_section(summary),
-        object_pictures(campaign, stored, groups),
-        causes_section(_cause_rows(campaign, stored, outcomes)),
-        margin_section(tried, groups[executed], document.trial),
-        repeat_campaign_section(campaign),
-        closing_sections(
-            count_section(summary),
-            further_margins(tried, groups[executed]),
-            cost_section(summary),
-            campaign_provenance_section(campaign),
-        ),
+    closing = (
+        count_section(summary),
+        further_margins(tried, groups[executed]),
+        cost_section(summary),
+        campaign_provenance_section(campaign),
+    )
+    return _render_report(
+        summary,
+        title=f"{scenes} on {document.station.name}",
+        about=_about(document),
+        notice=_campaign_notice(campaign, summary),
+        scene_picture=None,
+        scenes=_scene_shares(campaign, summary.scenes),
+        contested=(),
+        pictures=object_pictures(campaign, stored, groups),
+        causes=find_causes(_cause_rows(campaign, stored, outcomes)),
+        margins=margin_charts(tried, groups[executed], document.trial),
+        executed_groups=group_legend(present_groups(groups[executed])),
+        reach=None,
+        execution=None,
+        repeat=repeat_campaign_section(campaign),
+        closing=closing,
     )
 
 
@@ -207,7 +237,7 @@ def _about(document: RunDocument | CampaignDocument, count: int | None = None) -
     return ", ".join(facts)
 
 
-def _campaign_notice(campaign: Campaign, summary: Summary) -> Html | None:
+def _campaign_notice(campaign: Campaign, summary: Summary) -> str:
     parts = []
     if campaign.document.shard:
         number, _, whole = campaign.document.shard.partition("/")
@@ -218,24 +248,18 @@ def _campaign_notice(campaign: Campaign, summary: Summary) -> Html | None:
             f"This run is not complete: {judged} of {expected} grasps are judged. Run the"
             " same command again to continue it."
         )
-    return element("p", " ".join(parts), class_="notice") if parts else None
+    return " ".join(parts)
 
 
-def _report_link(campaign: Campaign, name: str) -> str | None:
-    """Where the report of a scene is, from that of all."""
+def _report_link(campaign: Campaign, name: str) -> str:
+    """Where the report of a scene is, from that of all; empty if there is none."""
     there = (campaign.folder(name) / REPORT_FILE).is_file()
-    return quote(f"{SCENES_FOLDER}/{name}/{REPORT_FILE}") if there else None
+    return quote(f"{SCENES_FOLDER}/{name}/{REPORT_FILE}") if there else ""
 
 
 def _report_command(campaign: Campaign, name: str) -> str:
     """The command that makes the report of a scene."""
     return shlex.join(["burg-drake", "report", str(campaign.folder(name))])
-
-
-def _member_indices(stored: StoredRows, name: str, members: Sequence[str]) -> NDArray[np.int8]:
-    """A column of texts (N,) as indices into the members."""
-    codes, texts = stored.codes(name)
-    return np.array([members.index(text) for text in texts], dtype=np.int8)[codes]
 
 
 def _cause_rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) -> CauseRows:
@@ -248,136 +272,45 @@ def _cause_rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int
 
     return CauseRows(
         outcomes=outcomes,
-        objects=TextValues(*stored.codes("object")),
-        blockers=TextValues(*stored.codes("blocker")),
+        objects=stored.codes("object"),
+        blockers=stored.codes("blocker"),
         margins={name: stored.column(name) for name in CAUSE_MARGINS},
         replay=replay,
     )
 
 
-class _Layout:
-    """Lengths in the chart of scenes, in SVG units."""
-
-    width = 480
-    height = 190
-    left = 44  # Edges of the plot.
-    right = 474
-    top = 8
-    bottom = 164
-
-
-def scenes_section(
-    scenes: Sequence[OutcomeCounts],
-    link: Callable[[str], str | None],
-    drill_down: Callable[[str], str],
-) -> Html:
+@dataclass(frozen=True)
+class SceneShares:
     """Success over scenes, worst first.
 
-    Args:
-        scenes: in the order of the run.
-        link: where the report of a scene is, from the page; None if it has none.
-        drill_down: the command that makes the report of a scene.
+    Attributes:
+        number: of scenes.
+        chart: a dot for each.
+        links: where the report of a scene is, from the page, by name; empty if there is none.
+        worst: the scenes that are shown with their outcomes.
+        listed: all or the worst of them, if they are too many for that.
+        command: that writes the report of one scene; empty if all have theirs.
     """
-    max_shown = 20  # Scenes that are shown with their outcomes.
+
+    number: int
+    chart: Html
+    links: Mapping[str, str]
+    worst: Sequence[CountedBar]
+    listed: Sequence[OutcomeCounts]
+    command: str
+
+
+def _scene_shares(campaign: Campaign, scenes: Sequence[OutcomeCounts]) -> SceneShares:
+    """Success over scenes, worst first."""
+    max_shown, max_listed = 20, 2000  # Scenes with their outcomes, and in the list of all.
     ranked = worst_first(scenes)
-    shown = ranked[:max_shown]
-    rows = [group_row(group, name=_scene_name(group.name, link)) for group in shown]
-    how: list[Child] = []
-    if any(link(group.name) is None for group in ranked):
-        how = [element("p", "This command writes the report of one scene:", class_="note")]
-        how.append(command(drill_down(ranked[0].name)))
-    text = (
-        "Success when executed in each scene with its 95 % interval, worst scene first."
-        " Scenes in which nothing was executed come first and have no dot."
+    links = {counts.name: _report_link(campaign, counts.name) for counts in ranked}
+    shares = [RankedShare(c.name, c.lifted, c.executed, c.interval) for c in ranked]
+    return SceneShares(
+        number=len(ranked),
+        chart=ranked_chart(shares),
+        links=links,
+        worst=[outcome_bar(counts) for counts in ranked[:max_shown]],
+        listed=ranked[:max_listed] if len(ranked) > max_shown else (),
+        command="" if all(links.values()) else _report_command(campaign, ranked[0].name),
     )
-    more = f" Below are the {max_shown} worst." if len(ranked) > max_shown else ""
-    return section(
-        "Outcomes by scene",
-        text + more,
-        ranked_chart(ranked),
-        table(["scene", *GROUP_COLUMNS], rows, numbers=(1, 3), style="stacking"),
-        *how,
-        _all_scenes(ranked, link) if len(ranked) > max_shown else None,
-    )
-
-
-def ranked_chart(ranked: Sequence[OutcomeCounts]) -> Html:
-    """A dot with its interval for each scene, from the worst on the left to the best."""
-    step = (_Layout.right - _Layout.left) / max(len(ranked), 1)
-    places = [_Layout.left + (k + 0.5) * step for k in range(len(ranked))]
-    tried = [(x, group) for x, group in zip(places, ranked, strict=True) if group.executed]
-    whiskers = "".join(
-        f"M{x:.1f} {_share_y(group.interval[0]):.1f}V{_share_y(group.interval[1]):.1f}"
-        for x, group in tried
-    )
-    marks: list[Child] = []
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-        y, text = f"{_share_y(share):.1f}", f"{100 * share:.0f} %"
-        marks += [
-            element("line", x1=_Layout.left, x2=_Layout.right, y1=y, y2=y, class_="grid"),
-            element("text", text, x=_Layout.left - 6, y=y, dy="0.35em", class_="end"),
-        ]
-    label = f"{format_count(len(ranked))} scenes, worst to best"
-    width = f"stroke-width:{min(max(0.5 * step, 0.5), 2.5):.2f}"
-    return element(
-        "svg",
-        *marks,
-        element("path", d=whiskers, class_="whiskers", style=width) if whiskers else None,
-        *_scene_dots(tried, step),
-        element("text", label, x=_Layout.left, y=_Layout.height - 6, class_="title"),
-        viewBox=f"0 0 {_Layout.width} {_Layout.height}",
-        class_="histogram ranked",
-        role="img",
-        aria_label=f"Success when executed of {_chart_description(ranked)}",
-    )
-
-
-def _scene_dots(tried: Sequence[tuple[float, OutcomeCounts]], step: float) -> list[Html]:
-    max_named = 200  # With more scenes, dots do not tell their names.
-    radius = min(max(0.35 * step, 0.8), 3.2)
-    dots = []
-    for x, group in tried:
-        share = group.lifted / group.executed
-        tip = f"{group.name}: {group.lifted} of {group.executed}, {format_percent(share)}"
-        name = element("title", tip) if len(tried) <= max_named else None
-        place = {"cx": f"{x:.1f}", "cy": f"{_share_y(share):.1f}", "r": f"{radius:.1f}"}
-        dots.append(element("circle", *([name] if name else []), **place, class_="dot"))
-    return dots
-
-
-def _chart_description(ranked: Sequence[OutcomeCounts]) -> str:
-    shares = [group.lifted / group.executed for group in ranked if group.executed]
-    if not shares:
-        return f"{len(ranked)} scenes: nothing was executed"
-    return (
-        f"{len(ranked)} scenes: from {format_percent(min(shares))} to {format_percent(max(shares))}"
-    )
-
-
-def _share_y(share: float) -> float:
-    return _Layout.bottom - (_Layout.bottom - _Layout.top) * share
-
-
-def _scene_name(name: str, link: Callable[[str], str | None]) -> Child:
-    target = link(name)
-    return name if target is None else element("a", name, href=target)
-
-
-def _all_scenes(ranked: Sequence[OutcomeCounts], link: Callable[[str], str | None]) -> Html:
-    max_listed = 2000  # Scenes that are listed.
-    rows = []
-    for group in ranked[:max_listed]:
-        share = interval = "-"
-        if group.executed:
-            low, high = (f"{100 * bound:.0f}" for bound in group.interval)
-            share, interval = format_percent(group.lifted / group.executed), f"{low} to {high} %"
-        counts = map(format_count, (group.judged, group.executed, group.lifted))
-        cells = number_cells([*counts, share, interval])
-        rows.append(table_row(_scene_name(group.name, link), *cells))
-    head = ["scene", "grasps", "executed", "lifted", "success", "95 % interval"]
-    title = f"All {format_count(len(ranked))} scenes"
-    if len(ranked) > max_listed:
-        title = f"The {format_count(max_listed)} worst of {format_count(len(ranked))} scenes"
-    summary = element("summary", element("h3", title))
-    listed = table(head, rows, numbers=(1, 2, 3, 4, 5))
-    return element("details", summary, listed, class_="screen")

@@ -22,10 +22,8 @@ from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.report.page_elements import (
     GROUP_CLASSES,
     LIFTED_GROUP,
-    group_legend,
-    present_groups,
-    section,
 )
+from burg_drake.evaluation.result_rows import ResultRows
 from burg_drake.evaluation.results_table import Columns, best_rows
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.evaluation.table_parts import StoredRows
@@ -33,7 +31,6 @@ from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.scene import Scene
 from burg_drake.visualization import (
     OUTCOME_GROUPS,
-    Child,
     FlatView,
     Html,
     SolidMesh,
@@ -49,6 +46,8 @@ from burg_drake.visualization import (
     path_data,
     project_to_ground,
     shaded_outline,
+    svg_line,
+    svg_text,
     upright_rotation,
 )
 
@@ -156,7 +155,7 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
         caption = f"{text}: {format_count(count) if count else 'none'}"
         drawn = [behind, *_strokes(grasps, mask, corners, view), _ruler(view)]
         panel = (
-            element("text", caption, x=_Layout.panel / 2, y=15, class_="panel"),
+            svg_text(caption, _Layout.panel / 2, 15, "panel"),
             element("g", *drawn, transform=f"translate(0 {_Layout.caption:g})"),
         )
         panels.append(element("g", *panel, transform=f"translate({left:g} 0)"))
@@ -199,8 +198,8 @@ def _ruler(view: FlatView) -> Html:
     text = f"{100 * _Layout.ruler:g} cm"
     return element(
         "g",
-        element("line", x1=f"{x:.1f}", x2=f"{x + length:.1f}", y1=y, y2=y),
-        element("text", text, x=f"{x + length / 2:.1f}", y=y - 4),
+        svg_line(x, y, x + length, y),
+        svg_text(text, x + length / 2, y - 4),
         class_="ruler",
     )
 
@@ -224,87 +223,117 @@ DRAWN_COLUMNS = ("id", "x", "y", "z", "qw", "qx", "qy", "qz", "width")
 """Columns that `_drawn_grasps` needs."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pictures:
-    """Data that the pictures of a run are made from.
+def scene_as_judged(run: Run) -> Scene | None:
+    """The scene of a run; None if its files, or those of its library, are gone or have changed."""
+    try:
+        scene = run.scene()
+        for name in (*scene.instances, *scene.background):
+            solid_of(scene, name)
+    except BurgError:
+        return None
+    return scene
 
-    Attributes:
+
+def scene_picture(scene: Scene, columns: ResultRows, groups: NDArray[np.int8]) -> Html:
+    """The scene with the number of grasps that lifted each object.
+
+    Args:
         scene: as it was judged.
         columns: the results.
         groups: (N,) of each row, see `group_indices`.
-        solids, fixed: surfaces of the free and the fixed instances in the scene frame, by name.
+    """
+    instances, lifted = columns.codes("instance"), groups == LIFTED_GROUP
+    notes = {}
+    for name in scene.instances:
+        mine = instances.equal(name)
+        notes[name] = f"{int((mine & lifted).sum())} of {int(mine.sum())}" if mine.any() else ""
+    free, fixed = (
+        {name: solid_of(scene, name) for name in names}
+        for names in (scene.instances, scene.background)
+    )
+    return scene_drawing(scene, free, fixed, notes)
+
+
+@dataclass(frozen=True)
+class GraspFigure:
+    """A drawing of the grasps on an object.
+
+    Attributes:
+        name: of the object, or of its instance in the scene.
+        drawing: with the grasps.
+        shown: the grasps that are drawn.
+        best: id of the best grasp; empty if there is none.
     """
 
-    scene: Scene
-    columns: Columns
-    groups: NDArray[np.int8]
-    solids: Mapping[str, SolidMesh]
-    fixed: Mapping[str, SolidMesh]
+    name: str
+    drawing: Html
+    shown: DrawnGrasps
+    best: str = ""
+
+    @property
+    def lifted(self) -> int:
+        """Number of grasps that lifted it, drawn or not."""
+        return int(self.shown.counts[LIFTED_GROUP])
+
+    @property
+    def grasps(self) -> int:
+        """Number of all grasps on it, drawn or not."""
+        return int(self.shown.counts.sum())
 
 
-def pictures_of(run: Run, groups: NDArray[np.int8]) -> Pictures | None:
-    """What to draw; nothing if the files that the run was judged with are gone or have changed."""
-    try:
-        scene = run.scene()
-        solids, fixed = (
-            {name: solid_of(scene, name) for name in names}
-            for names in (scene.instances, scene.background)
-        )
-    except BurgError:
-        return None
-    return Pictures(scene, run.results, groups, solids, fixed)
+@dataclass(frozen=True)
+class GraspFigures:
+    """Drawings of objects with their grasps.
+
+    Attributes:
+        figures: one for each object.
+        text: what they show.
+    """
+
+    figures: Sequence[GraspFigure]
+    text: str
 
 
-def scene_picture(pictures: Pictures | None) -> Html | None:
-    """The scene with how many grasps lifted each object."""
-    if pictures is None:
-        return None
-    instances, lifted = pictures.columns["instance"], pictures.groups == LIFTED_GROUP
-    notes = {}
-    for name in pictures.scene.instances:
-        mine = instances == name
-        notes[name] = f"{int((mine & lifted).sum())} of {int(mine.sum())}" if mine.any() else ""
-    drawing = scene_drawing(pictures.scene, pictures.solids, pictures.fixed, notes)
-    text = (
-        "The scene, seen from the near edge of the board, with the number of grasps that"
-        " lifted each object."
+def instance_figures(
+    scene: Scene, columns: ResultRows, groups: NDArray[np.int8]
+) -> GraspFigures | None:
+    """Each instance with its grasps; None if there are no grasps. For the arguments see
+    `scene_picture`."""
+    # Columns that `best_rows` needs.
+    ranking_columns = (
+        *("id", "instance", "object", "outcome", "clearance", "slip", "tilt", "others_moved"),
+        *("patch_area", "score", "confidence", "judged_again"),
     )
-    return element("figure", drawing, element("figcaption", text))
-
-
-def grasp_section(pictures: Pictures | None) -> Html | None:
-    """Each instance with its grasps; nothing where there are none, or no meshes any more."""
-    if pictures is None:
-        return None
-    instances = pictures.columns["instance"]
-    with_grasps = [name for name in pictures.scene.instances if (instances == name).any()]
+    instances = columns.codes("instance")
+    rows_of = {name: np.flatnonzero(instances.equal(name)) for name in scene.instances}
+    with_grasps = [name for name, rows in rows_of.items() if len(rows)]
     shown = with_grasps[:MAX_PICTURED_INSTANCES]
-    if not shown:
-        return None
-    figures, drawn = [], 0
+    figures = []
     for name in shown:
-        rows = np.flatnonzero(instances == name)
-        chosen = rows[drawn_rows(pictures.groups[rows], MAX_DRAWN_GRASPS // len(shown))]
-        figures.append(_instance_figure(pictures, name, rows, chosen))
-        drawn += len(chosen)
+        rows = rows_of[name]
+        lifted = rows[groups[rows] == LIFTED_GROUP]
+        ranking = columns.columns([key for key in ranking_columns if key in columns], lifted)
+        best = columns.cells("id", lifted[best_rows(ranking)]).tolist()
+        chosen = rows[drawn_rows(groups[rows], MAX_DRAWN_GRASPS // len(shown))]
+        drawn = columns.columns(DRAWN_COLUMNS, chosen)
+        grasps = _drawn_grasps(drawn, groups[chosen], groups[rows])
+        drawing = grasp_drawing(name, solid_of(scene, name), scene.X_SO(name), grasps)
+        figures.append(GraspFigure(name, drawing, grasps, *best))
     text = (
         "Each object as it stands in the scene: on the left with the grasps that lifted it, on"
         " the right with all others. Each fork shows the two fingers; its stem points toward"
         " the arm. Point at a grasp to see its id."
     )
-    text += _shown_text(drawn, int(np.isin(instances, shown).sum()))
+    text += _shown_text(figures)
     if len(shown) < len(with_grasps):
         text += f" The first {len(shown)} of {len(with_grasps)} objects are shown."
-    return section(
-        "The grasps",
-        text,
-        group_legend(present_groups(pictures.groups)),
-        element("div", *figures, class_="pictures"),
-    )
+    return GraspFigures(figures, text) if figures else None
 
 
-def _shown_text(drawn: int, total: int) -> str:
+def _shown_text(figures: Sequence[GraspFigure]) -> str:
     """How many grasps are drawn, if not all are."""
+    drawn = sum(len(figure.shown.ids) for figure in figures)
+    total = sum(figure.grasps for figure in figures)
     if drawn == total:
         return ""
     return f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
@@ -319,33 +348,6 @@ def drawn_rows(groups: NDArray[np.int8], most: int) -> NDArray[np.int64]:
     even = order[np.linspace(0, len(order) - 1, most).round().astype(np.int64)]
     first = [int(np.flatnonzero(groups == k)[0]) for k in np.unique(groups)]
     return np.union1d(even, np.array(first, dtype=np.int64))
-
-
-def _instance_figure(
-    pictures: Pictures, name: str, rows: NDArray[np.int64], chosen: NDArray[np.int64]
-) -> Html:
-    # Columns that `best_rows` needs.
-    ranking_columns = (
-        *("id", "instance", "object", "outcome", "clearance", "slip", "tilt", "others_moved"),
-        *("patch_area", "score", "confidence", "judged_again"),
-    )
-    columns, groups = pictures.columns, pictures.groups
-    drawn = {key: columns[key][chosen] for key in DRAWN_COLUMNS}
-    grasps = _drawn_grasps(drawn, groups[chosen], groups[rows])
-    drawing = grasp_drawing(name, pictures.solids[name], pictures.scene.X_SO(name), grasps)
-    best = best_rows(
-        {key: values[rows] for key, values in columns.items() if key in ranking_columns}
-    )
-    caption = _caption(name, grasps, len(rows))
-    if best:
-        id = str(columns["id"][rows[best[0]]])
-        caption += [", best: ", element("code", id, class_="copy")]
-    return element("figure", element("figcaption", *caption), drawing)
-
-
-def _caption(name: str, grasps: DrawnGrasps, total: int) -> list[Child]:
-    lifted = format_count(int(grasps.counts[LIFTED_GROUP]))
-    return [element("b", name), f" {lifted} of {format_count(total)} lifted"]
 
 
 def _drawn_grasps(
@@ -369,15 +371,15 @@ def _drawn_grasps(
         X_OG=X_OG,
         width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
         groups=groups,
-        counts=np.bincount(all_groups[all_groups >= 0], minlength=len(OUTCOME_GROUPS)),
+        counts=np.bincount(all_groups, minlength=len(OUTCOME_GROUPS)),
     )
 
 
 def object_pictures(
     campaign: Campaign, stored: StoredRows, groups: NDArray[np.int8]
-) -> Html | None:
-    """The objects with most grasps, each with its grasps of all scenes; nothing where there are
-    none, or no meshes any more.
+) -> GraspFigures | None:
+    """The objects with most grasps, each with its grasps of all scenes; None if there are none, or
+    no meshes any more.
 
     Args:
         campaign: the run.
@@ -393,7 +395,7 @@ def object_pictures(
     ranked = sorted(known, key=lambda k: (-numbers[k], names[k]))
     if not ranked:
         return None
-    figures, drawn, shown = [], 0, ranked[:MAX_PICTURED_INSTANCES]
+    figures, shown = [], ranked[:MAX_PICTURED_INSTANCES]
     for k in shown:
         rows = np.flatnonzero(codes == k)
         chosen = rows[drawn_rows(groups[rows], MAX_DRAWN_GRASPS // len(shown))]
@@ -401,17 +403,20 @@ def object_pictures(
         columns = {n: part.column(n).to_numpy(zero_copy_only=False) for n in DRAWN_COLUMNS}
         columns["id"] = columns["id"].astype(np.str_)
         grasps = _drawn_grasps(columns, groups[chosen], groups[rows])
-        figures.append(_object_figure(library_of[names[k]], names[k], grasps, len(rows)))
-        drawn += len(chosen)
+        library = library_of[names[k]]
+        X_SO = make_pose(upright_rotation(library.entry(names[k])))
+        surface = object_surface(library, names[k])
+        solid = SolidMesh(transform_points(X_SO, surface.vertices), surface.faces)
+        drawing = grasp_drawing(names[k], solid, X_SO, grasps)
+        figures.append(GraspFigure(names[k], drawing, grasps))
     text = (
         "Each object with its grasps from all scenes: on the left those that lifted it, on the"
         " right all others. Each fork shows the two fingers; its stem points toward the arm."
     )
-    text += _shown_text(drawn, int(numbers[shown].sum()))
+    text += _shown_text(figures)
     if len(shown) < len(ranked):
         text += f" The {len(shown)} of {len(ranked)} objects with the most grasps are shown."
-    legend = group_legend(present_groups(groups))
-    return section("The grasps", text, legend, element("div", *figures, class_="pictures"))
+    return GraspFigures(figures, text)
 
 
 def _unchanged_libraries(campaign: Campaign) -> list[ObjectLibrary]:
@@ -423,11 +428,3 @@ def _unchanged_libraries(campaign: Campaign) -> list[ObjectLibrary]:
         except BurgError:
             continue
     return found
-
-
-def _object_figure(library: ObjectLibrary, name: str, grasps: DrawnGrasps, total: int) -> Html:
-    X_SO = make_pose(upright_rotation(library.entry(name)))
-    surface = object_surface(library, name)
-    solid = SolidMesh(transform_points(X_SO, surface.vertices), surface.faces)
-    caption = element("figcaption", *_caption(name, grasps, total))
-    return element("figure", caption, grasp_drawing(name, solid, X_SO, grasps))

@@ -11,7 +11,7 @@ from typing import Any
 from burg_drake.core import format_duration, load_document, option_name
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
-from burg_drake.evaluation.report.page_elements import command, folded_section, section
+from burg_drake.evaluation.report.page_elements import ReportSection
 from burg_drake.evaluation.run_document import (
     HASH_DIGITS,
     CampaignDocument,
@@ -29,38 +29,38 @@ from burg_drake.evaluation.trial_origin import (
     without_motion,
 )
 from burg_drake.station import ENGINES, Engine, StationDocument
-from burg_drake.visualization import Html, element, join
 
 
 def reproduce_command(run: Run) -> str:
     """The command line that makes this run; for given grasps their file is among the run's."""
     document = run.document
-    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
-    words += _option_words(mode=document.mode)
-    if document.grasps.per_object is None:
-        words += ["--grasps", str(run.path / GRASPS_FILE)]
-    else:
-        words += _sampling_options(document)
-    if document.grasps.only:
-        words += ["--only", ",".join(document.grasps.only)]
-    words += _settings_options(document, run.path / STATION_FILE)
-    return shlex.join([*words, "-o", str(run.path)])
+    grasps = _sampling_options(document) or ["--grasps", str(run.path / GRASPS_FILE)]
+    words = _command_words(document, grasps, run.path / STATION_FILE)
+    return shlex.join(["burg-drake", "evaluate", document.scene.path, *words, "-o", str(run.path)])
 
 
 def reproduce_campaign_command(campaign: Campaign) -> str:
     """The command line that makes this run over many scenes; for given grasps, which it does not
     keep in one file, the one that began it."""
     document = campaign.document
-    if document.grasps.per_object is None:
+    grasps = _sampling_options(document)
+    if not grasps:
         return document.command
-    words = ["--station", document.station.path, *_option_words(mode=document.mode)]
-    words += _sampling_options(document)
+    begun = (place.folder / STATION_FILE for place in campaign.places)
+    station = next((path for path in begun if path.is_file()), None)
+    words = [*_command_words(document, grasps, station), "-o", str(campaign.path)]
+    scenes = _scene_words([entry.path for entry in document.scenes])
+    return f"burg-drake evaluate {scenes} {shlex.join(words)}"
+
+
+def _command_words(
+    document: RunDocument | CampaignDocument, grasps: list[str], station: Path | None
+) -> list[str]:
+    """The options of a command; `station` is a copy of the station's document."""
+    words = ["--station", document.station.path, *_option_words(mode=document.mode), *grasps]
     if document.grasps.only:
         words += ["--only", ",".join(document.grasps.only)]
-    begun = (place.folder / STATION_FILE for place in campaign.places)
-    words += _settings_options(document, next((path for path in begun if path.is_file()), None))
-    scenes = _scene_words([entry.path for entry in document.scenes])
-    return f"burg-drake evaluate {scenes} {shlex.join([*words, '-o', str(campaign.path)])}"
+    return words + _settings_options(document, station)
 
 
 def _scene_words(paths: Sequence[str]) -> str:
@@ -75,7 +75,10 @@ def _scene_words(paths: Sequence[str]) -> str:
 
 
 def _sampling_options(document: RunDocument | CampaignDocument) -> list[str]:
+    """How grasps were sampled; nothing if they were given."""
     grasps = document.grasps
+    if grasps.per_object is None:
+        return []
     words = _option_words(
         grasps_per_object=grasps.per_object,
         approach_angle_deg=grasps.approach_angle_deg,
@@ -128,7 +131,7 @@ MODE_MEANINGS = {
 """What a mode asks of each grasp."""
 
 
-def repeat_section(run: Run) -> Html:
+def repeat_section(run: Run) -> ReportSection:
     """The command that makes the same results again, and the settings that decide about them."""
     document = run.document
     facts = [
@@ -136,15 +139,11 @@ def repeat_section(run: Run) -> Html:
         *_common_facts(document),
         ("run", f"{document.hash} (hash of all of the above; column run of the table)"),
     ]
-    return section(
-        "How to repeat it",
-        _approach_text(document),
-        command(reproduce_command(run)),
-        _facts_list(facts),
-    )
+    line = reproduce_command(run)
+    return ReportSection("How to repeat it", _approach_text(document), command=line, facts=facts)
 
 
-def provenance_section(run: Run) -> Html:
+def provenance_section(run: Run) -> ReportSection:
     """All inputs with their hashes, settings, versions, sessions and files."""
     document = run.document
     files = (
@@ -154,10 +153,10 @@ def provenance_section(run: Run) -> Html:
     facts = [*_input_facts(document), *_setting_facts(document), *_session_facts(document)]
     facts.append(("files", files))
     text = "All inputs, the sessions in which the grasps were judged, and the files of the folder."
-    return folded_section("All settings and versions", text, _facts_list(facts))
+    return ReportSection("All settings and versions", text, facts=facts)
 
 
-def repeat_campaign_section(campaign: Campaign) -> Html:
+def repeat_campaign_section(campaign: Campaign) -> ReportSection:
     """The command that began a run over many scenes, and the settings that decide about it."""
     document = campaign.document
     scenes = [entry.path for entry in document.scenes]
@@ -171,12 +170,11 @@ def repeat_campaign_section(campaign: Campaign) -> Html:
         *_common_facts(document),
         ("run", f"{document.hash} (hash of all of that)"),
     ]
-    return section(
-        "How to repeat it", text, command(reproduce_campaign_command(campaign)), _facts_list(facts)
-    )
+    line = reproduce_campaign_command(campaign)
+    return ReportSection("How to repeat it", text, command=line, facts=facts)
 
 
-def campaign_provenance_section(campaign: Campaign) -> Html:
+def campaign_provenance_section(campaign: Campaign) -> ReportSection:
     """All settings, versions, and who worked on a run over many scenes."""
     document = campaign.document
     facts = [
@@ -185,7 +183,7 @@ def campaign_provenance_section(campaign: Campaign) -> Html:
     ]
     facts += [*_setting_facts(document), *_session_facts(document)]
     text = "All inputs except the scenes, and the sessions in which the grasps were judged."
-    return folded_section("All settings and versions", text, _facts_list(facts))
+    return ReportSection("All settings and versions", text, facts=facts)
 
 
 def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
@@ -206,11 +204,6 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
 
 def _content_text(given: Input) -> str:
     return f"{given.path}, content {given.content[:HASH_DIGITS]}"
-
-
-def _facts_list(facts: list[tuple[str, str]]) -> Html:
-    pairs = (join(element("dt", name), element("dd", fact)) for name, fact in facts)
-    return element("dl", *pairs, class_="facts")
 
 
 def _approach_text(document: RunDocument) -> str:

@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from burg_drake.core import CONTESTED_CONFIDENCE, Array, Stage
-from burg_drake.experiment.comparison.confusion_matrix import count_cells, estimate_agreement
-from burg_drake.experiment.comparison.estimates import Estimate, Flags, Values
+from burg_drake.core import CONTESTED_CONFIDENCE, Stage
+from burg_drake.experiment.comparison.confusion_matrix import (
+    Estimate,
+    Flags,
+    count_cells,
+    estimate_agreement,
+)
 from burg_drake.experiment.comparison.group_agreement import (
     FactorGroup,
     agreement_by_factor,
@@ -17,7 +21,7 @@ from burg_drake.experiment.comparison.group_agreement import (
 )
 from burg_drake.experiment.comparison.judge_assessment import replay_commands
 from burg_drake.experiment.comparison.margin_calibration import MarginCalibration, calibrate_margins
-from burg_drake.experiment.comparison.result_table import TextFactor, take_rows
+from burg_drake.experiment.comparison.result_table import ResultTable, TextFactor
 from burg_drake.experiment.comparison.verdict_pairs import (
     MEASURED_MARGINS,
     VerdictPairs,
@@ -86,27 +90,6 @@ CONFIDENCE_GROUPS = (
 """Groups of verdicts by their confidence, rising."""
 
 
-@dataclass(frozen=True, eq=False)
-class SecondVerdicts:
-    """What the second run found of N grasps.
-
-    Attributes:
-        stage: (N,) that decided.
-        judged_again: (N,) engine that gave the verdict; empty where it is the run's own.
-        confidence: (N,) of the verdict; NaN where there is none.
-        margins: (N,) numbers by name; NaN where there is none.
-    """
-
-    stage: TextFactor
-    judged_again: TextFactor
-    confidence: Array
-    margins: Mapping[str, Array]
-
-    def take(self, rows: Values) -> SecondVerdicts:
-        """Some grasps, as indices or truth values."""
-        return SecondVerdicts(*(take_rows(column, rows) for column in vars(self).values()))
-
-
 @dataclass(frozen=True, kw_only=True)
 class MarginDifference:
     """How far apart two runs measure a margin of grasps that both executed.
@@ -164,7 +147,7 @@ class RunAgreement:
 
 def assess_run_agreement(
     pairs: VerdictPairs,
-    second: SecondVerdicts,
+    second: ResultTable,
     scenes: Mapping[str, str],
     folders: Sequence[Mapping[str, str]],
     *,
@@ -174,7 +157,7 @@ def assess_run_agreement(
 
     Args:
         pairs: N grasps with the verdicts of the first run, and how they ended in the second.
-        second: what the second run found of them besides.
+        second: the N rows of the second run, with the columns `REFERENCE_COLUMNS`.
         scenes: names of the scenes by their content.
         folders: of the two runs, by content of the scene.
         seed: of the intervals' resampling.
@@ -187,7 +170,7 @@ def assess_run_agreement(
     alike = held.predicted == held.actual
     found = estimate_agreement(count_cells(held.predicted, held.actual), seed=seed)
     measured = {
-        name: np.where(np.isfinite(second.margins[name]), pairs.margins[name], np.nan)
+        name: np.where(np.isfinite(second.numbers[name]), pairs.margins[name], np.nan)
         for name in MEASURED_MARGINS
     }
     return RunAgreement(
@@ -195,8 +178,8 @@ def assess_run_agreement(
         kappa=found.kappa,
         same_rows=int(_identical_rows(pairs, second).sum()),
         objects=agreement_by_factor(held, held.object, seed=seed),
-        stages=_count_stage_pairs(pairs.stage, second.stage),
-        apart=_count_stage_pairs(pairs.stage.take(~alike), second.stage.take(~alike)),
+        stages=_count_stage_pairs(pairs.stage, second.texts["stage"]),
+        apart=_count_stage_pairs(pairs.stage.take(~alike), second.texts["stage"].take(~alike)),
         parted=parted_grasps(pairs, ~alike, scenes, folders),
         confidence=_agreement_by_confidence(held, seed),
         margins=calibrate_margins(measured, alike),
@@ -213,12 +196,14 @@ def both_executed(first: TextFactor, second: TextFactor) -> Flags:
     return one & other
 
 
-def _identical_rows(pairs: VerdictPairs, second: SecondVerdicts) -> Flags:
+def _identical_rows(pairs: VerdictPairs, second: ResultTable) -> Flags:
     """(N,) whether both runs have the same verdicts with the same numbers."""
-    same = _equal_texts(pairs.simulated, pairs.ended) & _equal_texts(pairs.stage, second.stage)
-    same &= _equal_texts(pairs.judged_again, second.judged_again)
-    numbers = [(pairs.margins[name], second.margins[name]) for name in MEASURED_MARGINS]
-    for one, other in [*numbers, (pairs.confidence, second.confidence)]:
+    same = _equal_texts(pairs.simulated, pairs.ended) & _equal_texts(
+        pairs.stage, second.texts["stage"]
+    )
+    same &= _equal_texts(pairs.judged_again, second.texts["judged_again"])
+    numbers = [(pairs.margins[name], second.numbers[name]) for name in MEASURED_MARGINS]
+    for one, other in [*numbers, (pairs.confidence, second.numbers["confidence"])]:
         same &= (one == other) | (np.isnan(one) & np.isnan(other))
     return same
 
@@ -230,14 +215,14 @@ def _equal_texts(first: TextFactor, second: TextFactor) -> Flags:
     return same
 
 
-def margin_differences(pairs: VerdictPairs, second: SecondVerdicts) -> tuple[MarginDifference, ...]:
+def margin_differences(pairs: VerdictPairs, second: ResultTable) -> tuple[MarginDifference, ...]:
     """How far apart two runs measure what both executed; margins that they never have in common are
     left out."""
     covered_share = 0.9  # Share of the differences that `MarginDifference.within` covers.
-    executed = both_executed(pairs.stage, second.stage)
+    executed = both_executed(pairs.stage, second.texts["stage"])
     found = []
     for name in MEASURED_MARGINS:
-        apart = second.margins[name][executed] - pairs.margins[name][executed]
+        apart = second.numbers[name][executed] - pairs.margins[name][executed]
         apart = apart[np.isfinite(apart)]
         if len(apart):
             size = np.abs(apart)

@@ -12,8 +12,12 @@ from typing import Any, Literal
 from burg_drake.core import MISSING_NUMBER, display_unit, format_number, outcome_label
 from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
-from burg_drake.experiment.comparison.confusion_matrix import Agreement, Paired
-from burg_drake.experiment.comparison.estimates import AGREEMENT_MEASURES, Estimate
+from burg_drake.experiment.comparison.confusion_matrix import (
+    AGREEMENT_MEASURES,
+    Agreement,
+    Estimate,
+    Paired,
+)
 from burg_drake.experiment.comparison.group_agreement import OutlierGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.margin_calibration import (

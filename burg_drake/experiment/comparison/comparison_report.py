@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
-from burg_drake.core import CONTESTED_CONFIDENCE, format_count, format_number, outcome_label
+from burg_drake.core import format_count, format_number, outcome_label
 from burg_drake.evaluation import command, folded_section, header, html_page, section, table, tiles
-from burg_drake.experiment.comparison.agreement_between_runs import MarginDifference, PartedGrasp
+from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
 from burg_drake.experiment.comparison.comparison import (
     PERCENT_MEASURES,
@@ -23,34 +23,37 @@ from burg_drake.experiment.comparison.comparison import (
     have_identical_rows,
     headline_agreement,
     headline_sentence,
-    margin_title,
+    no_outliers_sentence,
     outlier_sentence,
     population_agreement,
     population_difference_sentence,
     selection_suffix,
+    success_description,
+    too_few_trials_sentence,
     unpredictable_sentence,
 )
-from burg_drake.experiment.comparison.comparison_figures import (
-    figure_section,
-    group_section,
-    margin_section,
-    matrix_section,
-    placement_section,
-    reliability_plot,
-    standing_out_section,
-    unpredictable_section,
-)
-from burg_drake.experiment.comparison.estimates import Estimate
-from burg_drake.experiment.comparison.figure_tables import (
-    CONFIDENCE_HEADING,
+from burg_drake.experiment.comparison.comparison_findings import (
+    Named,
+    confidence_finding,
     deciding_stages,
-    labelled_row,
-    named_row,
-    number_cells,
-    run_agreement_table,
-    verdict_table,
+    group_finding,
+    margin_difference_finding,
+    margin_finding,
+    measure_finding,
+    outlier_finding,
+    parted_finding,
+    placement_finding,
+    run_agreement_finding,
+    unpredictable_finding,
+    verdict_finding,
 )
-from burg_drake.experiment.comparison.group_agreement import FactorGroup
+from burg_drake.experiment.comparison.confusion_matrix import Agreement, Estimate
+from burg_drake.experiment.comparison.finding_tables import (
+    FindingTable,
+    cross_table,
+    named_row,
+    reliability_plot,
+)
 from burg_drake.experiment.comparison.judge_assessment import Disagreement, Judgement
 from burg_drake.experiment.comparison.margin_calibration import MarginCalibration
 from burg_drake.visualization import Child, Html, element, join
@@ -171,29 +174,31 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
         judged = [("first", c.judgement), ("second", c.other)]
     if have_identical_rows(c):
         return []
-    parts = [*agreement_sections(c), matrix_section(c, judged), _difference_section(c)]
-    parts.append(figure_section(c, judged))
+    parts = [] if c.agreement is None else _agreement_sections(c, c.agreement)
+    parts += [_matrix_section(c, judged), measure_finding(c, judged).section()]
     for name, judgement in judged:
         parts += [_name_simulator(part, name) for part in _judge_sections(c, judgement, photos)]
     return parts
 
 
-def _judge_sections(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
-    right = "same verdict in both runs" if c.kind == "runs" else "right verdicts"
-    text = f"Share of {right}, precision and recall, with 95 % intervals."
-    of = selection_suffix(c)
+def _judge_sections(c: Comparison, judged: Judgement, photos: Path | None) -> list[Html | None]:
+    parts: list[Html | None] = []
+    if judged.unpredictable is not None:
+        parts.append(unpredictable_finding(judged).section())
+    if judged.standing_out:
+        parts.append(outlier_finding(judged).section())
+    elif c.kind != "runs":
+        parts.append(section("What stands out", no_outliers_sentence(judged)))
+    parts.append(group_finding(c, "object", judged.objects).section())
+    if len(judged.scenes) > 1:
+        parts.append(group_finding(c, "scene", judged.scenes).section())
     return [
-        unpredictable_section(judgement),
-        standing_out_section(judgement) if c.kind != "runs" else None,
-        group_section(f"By object{of}", text, "object", judgement.objects),
-        group_section(f"By scene{of}", text, "scene", judgement.scenes)
-        if len(judgement.scenes) > 1
-        else None,
-        placement_section(judgement, of),
-        margin_section(c, judgement),
-        stopped_section(c, judgement, of),
-        case_section(c, judgement, photos),
-        outcome_section(c, judgement, of),
+        *parts,
+        _placement_section(c, judged),
+        _margin_section(c, judged),
+        verdict_finding(c, judged).section(),
+        _case_section(c, judged, photos),
+        _outcome_section(c, judged),
     ]
 
 
@@ -202,22 +207,6 @@ def _name_simulator(part: Html | None, name: str) -> Html | None:
     if part is None or not name:
         return part
     return Html(part.replace("</h2>", f" ({name} simulator)</h2>", 1))
-
-
-def _difference_section(c: Comparison) -> Html | None:
-    """Whether one of two simulators is right more often."""
-    d = c.difference
-    if d is None or d.p_value is None or d.difference.value is None:
-        return None
-    points = bracketed_interval(d.difference, percent=True)
-    text = (
-        f"{population_difference_sentence(c)} Both are right in {d.both} of {d.trials} trials, only"
-        f" the first in {d.only_first}, only the second in {d.only_second}, neither in"
-        f" {d.neither}. In these trials the first is right {100 * d.difference.value:+.1f}"
-        f" percentage points more often {points}; McNemar's exact test of equally many right"
-        f" verdicts: p = {d.p_value:.3g}."
-    )
-    return section("Which simulator is right more often?", text.lstrip())
 
 
 def _settings_section(c: Comparison) -> Html:
@@ -235,6 +224,12 @@ def _settings_section(c: Comparison) -> Html:
         facts.append(("same id, other grasp", format_count(v.other_content)))
     facts += [(f"left out: {k.replace('_', ' ')}", format_count(n)) for k, n in v.left_out.items()]
     facts += [("differs", text) for text in c.settings]
+    d = c.difference
+    if d is not None and d.difference.value is not None:
+        points = f"{100 * d.difference.value:+.1f} percentage points"
+        points += f" {bracketed_interval(d.difference, percent=True)}"
+        text = f"first less second {points}; in both {d.both}, in neither {d.neither} trials"
+        facts.append(("right verdicts", text))
     facts.append(("intervals", f"95 %, bootstrap seed {c.seed}"))
     entries = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
     return section("What was compared", "", element("dl", *entries, class_="facts"))
@@ -255,7 +250,7 @@ def _photo_folder(c: Comparison, path: Path) -> Path | None:
     return Path(os.path.relpath(folder, path.absolute().parent))
 
 
-def case_section(comparison: Comparison, judged: Judgement, photos: Path | None) -> Html | None:
+def _case_section(comparison: Comparison, judged: Judgement, photos: Path | None) -> Html | None:
     """The wrong verdicts with the way to look at them; nothing where there are none.
 
     Args:
@@ -302,28 +297,25 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
 
 
 def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
+    found = FindingTable(style="cases")
     real = any(case.trial is not None for case in cases)
-    head = ["trial", "object", "simulated", "happened"] if real else ["object", "first", "second"]
-    head += ["offset", "note"] if real else []
-    head.append("replay")
-    rows = []
+    if real:
+        found.texts("trial", "object", "simulated", "happened", "offset", "note")
+    else:
+        found.texts("object", "first", "second")
+    found.elements("replay")
     for case in cases:
         verdict = outcome_label(case.simulated)
-        cells: list[Child] = [case.trial] if real else []
-        cells += [
-            case.object,
-            f"{verdict} ({case.blocker})" if case.blocker else verdict,
-            outcome_label(case.ended),
-        ]
+        simulated = f"{verdict} ({case.blocker})" if case.blocker else verdict
+        cells = [case.object, simulated, outcome_label(case.ended)]
         if real:
             offset = "-" if case.offset_mm is None else f"{format_number(case.offset_mm)} mm"
-            cells += [offset, _note_and_photo(case, photos)]
-        cells.append(join(*(command(line) for line in case.replays)))
-        rows.append(labelled_row(head, cells))
-    return table(head, rows, style="cases")
+            cells = [f"{case.trial}", *cells, offset, _note_and_photo(case, photos)]
+        found.row(*cells, join(*(command(line) for line in case.replays)))
+    return found.page_table()
 
 
-def _note_and_photo(case: Disagreement, photos: Path | None) -> Child:
+def _note_and_photo(case: Disagreement, photos: Path | None) -> str:
     """The note, and a link to the photo."""
     if not case.photo or photos is None:
         return case.note
@@ -331,130 +323,61 @@ def _note_and_photo(case: Disagreement, photos: Path | None) -> Child:
     return join(case.note, " " if case.note else "", link)
 
 
-def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
-    """What became of grasps by verdict and the body in the way; `of` says of which."""
-    max_rows = 30
-    more = f" The first {max_rows} of {len(judged.stopped)}."
-    more = more if len(judged.stopped) > max_rows else ""
-    text = f"For each simulated outcome: how many of these grasps succeeded.{more}"
-    if comparison.kind == "runs":
-        text = (
-            "For each outcome in the first run: how many of these grasps succeeded in the"
-            f" second run.{more}"
-        )
-    found = verdict_table(comparison, judged).html("groups", max_rows)
-    return section(f"How each verdict turned out{of}", text, found)
-
-
-def outcome_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
-    """Simulated outcomes by what happened; `of` says of which trials."""
+def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
+    """Simulated outcomes by what happened."""
     happened = sorted({name for row in judged.outcomes.values() for name in row})
-    rows = []
-    for simulated, row in judged.outcomes.items():
-        cells = [
-            element("td", row.get(name, "·"), class_="number" if name in row else "number zero")
-            for name in happened
-        ]
-        rows.append(named_row(outcome_label(simulated), *cells))
-    runs = comparison.kind == "runs"
-    head = ["first run" if runs else "simulated", *(outcome_label(n) for n in happened)]
-    judge, other = ("in simulation", "on the robot")
-    if runs:
-        judge, other = "in the first run", "in the second"
-    numbers = range(1, len(head))
-    style = "matrix" if len(head) > 6 else ""
+    rows = [
+        (outcome_label(simulated), [row.get(name, "·") for name in happened])
+        for simulated, row in judged.outcomes.items()
+    ]
+    head, judge, other = "simulated", "in simulation", "on the robot"
+    if comparison.kind == "runs":
+        head, judge, other = "first run", "in the first run", "in the second"
+    style = "matrix" if len(happened) > 5 else ""
     return folded_section(
-        f"Outcome by outcome{of}",
+        f"Outcome by outcome{selection_suffix(comparison)}",
         f"Rows: how grasps ended {judge}. Columns: how they ended {other}.",
-        table(head, rows, numbers=numbers, style=style),
+        cross_table(head, [outcome_label(name) for name in happened], rows, style),
     )
 
 
-def agreement_sections(comparison: Comparison) -> list[Html | None]:
-    """All that is known of two runs beside each other; nothing of other comparisons."""
-    found = comparison.agreement
-    if found is None:
-        return []
-    return [
-        section(
-            "Agreement on holding",
-            agreement_sentence(comparison),
-            _group_table("object", found.objects),
-        ),
-        _stage_section(found.stages, found.apart),
-        _disagreement_section(found.parted),
-        _confidence_section(found.confidence),
-        _margin_bin_section(found.margins),
-        _margin_difference_section(found.differences),
+def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Html | None]:
+    """All that is known of two runs beside each other."""
+    title, text = "Agreement on holding", agreement_sentence(comparison)
+    parts: list[Html | None] = [
+        run_agreement_finding("object", found.objects, title, text).section(),
+        _stage_section(found),
     ]
+    if found.parted:
+        parts.append(parted_finding(found.parted).section())
+    if found.confidence:
+        parts.append(confidence_finding(found.confidence).section())
+    if found.margins:
+        parts.append(_margin_bin_section(found.margins))
+    if found.differences:
+        parts.append(margin_difference_finding(found.differences).section())
+    return parts
 
 
-def _group_table(head: str, groups: Sequence[FactorGroup]) -> Html:
-    max_rows = 60  # The JSON has all.
-    return run_agreement_table(head, groups).html("groups", max_rows)
-
-
-def _stage_section(
-    stages: Mapping[str, Mapping[str, int]], apart: Mapping[str, Mapping[str, int]]
-) -> Html:
+def _stage_section(found: RunAgreement) -> Html:
     """All grasps by stage and stage, with those that only one run holds in brackets."""
-    columns, rows = deciding_stages(stages), []
-    for stage, row in stages.items():
-        cells = []
-        for name in columns:
-            count, parted = row.get(name, 0), apart.get(stage, {}).get(name, 0)
-            text = f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
-            cells.append(element("td", text, class_="number" if count else "number zero"))
-        rows.append(named_row(stage, *cells))
+    columns = deciding_stages(found.stages)
+
+    def cell(stage: str, other: str) -> Child:
+        count = found.stages[stage].get(other, 0)
+        parted = found.apart.get(stage, {}).get(other, 0)
+        return f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
+
+    rows = [(stage, [cell(stage, other) for other in columns]) for stage in found.stages]
     text = (
         "Rows: the stage that decided in the first run. Columns: in the second run. In"
         " brackets: grasps that only one of the runs holds."
     )
-    head = ["first run", *(f"{name} in the second" for name in columns)]
-    return section("Where the runs disagree", text, table(head, rows, numbers=range(1, len(head))))
+    heads = [f"{name} in the second" for name in columns]
+    return section("Where the runs disagree", text, cross_table("first run", heads, rows))
 
 
-def _disagreement_section(parted: Sequence[PartedGrasp]) -> Html | None:
-    """The first grasps that only one run holds, and how to look at them in either."""
-    max_rows = 50  # Grasps in the table; the JSON has all.
-    if not parted:
-        return None
-    head = ["grasp", "first", "second", "confidence of the first", "replay"]
-    rows = []
-    for one in parted[:max_rows]:
-        cells: tuple[Child, ...] = (
-            one.grasp,
-            outcome_label(one.first),
-            outcome_label(one.second),
-            "-" if one.confidence is None else f"{one.confidence:.3f}",
-            join(*(command(line) for line in one.replays)),
-        )
-        rows.append(labelled_row(head, cells))
-    text = (
-        f"{format_count(len(parted))} grasps. The commands show each one in the first and"
-        " in the second run."
-    )
-    if len(parted) > max_rows:
-        text += f" The first {max_rows}; the JSON has all."
-    return section("Grasps that only one of the runs holds", text, table(head, rows, style="cases"))
-
-
-def _confidence_section(groups: Sequence[FactorGroup]) -> Html | None:
-    if not groups:
-        return None
-    text = (
-        "Share of grasps on which the runs agree (both hold the object, or neither"
-        f" does), by the confidence of the first run's verdict. Below {CONTESTED_CONFIDENCE:g} a"
-        " verdict is contested."
-    )
-    return section(
-        "Do the runs disagree on contested grasps?", text, _group_table(CONFIDENCE_HEADING, groups)
-    )
-
-
-def _margin_bin_section(margins: Sequence[MarginCalibration]) -> Html | None:
-    if not margins:
-        return None
+def _margin_bin_section(margins: Sequence[MarginCalibration]) -> Html:
     text = (
         "Share of grasps on which the runs agree, in bins of about equally many grasps"
         " along the first run's margin, with Wilson's intervals. Only grasps whose"
@@ -462,27 +385,85 @@ def _margin_bin_section(margins: Sequence[MarginCalibration]) -> Html | None:
         " the engine. Line: the monotone curve that fits best; dashes: the share of all"
         " grasps."
     )
-    plots = (reliability_plot(c, "share on which the runs agree") for c in margins)
-    return section(
-        "Do the runs disagree at small margins?",
-        text,
-        element("div", *plots, class_="charts plots"),
-    )
+    plots = _plots(margins, "share on which the runs agree")
+    return section("Do the runs disagree at small margins?", text, plots)
 
 
-def _margin_difference_section(differences: Sequence[MarginDifference]) -> Html | None:
-    if not differences:
+def _plots(found: Sequence[MarginCalibration], vertical: str) -> Html:
+    plots = (reliability_plot(c, vertical) for c in found)
+    return element("div", *plots, class_="charts plots")
+
+
+def _margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
+    """What margins say about success, the most informative first; None where there are none."""
+    max_plots = 4  # Margins with a plot.
+    defined = [c for c in judged.calibration if c.auroc.value is not None]
+    found = sorted(defined, key=_distance_from_chance, reverse=True)
+    if found:
+        plots = _plots(found[:max_plots], success_description(comparison))
+        return margin_finding(comparison, found).section(plots)
+    words = too_few_trials_sentence(comparison, judged)
+    title = f"Do margins predict {success_description(comparison)}?"
+    return section(title, words) if words else None
+
+
+def _distance_from_chance(found: MarginCalibration) -> float:
+    """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
+    area = found.auroc_weighted or found.auroc
+    low, high = area.low, area.high
+    return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
+
+
+def _placement_section(comparison: Comparison, judged: Judgement) -> Html | None:
+    """Agreement by placement; None without real trials."""
+    found, p = placement_finding(comparison, judged), judged.placement
+    if found is None or p is None:
         return None
-    rows = []
-    for one in differences:
-        title, unit, size = margin_title(one.name)
-        values = (one.median, one.median_size, one.within)
-        cells = (f"{format_number(size * value)} {unit}".rstrip() for value in values)
-        rows.append(named_row(title, *number_cells([format_count(one.grasps), *cells])))
-    head = ["margin", "grasps", "median difference", "median size", "90 % within"]
-    return section(
-        "How much margins differ",
-        "Second run minus first run, for grasps that both executed; sizes are absolute"
-        " differences.",
-        table(head, rows, numbers=range(1, len(head)), style="figures"),
+    plots = _plots([c for c in (p.largest, p.target) if c.trials], "right verdicts")
+    return element("div", found.section(), plots)
+
+
+def _matrix_section(comparison: Comparison, judged: Named) -> Html:
+    """Confusion matrices of the trials, and of all grasps that they stand for."""
+    runs = comparison.kind == "runs"
+    title = "Verdicts of both runs" if runs else "Verdicts and outcomes"
+    blocks = []
+    for name, judgement in judged:
+        suffix = f", {name}" if name else ""
+        kind = "grasps" if runs else "selected trials"
+        blocks.append(_matrix_table(comparison, f"{kind}{suffix}", judgement.selected))
+        if judgement.all_grasps is not None:
+            blocks.append(_matrix_table(comparison, f"all grasps{suffix}", judgement.all_grasps))
+    text = "Rows: what the simulation predicted. Columns: what happened."
+    if runs:
+        text = "Rows: the first run. Columns: the second run."
+    if any(j.all_grasps is not None for _, j in judged):
+        text += (
+            " Each selected trial counts once; for all grasps it counts for all the"
+            " grasps that it was chosen from."
+        )
+    return section(title, text, element("div", *blocks, class_="beside"))
+
+
+def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
+    runs = comparison.kind == "runs"
+    judge, other = ("in the first", "in the second") if runs else ("predicted", "on the robot")
+
+    def cell(name: str, style: str) -> Html:
+        value = format_count(round(getattr(found, name)))
+        tip = cell_name(comparison, name)
+        return element(
+            "td", element("b", value), element("small", name.upper()), class_=style, title=tip
+        )
+
+    rows = [
+        named_row(f"{verdict} {judge}", *cells)
+        for verdict, cells in (
+            ("success", (cell("tp", "right"), cell("fp", "wrong"))),
+            ("failure", (cell("fn", "wrong"), cell("tn", "right"))),
+        )
+    ]
+    head = ["", f"success {other}", f"failure {other}"]
+    return element(
+        "div", element("h3", title[0].upper() + title[1:]), table(head, rows, style="confusion")
     )

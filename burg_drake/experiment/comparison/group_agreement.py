@@ -18,10 +18,12 @@ import numpy as np
 from burg_drake.core import Stage
 from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
+    Estimate,
+    Flags,
     count_cells_by_group,
     estimate_agreements,
+    estimate_share,
 )
-from burg_drake.experiment.comparison.estimates import Estimate, Flags, estimate_share
 from burg_drake.experiment.comparison.result_table import TextFactor
 from burg_drake.experiment.comparison.verdict_pairs import VerdictPairs
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from burg_drake.core import Array, RealOutcome
 from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
+    Flags,
     Paired,
     compare_paired,
     count_cells,
@@ -21,7 +22,6 @@ from burg_drake.experiment.comparison.confusion_matrix import (
     estimate_agreement,
     estimate_agreements,
 )
-from burg_drake.experiment.comparison.estimates import Flags
 from burg_drake.experiment.comparison.group_agreement import (
     FactorGroup,
     OutlierGroup,

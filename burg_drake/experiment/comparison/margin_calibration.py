@@ -16,7 +16,13 @@ from typing import Final, TypeVar
 import numpy as np
 
 from burg_drake.core import Z_95, Array, MarginNames
-from burg_drake.experiment.comparison.estimates import Estimate, Flags, Rows, Values, estimate_share
+from burg_drake.experiment.comparison.confusion_matrix import (
+    Estimate,
+    Flags,
+    Rows,
+    Values,
+    estimate_share,
+)
 
 MAX_ORDERED_ROWS = 20_000
 """Neighbouring trials share rows above it; this changes the ROC area by 2 / rows at most."""

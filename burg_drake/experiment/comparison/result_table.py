@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.evaluation import TEXT_COLUMNS, Columns, StoredRows
-from burg_drake.experiment.comparison.estimates import Flags, Rows, Values
+from burg_drake.experiment.comparison.confusion_matrix import Flags, Rows, Values
 
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 1 << 63, 4096).astype(np.uint64) | np.uint64(1)
 """Odd random factors of the words of a text."""
@@ -168,31 +168,16 @@ class TextFactor:
         return np.array(wanted, dtype=bool)[self.index]
 
 
-def take_rows(column: Any, rows: Values) -> Any:
-    """Some rows of a column or of several columns by name, as indices or truth values."""
-    if isinstance(column, Mapping):
-        return {name: values[rows] for name, values in column.items()}
-    return column[rows] if isinstance(column, np.ndarray) else column.take(rows)
+class StoredNumbers(dict[str, Values]):
+    """Columns of numbers in the columnar store, each read when it is first asked for."""
 
+    def __init__(self, rows: StoredRows) -> None:
+        super().__init__()
+        self._rows = rows
 
-class StoredNumbers(Mapping[str, Values]):
-    """Columns of numbers in the columnar store, read as they are asked for."""
-
-    def __init__(self, rows: StoredRows, names: Sequence[str]) -> None:
-        """Of some names."""
-        self._rows, self._names = rows, tuple(names)
-        self._read: dict[str, Values] = {}
-
-    def __getitem__(self, name: str) -> Values:
-        if name not in self._read:
-            self._read[name] = self._rows.column(name)
-        return self._read[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
+    def __missing__(self, name: str) -> Values:
+        self[name] = self._rows.column(name)
+        return self[name]
 
     def same(self, other: StoredNumbers, name: str) -> bool:
         """Whether a column of both is the same, without reading it."""
@@ -233,7 +218,7 @@ class ResultTable:
         return cls(
             IdColumn(rows.table.column("id")),
             {n: TextFactor.of_codes(*rows.codes(n)) for n in others if n in TEXT_COLUMNS},
-            StoredNumbers(rows, [n for n in others if n not in TEXT_COLUMNS]),
+            StoredNumbers(rows),
         )
 
     def same(self, other: ResultTable, name: str) -> bool:

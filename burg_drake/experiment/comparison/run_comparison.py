@@ -12,7 +12,6 @@ import numpy as np
 from burg_drake.core import Array, InvalidInputError, list_names, quote_value, suggest_names
 from burg_drake.evaluation import Campaign, Columns, Run
 from burg_drake.experiment.comparison.agreement_between_runs import (
-    SecondVerdicts,
     assess_run_agreement,
     both_executed,
 )
@@ -27,8 +26,7 @@ from burg_drake.experiment.comparison.compared_runs import (
     unpredictable_for,
 )
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
-from burg_drake.experiment.comparison.confusion_matrix import compare_paired
-from burg_drake.experiment.comparison.estimates import Flags
+from burg_drake.experiment.comparison.confusion_matrix import Flags, compare_paired
 from burg_drake.experiment.comparison.judge_assessment import (
     PLACEMENT_LIMIT_MM,
     Judgement,
@@ -353,7 +351,7 @@ def compare_runs(
         kind="runs",
         success=success,
         first=add_rejudging_engines(sides[0].side, pairs.judged_again),
-        reference=add_rejudging_engines(sides[1].side, others.judged_again),
+        reference=add_rejudging_engines(sides[1].side, others.texts["judged_again"]),
         coverage=Coverage(
             compared=len(pairs),
             only_first=found.only_first,
@@ -374,20 +372,18 @@ def pair_runs(
     found: Match,
     success: Success,
     same_mode: bool = True,
-) -> tuple[VerdictPairs, SecondVerdicts, dict[str, int]]:
-    """Pairs of verdicts of the grasps in common, what else the second run found of them, and what
-    is left out by reason: of different modes all that not both executed."""
-    others = tables[1].take(found.second, (*MEASURED_MARGINS, "confidence"))
-    ended, stage = others.texts["outcome"], others.texts["stage"]
+) -> tuple[VerdictPairs, ResultTable, dict[str, int]]:
+    """Pairs of verdicts of the grasps in common, their rows of the second run, and what is left out
+    by reason: of different modes all that not both executed."""
+    numbers = (*MEASURED_MARGINS, "confidence")
+    second = tables[1].take(found.second, numbers)
+    ended = second.texts["outcome"]
     pairs = make_pairs(
         tables[0].take(found.first, PREDICTION_NUMBERS),
         ended,
         is_success_verdict(ended, success),
         success,
     )
-    margins = {name: others.numbers[name] for name in MEASURED_MARGINS}
-    again, confidence = others.texts["judged_again"], others.numbers["confidence"]
-    second = SecondVerdicts(stage, again, confidence, margins)
     reasons: dict[str, Flags] = {}
     for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
         reasons |= {
@@ -395,7 +391,7 @@ def pair_runs(
         }
     if not same_mode:
         reason = "not executed in both runs, which have different modes"
-        reasons[reason] = ~both_executed(pairs.stage, stage)
+        reasons[reason] = ~both_executed(pairs.stage, second.texts["stage"])
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}
     for reason, rows in reasons.items():
@@ -404,7 +400,7 @@ def pair_runs(
             keep &= ~rows
     if keep.all():
         return pairs, second, left_out
-    return pairs.take(keep), second.take(keep), left_out
+    return pairs.take(keep), second.take(np.flatnonzero(keep), numbers), left_out
 
 
 def _no_common_grasps_message(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:

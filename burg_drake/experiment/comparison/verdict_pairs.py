@@ -20,7 +20,7 @@ from burg_drake.evaluation import (
     lifted_shares,
 )
 from burg_drake.experiment.comparison.compared_runs import JudgedRuns, list_scene_names
-from burg_drake.experiment.comparison.estimates import Flags, Values
+from burg_drake.experiment.comparison.confusion_matrix import Flags, Values
 from burg_drake.experiment.comparison.margin_calibration import PREDICTOR_COLUMNS
 from burg_drake.experiment.comparison.result_table import (
     GRASP_CONTENT_COLUMNS,
@@ -28,7 +28,6 @@ from burg_drake.experiment.comparison.result_table import (
     IdColumn,
     ResultTable,
     TextFactor,
-    take_rows,
 )
 from burg_drake.experiment.trials.source_runs import grasp_contents
 from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet, is_success
@@ -88,8 +87,12 @@ class VerdictPairs:
 
     def take(self, rows: Values) -> VerdictPairs:
         """Some rows, as indices or truth values."""
-        columns = {f.name: take_rows(getattr(self, f.name), rows) for f in fields(self)}
-        return VerdictPairs(**columns)
+        margins = {name: values[rows] for name, values in self.margins.items()}
+        columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "margins"}
+        for name, column in columns.items():
+            array = isinstance(column, np.ndarray)
+            columns[name] = column[rows] if array else column.take(rows)
+        return VerdictPairs(**columns, margins=margins)
 
 
 def make_pairs(

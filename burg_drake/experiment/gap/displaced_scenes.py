@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from burg_drake.core import (
     Pose,
     Units,
     inverse,
+    portable_reference,
     rng_from,
     rot_z,
     rotation_angle,
@@ -30,7 +32,7 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation import Candidates
 from burg_drake.experiment.trials.trial_sheet import ObjectPlace
-from burg_drake.scene import TOUCH_TOLERANCE, Scene, SceneIssue
+from burg_drake.scene import TOUCH_TOLERANCE, Scene, SceneIssue, save_scene
 
 
 def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
@@ -51,6 +53,17 @@ def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
         return scene
     document = replace(scene.document, instances=instances, origin=None)
     return Scene(document, scene.library, scene.path)
+
+
+def save_displaced_scene(scene: Scene, path: Path) -> None:
+    """Writes a scene as a file of its own, with its library as seen from there.
+
+    Raises:
+        InvalidInputError: it cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    library = portable_reference(scene.library.root, path.parent)
+    save_scene(replace(scene.document, library=library), path)
 
 
 def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) -> Array:

@@ -44,7 +44,6 @@ from burg_drake.core import (
     content_hash,
     ensure_writable_folder,
     load_document,
-    portable_reference,
     save_document,
     software_versions,
 )
@@ -83,9 +82,10 @@ from burg_drake.evaluation import (
 from burg_drake.experiment.gap.displaced_scenes import (
     candidates_as_commanded,
     noisy_scene,
+    save_displaced_scene,
 )
 from burg_drake.experiment.gap.gap_steps import GapDocument, GapSettings, GapStep, GapSteps
-from burg_drake.scene import Scene, SceneLike, as_scene, load_scene, save_scene
+from burg_drake.scene import Scene, SceneLike, as_scene, load_scene
 from burg_drake.station import Station, StationLike, as_station
 
 GAP_DOCUMENT_FILE = "gap.yaml"  # Settings of a gap measurement.
@@ -327,18 +327,12 @@ class _DisplacedJudging:
         )
 
     def _judge(self, candidates: Candidates, scene: Scene, number: str, folder: str) -> Run:
-        now = _save_scene(scene, self.path / "scenes" / f"{number}.yaml")
+        path = self.path / "scenes" / f"{number}.yaml"
+        save_displaced_scene(scene, path)
+        now = load_scene(path)
         moved = candidates_as_commanded(self.scene, now, candidates)
         same = _recorded_arguments(self.run) | {"grasps": group_candidates_by_instance(moved)}
         return evaluate(now, self.station, self.path / folder / number, **same, **self.options)
-
-
-def _save_scene(scene: Scene, path: Path) -> Scene:
-    """The scene as a file of its own."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    library = portable_reference(scene.library.root, path.parent)
-    save_scene(replace(scene.document, library=library), path)
-    return load_scene(path)
 
 
 @dataclass(frozen=True)
@@ -361,15 +355,10 @@ class ReachOfHandFactory:
             known = self.trials.get(grasp.id)
             if known is None or known.margins.get(MarginNames.lift_height) != grasp.lift:
                 return execute(grasp, None)
-            return decision_from_verdict(known)
+            return Decision(known.outcome, **known.of_trial())
 
         judge.stages = [(stage, recall)]
         return judge
-
-
-def decision_from_verdict(verdict: Verdict) -> Decision:
-    """The answer of a trial, from the verdict that it ended in."""
-    return Decision(verdict.outcome, **verdict.of_trial())
 
 
 def reach_verdicts(

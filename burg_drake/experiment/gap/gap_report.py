@@ -20,15 +20,12 @@ from burg_drake.evaluation import (
     html_page,
     interval_mark,
     section,
-    table,
     tiles,
 )
-from burg_drake.experiment.comparison.estimates import Estimate
-from burg_drake.experiment.comparison.figure_tables import named_row, number_cells
+from burg_drake.experiment.comparison.finding_tables import FindingTable, cross_table
 from burg_drake.experiment.gap.gap_steps import (
     Change,
     GapSteps,
-    OutcomeChange,
     StepAgreement,
     gap_changes,
     successes_by_object,
@@ -36,7 +33,7 @@ from burg_drake.experiment.gap.gap_steps import (
 from burg_drake.experiment.gap.gap_words import (
     GAP_STEP_TITLES,
     left_out_sentence,
-    reality_sentence,
+    reality_table,
     replay_arguments,
     step_sentences,
 )
@@ -81,7 +78,7 @@ def gap_page(
         objects_section(steps, success),
         *(change_section(change) for change in found),
         push_section(steps),
-        reality_section(agreement),
+        reality_table(agreement).section() if agreement and agreement[0].found.trials else None,
         _reproduction_section(steps, command_line),
     )
 
@@ -174,7 +171,7 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
     """Successes of each object in each step."""
     by_step = [successes_by_object(step, success) for step in steps.steps]
     whole = by_step[0]
-    head = ["object", "grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
+    head = ["grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
     rows = []
     for name, (_, grasps) in whole.items():
         cells: list[Child] = [grasps]
@@ -182,11 +179,11 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
             good, all = counts.get(name, (0, 0))
             share = f"{good} of {all}" if all else "-"
             cells.append(share if step.name == "placed" else good)
-        rows.append(named_row(name, *number_cells(cells)))
+        rows.append((name, cells))
     return section(
         "By object",
         "Grasps of each object that succeed in each step; in displaced scenes, successful trials.",
-        table(head, rows, numbers=tuple(range(1, len(head)))),
+        cross_table("object", head, rows),
     )
 
 
@@ -210,16 +207,14 @@ def change_section(change: Change) -> Html:
 def _flow_table(change: Change) -> Html:
     """Outcomes before and after, where they differ."""
     moved = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
-    rows = []
+    found = FindingTable().texts("before", "after").numbers("grasps").texts("in the way")
     for (before, after), count in sorted(moved.items(), key=lambda item: -item[1]):
         blockers = Counter(
             m.blocker for m in change.moves if (m.before, m.after) == (before, after) and m.blocker
         )
         by = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
-        cells = [element("td", outcome_label(outcome)) for outcome in (before, after)]
-        cells += [*number_cells([count]), element("td", by or "-", class_="faint")]
-        rows.append(element("tr", *cells))
-    return table(["before", "after", "grasps", "in the way"], rows, numbers=(2,))
+        found.row(outcome_label(before), outcome_label(after), count, by or "-")
+    return found.page_table()
 
 
 def _objects_table(change: Change) -> Html | None:
@@ -228,43 +223,33 @@ def _objects_table(change: Change) -> Html | None:
     if not lost:
         return None
     had = Counter(m.object for m in change.moves if m.lost or m.before.held)
-    rows = [
-        named_row(
-            name,
-            *number_cells([f"{count} of {had[name]}"]),
-            element("td", ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))),
-        )
-        for name, count in lost.most_common()
-        for into in [Counter(m.after for m in change.lost if m.object == name)]
-    ]
-    return table(["object", "lost", "what they become"], rows, numbers=(1,))
+    found = FindingTable().names("object").numbers("lost").texts("what they become")
+    for name, count in lost.most_common():
+        into = Counter(m.after for m in change.lost if m.object == name)
+        outcomes = ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))
+        found.row(name, f"{count} of {had[name]}", outcomes)
+    return found.page_table()
 
 
 def _change_list(change: Change) -> Html:
     """The grasps that change, and how to watch them."""
     max_rows = 40  # Grasps in the table of a step.
     moves = [*change.lost, *change.won]
-    rows = [_change_row(move) for move in moves[:max_rows]]
+    found = FindingTable(max_page_rows=max_rows)
+    found.names("grasp").texts("before", "after", "in the way", "command")
+    for move in moves:
+        before, after = outcome_label(move.before), outcome_label(move.after)
+        line = shlex.join(replay_arguments(move.run, move.grasp))
+        words = element("code", move.grasp), element("code", line, class_="copy")
+        found.row(words[0], before, after, move.blocker or "-", words[1])
     first = shlex.join(replay_arguments(moves[0].run, moves[0].grasp))
     more = f", the first {max_rows} of {len(moves)}" if len(moves) > max_rows else ""
     inside = join(
         element("p", "To watch one of them (replay also shows what was in the way):"),
         command(first),
-        table(["grasp", "before", "after", "in the way", "command"], rows),
+        found.page_table(),
     )
     return element("details", element("summary", f"Grasps that change{more}"), inside)
-
-
-def _change_row(move: OutcomeChange) -> Html:
-    line = shlex.join(replay_arguments(move.run, move.grasp))
-    return element(
-        "tr",
-        element("td", element("code", move.grasp)),
-        element("td", outcome_label(move.before)),
-        element("td", outcome_label(move.after)),
-        element("td", move.blocker or "-", class_="faint"),
-        element("td", element("code", line, class_="copy")),
-    )
 
 
 def push_section(steps: GapSteps) -> Html | None:
@@ -298,48 +283,14 @@ def push_section(steps: GapSteps) -> Html | None:
             f"{int((held & moved).sum())} of {int(moved.sum())}",
             f"{int((held & ~moved).sum())} of {int((~moved).sum())}",
         ]
-        rows.append(named_row(name, *number_cells(cells)))
+        rows.append((name, cells))
     limit = f"{1e3 * MIN_PUSH:g} mm"
-    head = ["object", "trials", f"pushed over {limit}", "median [mm]", "largest [mm]"]
+    head = ["trials", f"pushed over {limit}", "median [mm]", "largest [mm]"]
     head += ["held if pushed", "held if not"]
     return section(
         "Pushed before the hand closes",
         f"{sentence} The table counts only the object to be grasped.",
-        table(head, rows, numbers=range(1, 7)),
-    )
-
-
-def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
-    """What each step does to the agreement with the robot."""
-    if not agreement or not agreement[0].found.trials:
-        return None
-    rows = []
-    for one in agreement:
-        cells = (f"{cell:g}" for cell in one.found.cells)
-        counts: list[Child] = [one.found.trials, *cells, one.unpredictable]
-        shares = [
-            element("td", _estimate_cell(one.estimated.figure(name)), class_="estimate")
-            for name in ("precision", "recall", "accuracy")
-        ]
-        rows.append(named_row(GAP_STEP_TITLES[one.step], *number_cells(counts), *shares))
-    names = ["step", "trials", "TP", "FP", "FN", "TN", "not predictable"]
-    names += ["precision", "recall", "accuracy"]
-    return section(
-        "Compared with the robot",
-        "Real trials compared with each step's verdicts on the same grasps, with 95 %"
-        " intervals. Positive means: success is predicted (in displaced scenes: in more"
-        f" than half of them). Here {reality_sentence(agreement)}. "
-        "Not predictable are trials with a failure that the step cannot predict, for example"
-        " that the arm has no path if the step judges the hand alone.",
-        table(names, rows, numbers=range(1, 7)),
-    )
-
-
-def _estimate_cell(found: Estimate) -> Child:
-    if found.value is None or found.low is None or found.high is None:
-        return "-"
-    return join(
-        interval_mark(found.value, found.low, found.high), f" {format_percent(found.value)}"
+        cross_table("object", head, rows),
     )
 
 

@@ -8,9 +8,10 @@ from dataclasses import asdict
 from typing import Any
 
 from burg_drake.core import TextTable, format_percent, outcome_label, plain_data
-from burg_drake.evaluation import count_pushes
+from burg_drake.evaluation import count_pushes, interval_mark
 from burg_drake.experiment.comparison.comparison import bracketed_interval, json_values
-from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.comparison.confusion_matrix import Estimate
+from burg_drake.experiment.comparison.finding_tables import FindingTable
 from burg_drake.experiment.gap.gap_steps import (
     Change,
     GapDocument,
@@ -20,6 +21,7 @@ from burg_drake.experiment.gap.gap_steps import (
     successes_by_object,
 )
 from burg_drake.experiment.trials.trial_sheet import Success, is_success
+from burg_drake.visualization import Html, join
 
 GAP_STEP_TITLES: dict[StepName, str] = {
     "hand": "hand alone",
@@ -138,29 +140,36 @@ def _caption(steps: GapSteps) -> str:
     )
 
 
-def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
+def reality_table(agreement: Sequence[StepAgreement]) -> FindingTable:
     """What each step does to the agreement with the robot."""
     measures = ("precision", "recall", "accuracy")
-    table = TextTable(
-        "Compared with the robot",
-        caption=f"{reality_sentence(agreement)}; positive: success predicted",
+    sentence = reality_sentence(agreement)
+    found = FindingTable(
+        title="Compared with the robot",
+        caption=f"{sentence}; positive: success predicted",
+        text=(
+            "Real trials compared with each step's verdicts on the same grasps, with 95 %"
+            " intervals. Positive means: success is predicted (in displaced scenes: in more"
+            f" than half of them). Here {sentence}. "
+            "Not predictable are trials with a failure that the step cannot predict, for example"
+            " that the arm has no path if the step judges the hand alone."
+        ),
     )
-    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", "not predictable", *measures)
+    found.names("step").numbers("trials", "TP", "FP", "FN", "TN", "not predictable")
+    found.shares(*measures, interval=False)
     for one in agreement:
-        found = one.found
-        counts = (found.trials, *(f"{cell:g}" for cell in found.cells), one.unpredictable)
-        table.row(
-            GAP_STEP_TITLES[one.step],
-            *map(str, counts),
-            *(_share_text(one.estimated.figure(n)) for n in measures),
-        )
-    return table
+        trials, cells = one.found.trials, (f"{cell:g}" for cell in one.found.cells)
+        shares = (_share_cell(one.estimated.figure(name)) for name in measures)
+        found.row(GAP_STEP_TITLES[one.step], f"{trials}", *cells, f"{one.unpredictable}", *shares)
+    return found
 
 
-def _share_text(found: Estimate) -> str:
-    if found.value is None:
-        return "-"
-    return f"{100 * found.value:.0f} {bracketed_interval(found, percent=True)} %"
+def _share_cell(found: Estimate) -> tuple[str, Html]:
+    if found.value is None or found.low is None or found.high is None:
+        return "-", Html("-")
+    mark = interval_mark(found.value, found.low, found.high)
+    text = f"{100 * found.value:.0f} {bracketed_interval(found, percent=True)} %"
+    return text, join(mark, f" {format_percent(found.value)}")
 
 
 def gap_json(

@@ -5,17 +5,18 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from collections.abc import Sequence
+from itertools import product
 
 from burg_drake.core import Stage, TextTable, format_percent, outcome_label
-from burg_drake.evaluation import command, interval_mark, section, table
-from burg_drake.experiment.comparison.figure_tables import named_row, number_cells
-from burg_drake.experiment.gap.rejudged_trials import (
+from burg_drake.evaluation import command, interval_mark, section
+from burg_drake.experiment.comparison.finding_tables import FindingTable
+from burg_drake.experiment.gap.rejudging import (
     DISAGREEMENT_CAUSES,
     REJUDGED_TABLE_FILE,
     Rejudged,
     Rejudging,
 )
-from burg_drake.visualization import Child, Html, element, join
+from burg_drake.visualization import Html, element, join
 
 
 def rejudged_sentences(found: Rejudging) -> list[str]:
@@ -114,34 +115,31 @@ def rejudged_section(found: Rejudging) -> Html:
 
 
 def _agreement_table(found: Rejudging) -> Html:
-    rows = []
+    """How many verdicts agree with the robot."""
+    shown = FindingTable().names("verdict").numbers("right").shares("share with 95 % interval")
     cases = [("as planned", False, False), ("as measured", True, False)]
     if len(found.predictable) < len(found.judged):
         cases += [(f"{name}, with what cannot be predicted", m, True) for name, m, _ in cases]
     for name, measured, every in cases:
         whole = len(found.judged if every else found.predictable)
         count, low, high = found.agreement(measured=measured, every=every)
-        share: Child = "-"
+        share = Html("-")
         if whole:
-            share = join(
-                interval_mark(count / whole, low, high), f" {format_percent(count / whole)}"
-            )
-        counts = number_cells([f"{count} of {whole}"])
-        rows.append(named_row(name, *counts, element("td", share, class_="estimate")))
-    return table(["verdict", "right", "share with 95 % interval"], rows, numbers=(1,))
+            mark = interval_mark(count / whole, low, high)
+            share = join(mark, f" {format_percent(count / whole)}")
+        shown.row(name, f"{count} of {whole}", ("", share))
+    return shown.page_table()
 
 
 def _verdict_table(found: Rejudging) -> Html:
     """Both verdicts and reality."""
-    rows = []
-    for planned in (True, False):
-        for measured in (True, False):
-            counts = [found.table[planned, measured, real] for real in (True, False)]
-            words = ("success" if value else "failure" for value in (planned, measured))
-            texts = [element("td", word) for word in words]
-            rows.append(element("tr", *texts, *number_cells(counts)))
-    head = ["as planned", "as measured", "robot: success", "robot: failure"]
-    return table(head, rows, numbers=(2, 3))
+    shown = FindingTable().texts("as planned", "as measured")
+    shown.numbers("robot: success", "robot: failure")
+    words = {True: "success", False: "failure"}
+    for planned, measured in product((True, False), repeat=2):
+        counts = (found.table[planned, measured, real] for real in (True, False))
+        shown.row(words[planned], words[measured], *counts)
+    return shown.page_table()
 
 
 def _trial_list(found: Rejudging) -> Html | None:
@@ -152,30 +150,34 @@ def _trial_list(found: Rejudging) -> Html | None:
         "worsened": "Worsened",
         "physics": "Left to physics",
         "unpredictable": "Not predictable",
+        None: "Not judged",
     }
-    rows: list[Html] = []
-    for cause, head in headings.items():
-        chosen = [t for t in found.trials if t.cause(found.success) == cause]
-        rows += _trial_rows(chosen, head)
-    rows += _trial_rows([t for t in found.trials if t.cause(found.success) is None], "Not judged")
-    if not rows:
+    groups = {
+        head: [t for t in found.trials if t.cause(found.success) == cause]
+        for cause, head in headings.items()
+    }
+    if not any(groups.values()):
         return None
-    names = ["", "trial", "object", "planned", "as measured", "robot", "notes"]
-    return table(names, rows, numbers=(1,))
+    shown = FindingTable().texts("").numbers("trial")
+    shown.texts("object", "planned", "as measured", "robot", "notes")
+    for head, trials in groups.items():
+        _add_trials(shown, trials, head)
+    return shown.page_table()
 
 
-def _trial_rows(trials: Sequence[Rejudged], head: str) -> list[Html]:
+def _add_trials(shown: FindingTable, trials: Sequence[Rejudged], head: str) -> None:
     max_rows = 40  # Trials in a group.
-    rows = []
+    more = f" (first {max_rows} of {len(trials)})" if len(trials) > max_rows else ""
     for k, trial in enumerate(trials[:max_rows]):
-        more = f" (first {max_rows} of {len(trials)})" if len(trials) > max_rows else ""
-        measured = outcome_label(trial.outcome) if trial.outcome else trial.failure_reason
-        planned, real = outcome_label(trial.planned), outcome_label(trial.real)
-        cells: list[Child] = [trial.object, planned, measured, real, "; ".join(trial.notes)]
-        name = "" if k else f"{head}{more}"
-        texts = (element("td", cell) for cell in cells)
-        rows.append(named_row(name, *number_cells([trial.number]), *texts))
-    return rows
+        shown.row(
+            "" if k else f"{head}{more}",
+            f"{trial.number}",
+            trial.object,
+            outcome_label(trial.planned),
+            outcome_label(trial.outcome) if trial.outcome else trial.failure_reason,
+            outcome_label(trial.real),
+            "; ".join(trial.notes),
+        )
 
 
 def replay_line(found: Rejudging, row: int) -> str:

@@ -20,24 +20,11 @@ from burg_drake.experiment.lab.tried_grasps import (
     closing_text,
     point_text,
 )
-from burg_drake.experiment.trials.journal import entered_values
-from burg_drake.experiment.trials.trial_book import TrialBook, TrialChanged
+from burg_drake.experiment.trials.trial_book import TrialBook, TrialChanged, entered_values
 from burg_drake.experiment.trials.trial_sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
 
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""
-
-
-class EntryConflict(InvalidInputError):
-    """Somebody else has entered something else meanwhile.
-
-    Attributes:
-        trial: as it stands now.
-    """
-
-    def __init__(self, message: str, trial: RealTrial) -> None:
-        super().__init__(message)
-        self.trial = trial
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +80,7 @@ class LabBook:
             The trial as it stands then.
 
         Raises:
-            EntryConflict: the trial is neither as `entry.replaces` says nor as the entry says, and
+            TrialChanged: the trial is neither as `entry.replaces` says nor as the entry says, and
                 the entry was never written before.
             BurgError: there is no such trial, or the file cannot be read or written.
         """
@@ -167,11 +154,11 @@ class LabBook:
         return cached[1], cached[2]
 
 
-def _conflict(trial: RealTrial) -> EntryConflict:
+def _conflict(trial: RealTrial) -> TrialChanged:
     what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
     who = f" by {trial.operator}" if trial.operator else ""
     message = f"trial {trial.number} was changed by someone else: it now has {what}{who}"
-    return EntryConflict(message, trial)
+    return TrialChanged(message, trial)
 
 
 def _entered_values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:

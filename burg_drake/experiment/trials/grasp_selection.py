@@ -389,7 +389,7 @@ def select_grasps(
                 ranked = _random_order(pool, members[stratum.label], selection.seed)
                 chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
     notes = (
-        [f"{unknown} grasps have no {_balancing_quantity(selection)} and are left out"]
+        [f"{unknown} grasps have no {selection.margin or 'probability'} and are left out"]
         if unknown
         else []
     )
@@ -433,10 +433,6 @@ def _make_strata(
         )
         for label in sorted(members)
     }
-
-
-def _balancing_quantity(selection: Selection) -> str:
-    return selection.margin or "probability"
 
 
 def _random_order(pool: EligibleGrasps, members: Sequence[int], seed: int) -> list[int]:

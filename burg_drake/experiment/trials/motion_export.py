@@ -10,23 +10,18 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from burg_drake.core import (
-    STARTING_PHASE,
     InvalidInputError,
     Listener,
     Outcome,
-    Progress,
-    ProgressMeter,
     Reporter,
     Verdict,
     atomic_write,
-    default_workers,
     ensure_writable_folder,
     remove_unfinished,
     require_name,
@@ -39,7 +34,7 @@ from burg_drake.evaluation import (
     Run,
     arm_settings,
     input_of,
-    judge_all,
+    plan_into_folder,
     plans_document,
     read_motion,
     settings_numbers,
@@ -142,12 +137,13 @@ def export_trials(
     rows: dict[int, ExportedMotion] = {}
     with Reporter(progress) as reporter:
         for own, (factory, candidates) in jobs:
-            verdicts = _judge_candidates(
-                factory, candidates, retry_failed, workers or default_workers(), reporter
+            plans = factory.plans
+            assert isinstance(plans, TrialPlans)
+            verdicts = plan_into_folder(
+                plans, candidates, factory, workers or None, reporter, retry_failed=retry_failed
             )
-            assert isinstance(factory.plans, TrialPlans)
             for trial in own:
-                rows[trial.number] = _make_row(trial, verdicts[trial.grasp], factory.plans)
+                rows[trial.number] = _make_row(trial, verdicts[trial.grasp], plans)
     found = [rows[trial.number] for trial in sheet.trials]
     atomic_write(out / MOTION_INDEX_FILE, _index_csv(found))
     return found
@@ -190,29 +186,6 @@ def _make_judge_factory(
     return ReachJudgeFactory(scene, station, motion, True, plans), candidates
 
 
-def _judge_candidates(
-    factory: ReachJudgeFactory,
-    candidates: Candidates,
-    retry_failed: bool,
-    workers: int,
-    reporter: Reporter,
-) -> dict[str, Verdict]:
-    """Verdicts by grasp id; each is on disk at once."""
-    folder = factory.plans
-    assert folder is not None
-    with folder.opened() as journal:
-        known = folder.finished(retry_failed=retry_failed)
-        left = [candidate for candidate in candidates if candidate.id not in known]
-        known_already = len(candidates) - len(left)
-        begin = Progress(STARTING_PHASE, known_already, len(candidates), unit="trials")
-        pace = ProgressMeter(reporter.show, begin, "planning")
-        with closing(judge_all(left, factory, workers=workers)) as judged:
-            for candidate, verdict in judged:
-                journal.append(candidate.id, verdict)
-                pace.step(outcome=verdict.outcome)
-    return folder.verdicts()
-
-
 def _make_row(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> ExportedMotion:
     plan = plans.plan(trial.grasp)
     failed = verdict.outcome is Outcome.SIMULATION_FAILED
@@ -253,9 +226,8 @@ def _require_export_folder(out: Path) -> None:
 
 def _index_csv(rows: Sequence[ExportedMotion]) -> str:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(ExportedMotion)])
-    for row in rows:
-        cells = vars(row).values()
-        writer.writerow(["" if cell is None else cell for cell in cells])
+    names = [field.name for field in fields(ExportedMotion)]
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(map(vars, rows))
     return text.getvalue()

@@ -13,9 +13,9 @@ import os
 from itertools import count
 from pathlib import Path
 
-from burg_drake.cameras import Placement, PlacementCheck, save_placement
+from burg_drake.cameras import CheckedScene, Placement, PlacementCheck, save_placement
 from burg_drake.core import FileLimits, InvalidInputError, Pose, atomic_write, read_bytes
-from burg_drake.experiment.trials.journal import lock_trials_file
+from burg_drake.experiment.trials.trial_book import lock_trials_file
 from burg_drake.experiment.trials.trial_sheet import ObjectPlace, RealTrial, TrialSheet
 from burg_drake.scene import Scene
 
@@ -26,24 +26,16 @@ def summarize_placements(check: PlacementCheck) -> dict[str, ObjectPlace]:
     return {name: _summarize_placement(placement) for name, placement in check.instances.items()}
 
 
-def require_scene_of_check(
-    check: PlacementCheck, sheet: TrialSheet, trial: RealTrial, where: str
+def require_scene_of_trial(
+    scene: Scene | CheckedScene, sheet: TrialSheet, trial: RealTrial, where: str
 ) -> None:
-    """Refuses a placement check of another scene than that of a trial.
-
-    Raises:
-        InvalidInputError: it is of another one.
-    """
-    expected = sheet.runs[trial.run].scene
-    if check.scene.content != expected.content:
-        raise InvalidInputError(
-            f"{where} is of scene {check.scene.name!r} ({check.scene.content[:12]}), but"
-            f" trial {trial.number} is on {expected.name!r} ({expected.content[:12]})"
-        )
-
-
-def require_same_scene(scene: Scene, sheet: TrialSheet, trial: RealTrial) -> None:
     """Refuses another scene than that of a trial.
+
+    Args:
+        scene: of a file or of a placement check.
+        sheet: the trials.
+        trial: the trial.
+        where: the file of the scene or of the check, for the message.
 
     Raises:
         InvalidInputError: it is another one.
@@ -51,8 +43,8 @@ def require_same_scene(scene: Scene, sheet: TrialSheet, trial: RealTrial) -> Non
     expected = sheet.runs[trial.run].scene
     if scene.content != expected.content:
         raise InvalidInputError(
-            f"{scene.path} is not the scene of trial {trial.number}, {expected.name!r}:"
-            f" its content is {scene.content[:12]}, not {expected.content[:12]}"
+            f"{where} is of scene {scene.name!r} ({scene.content[:12]}), but"
+            f" trial {trial.number} is on {expected.name!r} ({expected.content[:12]})"
         )
 
 

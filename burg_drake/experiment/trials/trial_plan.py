@@ -36,8 +36,8 @@ from burg_drake.experiment.trials.grasp_selection import (
     list_eligible_grasps,
     select_grasps,
 )
-from burg_drake.experiment.trials.journal import entered_values, journal_path, read_entries
 from burg_drake.experiment.trials.source_runs import grasp_contents, make_source_run
+from burg_drake.experiment.trials.trial_book import entered_values, journal_path, read_entries
 from burg_drake.experiment.trials.trial_sheet import (
     Balance,
     RealTrial,

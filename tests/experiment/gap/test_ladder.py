@@ -32,8 +32,8 @@ from burg_drake.experiment import (
     grasp_contents,
     measure_gap,
     push_section,
-    reality_section,
     reality_sentence,
+    reality_table,
     step_sentences,
     tried_grasps,
 )
@@ -334,8 +334,8 @@ def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known
     assert hand.all_grasps.cells == pytest.approx((5, 5, 90, 0))
     assert hand.estimated.accuracy.value == pytest.approx(0.05)
     assert hand.estimated.recall.value == pytest.approx(5 / 95)
-    page = reality_section([hand])
-    assert page is not None and "estimated for the 100 grasps" in page and " 5.0 %" in page
+    page = reality_table([hand]).section()
+    assert "estimated for the 100 grasps" in page and " 5.0 %" in page
 
 
 def test_the_page_shows_all_sections(ladder: GapSteps) -> None:

@@ -14,12 +14,12 @@ import pytest
 from burg_drake.cameras import FrameProcessor, Intrinsics, LocatedFrame, PlacementCheck, open_source
 from burg_drake.core import InvalidInputError, RealOutcome, make_pose
 from burg_drake.experiment import (
-    EntryConflict,
     LabBook,
     LabCamera,
     LabEntry,
     RealTrial,
     TrialBook,
+    TrialChanged,
     TriedRuns,
     entry_states,
     load_trials,
@@ -69,7 +69,7 @@ def test_a_late_copy_does_not_undo_a_correction(lab: LabBook, trials: Path) -> N
 def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     mine, theirs = entry(lab, 1, "lifted"), entry(lab, 1, "slipped", operator="CD")
     lab.enter(theirs)
-    with pytest.raises(EntryConflict, match="now has slipped by CD"):
+    with pytest.raises(TrialChanged, match="now has slipped by CD"):
         lab.enter(mine)
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
     lab.enter(replace(mine, replaces=trial_state_hash(load_trials(trials).trial(1))))
@@ -91,7 +91,7 @@ def test_what_another_program_enters_in_between_is_not_replaced(
 
     mine = entry(lab, 1, "lifted")
     monkeypatch.setattr(lab_book, "trial_state_hash", seen)
-    with pytest.raises(EntryConflict, match="changed by someone else: it now has dropped"):
+    with pytest.raises(TrialChanged, match="changed by someone else: it now has dropped"):
         lab.enter(mine)
     trial = load_trials(trials).trial(1)
     assert (trial.outcome, trial.photo) == (RealOutcome.DROPPED, "photos/001.png")

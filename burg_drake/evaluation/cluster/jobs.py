@@ -1,0 +1,287 @@
+"""Work that the workers of a cluster share: grasps of a job, or calls of a function."""
+
+from __future__ import annotations
+
+import pickle
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core import BurgError, Outcome, SimulationError, Stage, Verdict
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.bundle import Bundle, make_recipe
+from burg_drake.evaluation.cluster.worker_tasks import (
+    CallAnswer,
+    ChunkAnswers,
+    ClusterCall,
+    ClusterTask,
+    GraspChunk,
+)
+from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, WorkerLimits
+
+
+class ChunkSettings:
+    """How many grasps travel together, and how often a grasp or a call is sent."""
+
+    max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
+    max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
+
+
+@dataclass(eq=False)
+class ClusterWorker:
+    """A worker.
+
+    Attributes:
+        address: where it is.
+        threads: number of chunks that it works on at a time.
+        chunks: those that it has, the first ones first.
+        job: the one that it works on.
+    """
+
+    address: str
+    threads: int
+    chunks: list[SentChunk] = field(default_factory=list)
+    job: ClusterJob | None = None
+
+    @property
+    def load(self) -> float:
+        """Chunks a thread."""
+        return len(self.chunks) / self.threads
+
+
+@dataclass(eq=False)
+class SentChunk:
+    """Grasps or a call that a worker has.
+
+    Attributes:
+        job: what they belong to.
+        items: grasps, or the argument of the call.
+        losses: workers that were lost at the one item before.
+        worker: the worker.
+        future: of Dask.
+        done: whether the worker has done it; the answer may be lost with it nonetheless.
+    """
+
+    job: ClusterJob
+    items: tuple[Any, ...]
+    losses: int = 0
+    worker: ClusterWorker = field(init=False)
+    future: Any = field(init=False)
+    done: bool = field(init=False, default=False)
+
+
+class ClusterJob(ABC):
+    """Items of work that need the same bundle.
+
+    Attributes:
+        what: the bundle is for, as messages name it.
+        bundle: the bundle; None if none is needed.
+        waiting: items that no worker has.
+        suspects: items at which a worker was lost, with the number of workers; each of them is
+            sent alone.
+        sent: number of chunks that workers have.
+        failed: whether it is given up.
+        deliveries: how often its bundle was sent, by the worker's address.
+    """
+
+    max_items = 1
+    """Items in a chunk, at most."""
+    result_timeout = 60.0
+    """Seconds for a result: it may have many megabytes, or its worker may be lost."""
+
+    def __init__(self, what: str, bundle: Bundle | None, items: Iterable[Any]) -> None:
+        self.what, self.bundle = what, bundle
+        self.waiting: deque[Any] = deque(items)
+        self.suspects: deque[tuple[Any, int]] = deque()
+        self.sent = 0
+        self.failed = False
+        self.deliveries: Counter[str] = Counter()
+
+    @abstractmethod
+    def task(self, run: str, items: Sequence[Any]) -> ClusterTask:
+        """What a worker is sent for items.
+
+        Raises:
+            BurgError: they cannot be sent.
+        """
+
+    @abstractmethod
+    def read_answer(self, chunk: SentChunk, answer: Any) -> Iterator[Any]:
+        """Yields the results of a chunk from the answer of its task."""
+
+    @abstractmethod
+    def failure(self, item: Any, error: BurgError) -> Any:
+        """The result of an item that has no other."""
+
+    @property
+    def left(self) -> int:
+        """Number of items that no worker has."""
+        return len(self.waiting) + len(self.suspects)
+
+    def take_chunk(self, places: int) -> SentChunk:
+        """Takes items for a chunk, fewer as the end comes near.
+
+        Args:
+            places: number of chunks into which the items that are left could go.
+        """
+        if self.suspects:
+            item, losses = self.suspects.popleft()
+            return SentChunk(self, (item,), losses)
+        size = min(self.max_items, -(-len(self.waiting) // places))
+        return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
+
+    def take_back(self, chunk: SentChunk) -> None:
+        """Takes the items of a chunk back, as none of them was begun."""
+        if self.failed:
+            return
+        if chunk.losses:
+            self.suspects.appendleft((chunk.items[0], chunk.losses))
+        else:
+            self.waiting.extendleft(reversed(chunk.items))
+
+    def suspect(
+        self,
+        chunk: SentChunk,
+        items: Sequence[Any] | None = None,
+        what: str = "were lost while working on it",
+    ) -> Iterator[Any]:
+        """Takes items back that a lost worker had or that it left out. Each of them is sent alone
+        next time, as it may be the cause.
+
+        Args:
+            chunk: that it had.
+            items: those of the chunk; all if None.
+            what: the last workers did, for the reason of the failure.
+
+        Yields:
+            Results of items at which too many workers were lost.
+        """
+        if self.failed:
+            return
+        items, losses = chunk.items if items is None else items, chunk.losses + 1
+        if losses < ChunkSettings.max_losses:
+            self.suspects.extend((item, losses) for item in items)
+            return
+        error = SimulationError(f"{losses} workers of the cluster {what}, one after the other")
+        for item in items:
+            yield self.failure(item, error)
+
+    def give_up(self) -> None:
+        """Drops the items that no worker has."""
+        self.failed = True
+        self.waiting.clear()
+        self.suspects.clear()
+
+
+class GraspJob(ClusterJob):
+    """Grasps that are judged on the cluster; see `executor.Executor.judge`.
+
+    Attributes:
+        job: the job.
+        crashes_in_a_row: grasps that ended their children since one was judged.
+    """
+
+    max_items = ChunkSettings.max_grasps
+    result_timeout = 3.0  # Seconds; the worker may be lost by now.
+
+    def __init__(self, job: Job, limits: WorkerLimits, on_failure: OnFailure | None) -> None:
+        """Packs the scene of a job.
+
+        Raises:
+            BurgError: see `make_bundle`.
+        """
+        self._recipe, bundle = make_recipe(job.make_judge)
+        super().__init__(f"the scene {job.key!r}", bundle, job.candidates)
+        self.job = job
+        self.crashes_in_a_row = 0
+        self._limits, self._on_failure = limits, on_failure
+
+    def task(self, run: str, items: Sequence[Candidate]) -> GraspChunk:
+        """See `ClusterJob.task`."""
+        return GraspChunk(run, self._recipe.bundle, self._recipe, tuple(items), self._limits)
+
+    def read_answer(self, chunk: SentChunk, answer: ChunkAnswers) -> Iterator[Answer]:
+        """See `ClusterJob.read_answer`; the job fails after too many crashes in a row."""
+        judged = set()
+        for place, verdict in answer.verdicts:
+            judged.add(place)
+            yield self.job, chunk.items[place], verdict
+            self.crashes_in_a_row = self.crashes_in_a_row + 1 if place in answer.crashing else 0
+            if self.crashes_in_a_row >= self._limits.hopeless:
+                self.fail(
+                    SimulationError(
+                        f"{self._limits.hopeless} grasps in a row could not be simulated;"
+                        f" the reason of the last one: {verdict.reason}"
+                    )
+                )
+        if answer.error is not None:
+            self.fail(answer.error)
+        open_ones = [grasp for k, grasp in enumerate(chunk.items) if k not in judged]
+        yield from self.suspect(chunk, open_ones, "gave no answer about it")
+
+    def failure(self, item: Candidate, error: BurgError) -> Answer:
+        """See `ClusterJob.failure`."""
+        failed = Outcome.SIMULATION_FAILED
+        return self.job, item, Verdict(failed, Stage.CLEAR, reason=str(error), interrupted=True)
+
+    def fail(self, error: BurgError) -> None:
+        """Gives the job up, and reports that once."""
+        if not self.failed:
+            self.give_up()
+            report_failure(JobFailed(self.job, error), self._on_failure)
+
+
+def report_failure(failure: JobFailed, on_failure: OnFailure | None) -> None:
+    """Tells of a job that failed; raises its error if there is nobody to tell."""
+    if on_failure is None:
+        raise failure.error
+    on_failure(failure)
+
+
+def grasp_jobs(
+    jobs: Iterable[Job | None], limits: WorkerLimits, on_failure: OnFailure | None
+) -> Iterator[GraspJob | None]:
+    """Packs jobs as they are asked for; None where none is ready yet."""
+    for job in jobs:
+        if job is None:
+            yield None
+        elif job.candidates:
+            try:
+                packed = GraspJob(job, limits, on_failure)
+            except BurgError as error:
+                report_failure(JobFailed(job, error), on_failure)
+            else:
+                yield packed
+
+
+class CallJob(ClusterJob):
+    """Calls of a function, one for each piece of work; see `dask_executor.map_on_cluster`."""
+
+    def __init__(
+        self,
+        function: Callable[[Any, Path], Any],
+        work: Sequence[Any],
+        bundle: Bundle,
+        pack: Callable[[Any], Any],
+    ) -> None:
+        super().__init__("the files that its work needs", bundle, work)
+        self._function, self._pack = function, pack
+        self._bundle_name = bundle.name
+
+    def task(self, run: str, items: Sequence[Any]) -> ClusterCall:
+        """See `ClusterJob.task`."""
+        (work,) = items
+        packed = pickle.dumps((self._function, self._pack(work)))
+        return ClusterCall(run, self._bundle_name, packed)
+
+    def read_answer(self, chunk: SentChunk, answer: CallAnswer) -> Iterator[tuple[Any, Any]]:
+        """See `ClusterJob.read_answer`."""
+        result = pickle.loads(answer.result) if answer.error is None else answer.error
+        yield chunk.items[0], result
+
+    def failure(self, item: Any, error: BurgError) -> tuple[Any, BurgError]:
+        """See `ClusterJob.failure`."""
+        return item, error

@@ -1,0 +1,168 @@
+"""The results of a run in little memory: what repeats, or does not exist, takes no room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Verdict
+from burg_drake.evaluation.candidates import Candidates
+from burg_drake.evaluation.results_table import (
+    TEXT_COLUMNS,
+    Columns,
+    ColumnValues,
+    TextValues,
+    arrange_columns,
+    code_texts,
+    grasp_columns,
+)
+from burg_drake.evaluation.trial_origin import TrialOrigin
+
+CHUNK_ROWS = 1 << 14
+"""Rows whose columns are made at a time."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResultRows(Mapping[str, ColumnValues]):
+    """The table of judged grasps, N rows in the order of the candidates.
+
+    A column is made when it is asked for.
+
+    Attributes:
+        candidates: all grasps of the run.
+        places: (N,) which of them are judged.
+        chunks: by column, what is kept of `CHUNK_ROWS` rows each; nothing of columns that follow
+            from the candidates.
+    """
+
+    candidates: Candidates
+    places: NDArray[np.int64]
+    chunks: Sequence[Mapping[str, ColumnValues | TextValues | None]]
+
+    @classmethod
+    def of(
+        cls,
+        candidates: Candidates,
+        places: NDArray[np.int64],
+        verdicts_of: Callable[[NDArray[np.int64]], Sequence[Verdict]],
+        origin: TrialOrigin,
+        *,
+        instances: Sequence[str],
+        joints: int = 0,
+    ) -> ResultRows:
+        """Makes the table.
+
+        Args:
+            candidates: the grasps.
+            places: (N,) which of them are judged, ascending.
+            verdicts_of: reads the verdicts about some of them.
+            origin, instances, joints: see `make_columns`.
+        """
+        chunks = []
+        for begin in range(0, max(1, len(places)), CHUNK_ROWS):
+            rows = places[begin : begin + CHUNK_ROWS]
+            columns = arrange_columns(
+                dict.fromkeys(grasp_columns(candidates, rows[:0])),
+                verdicts_of(rows),
+                origin,
+                instances=instances,
+                joints=joints,
+            )
+            kept = {n: None if values is None else _pack(values) for n, values in columns.items()}
+            chunks.append(kept)
+        return cls(candidates=candidates, places=places, chunks=chunks)
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.places)
+
+    def __len__(self) -> int:
+        return len(self.chunks[0])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.chunks[0])
+
+    def __getitem__(self, name: str) -> ColumnValues:
+        parts = [self._cells(k, name) for k in range(len(self.chunks))]
+        if len(parts) > 1 and all(values.strides == (0,) for values in parts):
+            first = parts[0][:1]
+            if all((values[:1] == first).all() for values in parts):
+                return np.broadcast_to(first[0], len(self.places))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def codes(self, name: str) -> TextValues:
+        """A column of texts as numbers, and the texts that they stand for, as they come up."""
+        places: dict[str, int] = {}
+        found = []
+        for k, chunk in enumerate(self.chunks):
+            kept = chunk[name]
+            values = kept if isinstance(kept, TextValues) else code_texts(self._cells(k, name))
+            into = [places.setdefault(text, len(places)) for text in values.names]
+            found.append(np.array(into, dtype=np.min_scalar_type(len(places)))[values.codes])
+        return TextValues(np.concatenate(found), tuple(places))
+
+    @property
+    def run(self) -> NDArray[np.int64]:
+        """(N,) zeros, as all rows are of one run; see `StoredRows.run`."""
+        return np.broadcast_to(np.int64(0), self.count)
+
+    def is_text(self, name: str) -> bool:
+        """Whether a column has texts."""
+        kept = self.chunks[0][name]
+        return isinstance(kept, TextValues) or self._cells(0, name).dtype.kind == "U"
+
+    def column(self, name: str) -> ColumnValues:
+        """A column; NaN, or empty texts, if there is none."""
+        if name in self:
+            return self[name]
+        return np.full(self.count, "" if name in TEXT_COLUMNS else np.nan)
+
+    def columns(self, names: Sequence[str], rows: NDArray[np.int64] | None = None) -> Columns:
+        """Several columns, of all rows or of some (M,)."""
+        return {name: self[name] if rows is None else self.cells(name, rows) for name in names}
+
+    def cells(self, name: str, rows: NDArray[np.int64]) -> ColumnValues:
+        """A column of some rows (M,)."""
+        rows = np.asarray(rows, dtype=np.int64)
+        if self.chunks[0][name] is None:
+            return grasp_columns(self.candidates, self.places[rows], [name])[name]
+        chunk = rows // CHUNK_ROWS
+        order = np.argsort(chunk, kind="stable")
+        parts = [
+            self._cells(k, name)[rows[order[chunk[order] == k]] - k * CHUNK_ROWS]
+            for k in np.unique(chunk).tolist()
+        ]
+        found = np.concatenate(parts) if parts else self._cells(0, name)[:0]
+        return found[np.argsort(order, kind="stable")]
+
+    def parts(self) -> Iterator[Columns]:
+        """The table in pieces, one after the other."""
+        for k, chunk in enumerate(self.chunks):
+            yield {name: self._cells(k, name) for name in chunk}
+
+    def _cells(self, k: int, name: str) -> ColumnValues:
+        """A column of a chunk."""
+        kept = self.chunks[k][name]
+        if kept is None:
+            rows = self.places[k * CHUNK_ROWS : (k + 1) * CHUNK_ROWS]
+            return grasp_columns(self.candidates, rows, [name])[name]
+        if isinstance(kept, TextValues):
+            texts: ColumnValues = np.array(kept.names, dtype=np.str_)[kept.codes]
+            return texts
+        return kept
+
+
+def _pack(values: ColumnValues) -> ColumnValues | TextValues:
+    """What is kept of a column: one number for all rows if there are no others, texts once each."""
+    if not len(values) or values.strides == (0,):
+        return values
+    if values.dtype.kind == "U":
+        found = code_texts(values)
+        return TextValues(found.codes.astype(np.min_scalar_type(len(found.names))), found.names)
+    if values.tobytes() == values[:1].tobytes() * len(values):
+        return np.broadcast_to(values[0].copy(), len(values))
+    return values
