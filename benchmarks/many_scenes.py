@@ -114,7 +114,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
         size = sum(map(len, lines))
         state = SceneState(scene=name, state="done", run=document.hash, grasps=grasps, mine=grasps)
         ledger.note(replace(state, sampling=5.0, size=size))
-        writer.take(name, run)
+        writer.add_rows(name, run)
     writer.close()
     return load_campaign(folder)
 

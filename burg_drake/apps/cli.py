@@ -1,7 +1,7 @@
 """The command `burg-drake`: the table of its commands, the parser, exit codes and error messages.
 
 Exit codes: 0 success; 1 finished, with failures to report; 2 the input cannot be used; 130
-interrupted by Ctrl-C. Only the module of the command that is asked for is imported.
+interrupted by Ctrl-C. Only the module of the given command is imported.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ OPTION_DESTINATIONS = {
     "out": ("output",),
     "folder": ("output",),
 }
-"""Names in the parsed arguments of library arguments that are called differently there."""
+"""Names in the parsed arguments of library parameters that have other names there."""
 
 
 class Verb(NamedTuple):
@@ -169,7 +169,7 @@ COMMANDS = {
 
 @cache
 def build_parser() -> Parser:
-    """The parser of the whole command, of which a process needs one."""
+    """The parser of the whole command, built once per process."""
     parser = Parser(
         prog="burg-drake",
         description="Find out which grasps a robot can execute: in simulation, on a printed board,"
@@ -221,9 +221,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             from burg_drake.apps.commands.completion import complete_line
 
             complete_line(build_parser())
-        if isinstance(sys.stdout, io.TextIOWrapper):  # not every terminal knows all characters
+        if isinstance(sys.stdout, io.TextIOWrapper):  # the terminal may lack some characters
             sys.stdout.reconfigure(errors="backslashreplace")
-    # pyarrow's own allocator gives memory back again and again, which costs more than the reading
+    # pyarrow's own allocator returns memory so often that it takes longer than the reading
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     words = sys.argv[1:] if argv is None else argv
     arguments = build_parser().parse_args(words)
@@ -231,7 +231,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run_command(arguments)
     except KeyboardInterrupt:
-        if argv is None:  # the process ends: further Ctrl-C, of an impatient user, change nothing
+        if argv is None:  # the process ends; ignore further Ctrl-C
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _print_error(
             "interrupted" + getattr(arguments, "after_interrupt", ""), interrupted_code
@@ -248,27 +248,27 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_command(arguments: argparse.Namespace) -> int:
-    """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again; for verbs
-    that go on later SIGTERM, which batch systems send, is one, too."""
-    goes_on = hasattr(arguments, "after_interrupt")
+    """Runs a command. Raises `KeyboardInterrupt` in place of any exception that it has caused.
+    For resumable commands SIGTERM, which batch systems send, is an interrupt, too."""
+    is_resumable = hasattr(arguments, "after_interrupt")
     try:
-        with sigterm_as_interrupt() if goes_on else contextlib.nullcontext():
+        with sigterm_as_interrupt() if is_resumable else contextlib.nullcontext():
             code = int(arguments.run(arguments))
         sys.stdout.flush()
         return code
     except Exception as error:
-        behind: BaseException | None = error
-        while behind is not None:  # modules in C++ end an interrupted import by an ImportError
-            if isinstance(behind, KeyboardInterrupt):
-                raise behind from None
-            behind = behind.__cause__ or behind.__context__
+        cause: BaseException | None = error
+        while cause is not None:  # an interrupted import of a C++ module raises ImportError
+            if isinstance(cause, KeyboardInterrupt):
+                raise cause from None
+            cause = cause.__cause__ or cause.__context__
         raise
 
 
 def _describe_error(
     error: BurgError | MemoryError | ImportError, arguments: argparse.Namespace
 ) -> str | None:
-    """What a user can do something about, with the options that an error is about; else None."""
+    """The message of an error that a user can fix, with the options concerned; else None."""
     if isinstance(error, BurgError):
         names = (OPTION_DESTINATIONS.get(name, (name,)) for name in error.arguments)
         flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
@@ -284,7 +284,7 @@ def _describe_error(
 
 
 def _print_error(message: str, code: int) -> int:
-    """Says in one line of printable text how it ended."""
+    """Prints an error message in one line of printable text; returns the exit code."""
     max_word_length = 300  # Characters. Longer words, such as paths, are shortened.
     _drop_unread_output()
     sys.stdout.flush()
@@ -297,9 +297,9 @@ def _print_error(message: str, code: int) -> int:
 
 
 def _drop_unread_output() -> bool:
-    """Whether nobody reads our output any more, as of `burg-drake ... | head`; it is then dropped.
+    """Drops the output if its reader is gone, as in `burg-drake ... | head`; returns whether.
 
-    What is left of it would otherwise raise an error when Python ends.
+    Buffered output would otherwise raise an error when Python ends.
     """
     try:
         output = sys.stdout.fileno()

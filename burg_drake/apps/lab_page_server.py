@@ -51,11 +51,11 @@ def parse_lab_entry(body: dict[str, Any], plan: str) -> LabEntry:
     """The entry in the body of a request.
 
     Args:
-        body: what was sent.
-        plan: of the trials file that is served.
+        body: JSON object of the request.
+        plan: of the served trials file.
 
     Raises:
-        RequestError: a field is unknown, missing, or no such value; another plan.
+        RequestError: a field is unknown, missing or invalid, or the plan is another one.
     """
     for name, value in body.items():
         if name not in ENTRY_FIELDS:
@@ -85,10 +85,10 @@ def parse_lab_entry(body: dict[str, Any], plan: str) -> LabEntry:
 
 
 def parse_trial_number(body: dict[str, Any]) -> int:
-    """`number` of a request that is about a trial.
+    """The `number` of the trial in a request.
 
     Raises:
-        RequestError: there is none.
+        RequestError: it is missing or invalid.
     """
     number = body.get("number")
     if not _has_type(int, number):
@@ -103,11 +103,11 @@ def _has_type(kind: type, value: Any) -> bool:
 
 
 def _require_line(name: str, value: str) -> None:
-    """Refuses what is too long, and what is not a text: parts of characters, control characters."""
+    """Refuses text that is too long, or has lone surrogates or control characters."""
     max_lengths = {"note": 2000, "operator": 100}  # Characters. Other fields have at most 64.
-    most = max_lengths.get(name, 64)
-    if len(value) > most:
-        raise _bad_request(f"{name} has {len(value)} characters; at most {most}")
+    max_length = max_lengths.get(name, 64)
+    if len(value) > max_length:
+        raise _bad_request(f"{name} has {len(value)} characters; at most {max_length}")
     if any(0xD800 <= ord(c) < 0xE000 or (ord(c) < 32 and c not in "\n\t") for c in value):
         raise _bad_request(f"{name} has characters that are no text")
 
@@ -166,8 +166,8 @@ class LabServer(PageServer):
         camera: over the board, if there is one.
         host: address to listen on; only this machine can reach the default.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
-        secret: of the cookie of browsers on other machines, for one that outlives the process; a
-            new one if None.
+        secret: for the cookies of browsers on other machines, so that they stay valid after a
+            restart; a new one if None.
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
@@ -211,12 +211,12 @@ class LabServer(PageServer):
 
     @property
     def url(self) -> str:
-        """Address of the page for the next browser; with a token, good for one alone, if other
-        machines can reach it."""
+        """Address of the page for the next browser; with a token for one browser if other machines
+        can reach the page."""
         return super().url if self.token is None else f"{super().url}?token={self.token.token}"
 
     def admit(self, request: Request) -> str:
-        """This machine is meant, and the browser was admitted or brings the token."""
+        """Accepts a request for this machine with a valid cookie or token."""
         super().admit(request)
         if self.token is None or self.token.admits(request_header(request, "Cookie") or ""):
             return ""
@@ -231,7 +231,7 @@ class LabServer(PageServer):
         return self.token.set_cookie
 
     def _answer_refusal(self, request: Request, error: Exception) -> Response:
-        """An entry that another one came before is answered with that one."""
+        """The answer to a refused action; if the trial was recorded before, with that entry."""
         if isinstance(error, TrialChanged):
             answer = {"error": str(error), "entry": entry_data(error.trial)}
             return json_response(answer, HTTPStatus.CONFLICT)

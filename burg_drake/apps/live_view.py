@@ -43,11 +43,11 @@ def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> d
 
     Args:
         live: the session.
-        actions: on it.
-        after: events up to this number are left out.
+        actions: on the session.
+        after: number of the last event that is left out.
 
     Returns:
-        Plain data without NaN; what is not known is None.
+        JSON data without NaN; None for unknown values.
     """
     scene, recording = live.processor.scene, actions.recording
     style = live.processor.style
@@ -110,20 +110,20 @@ def _placement_status(check: PlacementCheck, style: OverlayStyle) -> dict[str, A
 
 
 def placement_row(placed: Placement, style: OverlayStyle) -> dict[str, Any]:
-    """One object's row: distance and turn, with their standard deviations."""
-    off = None if placed.displacement is None else 1e3 * math.hypot(*placed.displacement)
+    """The row of an object: distance and turn, with their standard deviations."""
+    distance_mm = None if placed.displacement is None else 1e3 * math.hypot(*placed.displacement)
     turn = None if placed.angle is None else math.degrees(placed.angle)
     sd = placed.displacement_sd
     within = (
-        off is not None
-        and off <= 1e3 * style.tolerance
+        distance_mm is not None
+        and distance_mm <= 1e3 * style.tolerance
         and abs(turn or 0.0) <= math.degrees(style.angle_tolerance)
     )
     return {
         "status": placed.status,
         "reason": placed.reason,
         "within": within,
-        "mm": off,
+        "mm": distance_mm,
         "xy_mm": placed.displacement and [1e3 * d for d in placed.displacement],
         "sd_mm": None if sd is None else 1e3 * math.hypot(*sd),
         "deg": turn,
@@ -152,10 +152,10 @@ class ViewServer(PageServer):
 
     Args:
         live: the session.
-        actions: on it.
+        actions: on the session.
         host: address to listen on; only this machine can reach the default.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
-        connections: that are served at a time.
+        connections: maximum number served at a time.
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
@@ -241,13 +241,13 @@ class ViewServer(PageServer):
 def finish_script(
     live: LiveSession, actions: ViewActions, *, check: bool, snapshot: str | None
 ) -> None:
-    """Tells what was found, and does what is to be done with the last frame that gave a pose.
+    """Prints a summary of a scripted session, and checks or saves the last frame with a pose.
 
     Args:
         live: the session, closed.
-        actions: on it.
-        check: measure how far objects are off.
-        snapshot: folder for a snapshot, if one is wanted.
+        actions: on the session.
+        check: whether to measure the placement errors of objects.
+        snapshot: folder for a snapshot; None for no snapshot.
     """
     located, counts = live.last_located, live.counts
     if located is None:
@@ -272,7 +272,7 @@ def finish_script(
 
 
 def placement_exit_code(live: LiveSession) -> int:
-    """The exit code of a script; says why if no frame gave a pose."""
+    """The exit code of a scripted session; prints why if no frame gave a pose."""
     if live.counts.valid:
         return 0
     reason = live.counts.reason or live.reader.fault or "no image arrived"
@@ -281,7 +281,7 @@ def placement_exit_code(live: LiveSession) -> int:
 
 
 def placement_lines(check: PlacementCheck, style: OverlayStyle) -> list[str]:
-    """A placement check in words, a line an object."""
+    """A placement check as text, one line per object."""
     if not check.instances:
         return [f"placement: {check.reason}"]
     width = max(map(len, check.instances))
@@ -306,5 +306,5 @@ def _placement_row_text(row: dict[str, Any]) -> str:
 
 
 def _standard_deviation_text(sd: float | None, before: str = ",") -> str:
-    """A standard deviation behind its value; nothing where it is not known."""
+    """Text of a standard deviation, to follow its value; empty if unknown."""
     return "" if sd is None else f"{before} ± {sd:.2f}"

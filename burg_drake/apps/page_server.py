@@ -1,6 +1,6 @@
-"""The HTTP server of local pages: connections, their deadlines and places, requests and answers.
+"""The HTTP server of local pages: connections, their limits and timeouts, requests and answers.
 
-Requests are not trusted: what cannot be read is refused with a message.
+Requests are not trusted: unreadable ones are refused with a message.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ REFUSAL_TIMEOUT = 2.0  # Seconds for the request of a surplus connection.
 def json_response(
     data: Any, code: int = HTTPStatus.OK, headers: Mapping[str, str] | None = None
 ) -> Response:
-    """An answer with JSON; what no UTF-8 can tell, as names of files may hold, is escaped."""
+    """A JSON response; lone surrogates, which file names may contain, are escaped."""
     return Response(json.dumps(data, allow_nan=False), code, headers, "application/json")
 
 
 def get_route(path: str, answer: Callable[[Request], Response]) -> Route:
-    """A GET request that is answered in a thread of its own."""
+    """The route of a GET request, answered in its own thread."""
     return Route(path, answer, methods=["GET"])
 
 
 def post_route(path: str, act: Callable[[dict[str, Any]], dict[str, Any]]) -> Route:
-    """A POST request: what is done, in a thread of its own, with the JSON object that was sent, and
-    the JSON object of the answer."""
+    """The route of a POST request: `act` takes the JSON object of the request, in its own thread,
+    and returns the JSON object of the answer."""
 
     async def answer(request: Request) -> Response:
         return json_response(await run_in_threadpool(act, await _read_json_body(request)))
@@ -62,10 +62,10 @@ def post_route(path: str, act: Callable[[dict[str, Any]], dict[str, Any]]) -> Ro
 
 
 def file_routes(folder: str, pages: Mapping[str, tuple[str, str]]) -> list[Route]:
-    """The files of a page.
+    """The routes of the files of a page.
 
     Args:
-        folder: of `burg_drake.apps`, in which they are.
+        folder: of the files, in `burg_drake.apps`.
         pages: file name and content type by path.
     """
 
@@ -77,10 +77,10 @@ def file_routes(folder: str, pages: Mapping[str, tuple[str, str]]) -> list[Route
 
 
 async def _read_json_body(request: Request) -> dict[str, Any]:
-    """The JSON object of a POST; a form of another site cannot send that type.
+    """The JSON object of a POST request; forms of other sites cannot send this content type.
 
     Raises:
-        RequestError: another type, too long, or no JSON object.
+        RequestError: the body has another type, is too long, or is not a JSON object.
     """
     max_body = 10_000  # Bytes.
     kind = request.headers.get("Content-Type", "").partition(";")[0]
@@ -99,10 +99,10 @@ async def _read_json_body(request: Request) -> dict[str, Any]:
 
 
 def parse_picture_number(request: Request, name: str = "after") -> int:
-    """A picture's number in the query, such as `after=N`; 0 without.
+    """A picture number in the query, such as `after=N`; 0 if there is none.
 
     Raises:
-        RequestError: no number, or one that no picture has.
+        RequestError: it is not a valid picture number.
     """
     text = request.query_params.get(name, "0")
     if not _is_number(text):
@@ -118,10 +118,10 @@ def _is_number(text: str) -> bool:
 
 
 def request_header(request: Request, name: str) -> str | None:
-    """A header; None without.
+    """The value of a header; None if there is none.
 
     Raises:
-        RequestError: it is given twice, and would mean one thing here and another thing there.
+        RequestError: the header is given twice, which servers read in different ways.
     """
     values = request.headers.getlist(name)
     if len(values) > 1:
@@ -130,46 +130,46 @@ def request_header(request: Request, name: str) -> str | None:
 
 
 class _Connection(H11Protocol):
-    """An open connection: of which address, whether it has a place, and its deadlines."""
+    """An open connection with its address, its state and its deadline."""
 
     places: ConnectionPlaces
     state: Literal["new", "admitted", "refused"] = "new"
     _deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Takes a place, or is refused."""
+        """Takes a place, or refuses the connection."""
         super().connection_made(transport)
         self.address = _address_key(self.client[0] if self.client else "127.0.0.1")
         self.places.add(self)
-        self._expect_within(REFUSAL_TIMEOUT if self.state == "refused" else REQUEST_TIMEOUT)
+        self._set_deadline(REFUSAL_TIMEOUT if self.state == "refused" else REQUEST_TIMEOUT)
 
     def data_received(self, data: bytes) -> None:
-        """Bounds the time for a whole request, and not only that between two bytes."""
+        """Limits the time for a whole request, not only that between two bytes."""
         is_next = self.cycle is not None and self.cycle.response_complete
         if self._deadline is None and is_next:
-            self._expect_within(REQUEST_TIMEOUT)
+            self._set_deadline(REQUEST_TIMEOUT)
         super().data_received(data)
         if self.cycle is not None and not self.cycle.more_body:
-            self._expect_within(None)
+            self._set_deadline(None)
 
     def pause_writing(self) -> None:
-        """Bounds the time for the client to receive what waits to be sent."""
+        """Limits the time for the client to receive the buffered data."""
         super().pause_writing()
-        self._expect_within(IDLE_TIMEOUT)
+        self._set_deadline(IDLE_TIMEOUT)
 
     def resume_writing(self) -> None:
-        """The client received it."""
+        """Ends the time limit after the client has received the data."""
         super().resume_writing()
-        self._expect_within(None)
+        self._set_deadline(None)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Makes room for the next connection."""
-        self._expect_within(None)
+        """Frees the place of the connection."""
+        self._set_deadline(None)
         self.places.remove(self)
         super().connection_lost(exc)
 
-    def _expect_within(self, seconds: float | None) -> None:
-        """Closes the connection after this many seconds, in place of the deadline that it had."""
+    def _set_deadline(self, seconds: float | None) -> None:
+        """Replaces the deadline of the connection; None for no deadline."""
         if self._deadline is not None:
             self._deadline.cancel()
         abort = self.transport.abort
@@ -190,20 +190,20 @@ def _address_key(host: str) -> str:
 
 
 class ConnectionPlaces:
-    """The connections that are open, of which not more than a number are served.
+    """The open connections, with a limit on how many are served.
 
-    A connection is admitted with its first request that is not refused. Where there are too many
-    connections, those that are not admitted yet make room, so that they lock nobody out.
+    A connection is admitted by its first accepted request. If there are too many connections, one
+    that is not yet admitted is closed, so that idle ones lock nobody out.
 
     Args:
-        limit: connections that are served at a time.
+        limit: maximum number of connections served at a time.
     """
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
         self._open: dict[Any, _Connection] = {}  # By address and port, in the order of arrival.
 
-    def of(self, request: Request) -> _Connection | None:
+    def connection_of(self, request: Request) -> _Connection | None:
         """The connection of a request; None if it was closed."""
         return self._open.get(request.scope["client"])
 
@@ -217,20 +217,20 @@ class ConnectionPlaces:
         self._open[connection.client] = connection
 
     def remove(self, connection: _Connection) -> None:
-        """Forgets a connection that is closed."""
+        """Removes a closed connection."""
         self._open.pop(connection.client, None)
 
     def _make_room(self, address: str) -> bool:
-        """Whether one more connection from an address can be served. If there are too many, this
-        closes one that is not admitted."""
-        browser_connections = 6  # Most connections that a browser opens to one server.
+        """Whether one more connection from an address can be served. If there are too many, closes
+        one that is not admitted."""
+        browser_connections = 6  # Maximum number of connections from a browser to one server.
         served = [c for c in self._open.values() if c.state != "refused"]
         own = [c for c in served if c.address == address]
         share = max(browser_connections, self.limit // 2)
-        most = self.limit if address == LOOPBACK_KEY else share
-        if len(own) < most and len(served) < self.limit:
+        address_limit = self.limit if address == LOOPBACK_KEY else share
+        if len(own) < address_limit and len(served) < self.limit:
             return True
-        waiting = [c for c in (own if len(own) >= most else served) if c.state == "new"]
+        waiting = [c for c in (own if len(own) >= address_limit else served) if c.state == "new"]
         if not waiting:
             return False
         counts = Counter(c.address for c in waiting)
@@ -241,21 +241,20 @@ class ConnectionPlaces:
 
 
 class PageServer:
-    """Serves a page in a thread of its own until it is closed.
+    """Serves a page in its own thread until it is closed.
 
     Args:
         routes: of the page.
         host: address to listen on.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
-        connections: that are served at a time, half as many for one address of another machine
-            (but what a browser needs); where all are admitted the next ones are told so, with
-            status 503.
+        connections: maximum number served at a time; half as many, but at least six, for one
+            address of another machine. If all are admitted, further ones get status 503.
 
     Attributes:
         first_port: the first port that is tried.
-        title: of what is served, for messages.
+        title: of the page, for messages.
         policy: the Content-Security-Policy of every answer.
-        refused_code: status of the answer where an action is refused by a `BurgError`.
+        refused_code: status of the answer if an action raises a `BurgError`.
         host: as given.
         server_address: address and port that it listens on.
 
@@ -295,7 +294,7 @@ class PageServer:
             log_level="error",
             access_log=False,
             server_header=False,
-            proxy_headers=False,  # a request does not say itself where it comes from
+            proxy_headers=False,  # headers about the client's address are not trusted
             timeout_keep_alive=IDLE_TIMEOUT,  # type: ignore[arg-type]
             timeout_graceful_shutdown=1,
         )
@@ -313,7 +312,7 @@ class PageServer:
         return core.page_url(self.host, self.server_address[1])
 
     def start(self) -> None:
-        """Begins to serve."""
+        """Starts serving."""
         self._thread.start()
 
     def close(self) -> None:
@@ -324,13 +323,13 @@ class PageServer:
         self._socket.close()
 
     def admit(self, request: Request) -> str:
-        """Refuses a request that does not mean this machine, whatever it asks for.
+        """Refuses a request whose headers name another host.
 
         Returns:
-            The cookie that the answer brings along; empty if none.
+            The cookie to set with the answer; empty if none.
 
         Raises:
-            RequestError: it is refused.
+            RequestError: the request is refused.
         """
         header, is_page = partial(request_header, request), request.scope["path"] == "/"
         core.require_local_host(header, served=self.host, is_page=is_page)
@@ -339,7 +338,7 @@ class PageServer:
     async def _answer(
         self, request: Request, answer: Callable[[Request], Awaitable[Response]]
     ) -> Response:
-        """Answers a request that is admitted; the headers of all answers."""
+        """Answers an admitted request, and adds the headers of all answers."""
         common = {**core.SECURITY_HEADERS, "Content-Security-Policy": self.policy}
         try:
             cookie = self._admit_connection(request)
@@ -347,14 +346,14 @@ class PageServer:
             if cookie:
                 response.headers["Set-Cookie"] = cookie
         except core.RequestError as error:
-            # its body may not have been read
+            # the body of the request may not have been read
             response = json_response({"error": str(error)}, error.code, {"Connection": "close"})
         for name, value in common.items():
             response.headers.setdefault(name, value)
         return response
 
     def _admit_connection(self, request: Request) -> str:
-        """The cookie that the answer brings along.
+        """Admits the connection of a request; returns the cookie to set with the answer.
 
         Raises:
             RequestError: the request is refused.
@@ -364,7 +363,7 @@ class PageServer:
         if request.method not in ("GET", "POST"):
             raise core.RequestError(HTTPStatus.NOT_IMPLEMENTED, "send GET or POST")
         cookie = self.admit(request)
-        connection = self._places.of(request)
+        connection = self._places.connection_of(request)
         if connection is None or connection.state == "refused":
             raise core.RequestError(
                 HTTPStatus.SERVICE_UNAVAILABLE,
@@ -375,10 +374,10 @@ class PageServer:
         return cookie
 
     def _answer_refusal(self, request: Request, error: Exception) -> Response:
-        """The answer to an action that is refused by a `BurgError`."""
+        """The answer to an action that raised a `BurgError`."""
         return json_response({"error": str(error)}, self.refused_code)
 
 
 def _no_route(request: Request, error: Exception) -> Response:
-    """Raises the error of a path that nobody answers."""
+    """Raises the error for a path without a route."""
     raise core.RequestError(HTTPStatus.NOT_FOUND, f"there is no {request.scope['path'][:100]}")

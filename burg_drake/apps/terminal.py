@@ -1,4 +1,4 @@
-"""Terminal output and Meshcat views of commands, and how commands end that run until Ctrl-C."""
+"""Terminal output and Meshcat views of commands, and their reaction to Ctrl-C and SIGTERM."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def print_warning(text: str) -> None:
 
 
 def print_note_lines(notes: Iterable[str]) -> None:
-    """Prints notes on the results, a line each."""
+    """Prints notes on the results, one per line."""
     for note in notes:
         print(f"note: {note}")
 
@@ -43,9 +43,9 @@ def show_progress(
     """Shows the progress of a job on standard error until the block is left.
 
     Args:
-        phase: what is being done, such as `sampling`.
-        unit: what is counted.
-        total: how many there are; 0 if that is not known.
+        phase: name of the job, such as `sampling`.
+        unit: of the counted things.
+        total: their number; 0 if unknown.
         quiet: show nothing.
     """
     with core.Reporter(not quiet) as reporter:
@@ -55,11 +55,11 @@ def show_progress(
 def wait_for_interrupt() -> NoReturn:
     """Waits, in the main thread, for Ctrl-C; see `sigterm_as_interrupt`.
 
-    The system may deliver a signal in any thread. Python handles it in the main thread, which that
-    does not wake: a wait without end would sleep on.
+    The system may deliver a signal in any thread. Python handles it in the main thread, which the
+    signal does not wake from a wait without timeout.
 
     Raises:
-        KeyboardInterrupt: that is how it ends.
+        KeyboardInterrupt: at Ctrl-C.
     """
     poll_interval = 0.5  # Seconds between checks for an interrupt.
     while True:
@@ -67,7 +67,7 @@ def wait_for_interrupt() -> NoReturn:
 
 
 def sigterm_as_interrupt() -> contextlib.AbstractContextManager[None]:
-    """SIGTERM ends as Ctrl-C does, so that what is open is finished."""
+    """Makes SIGTERM act like Ctrl-C, so that commands finish cleanly."""
     return _handle_signal(signal.SIGTERM, signal.default_int_handler)
 
 
@@ -78,7 +78,7 @@ def ignore_interrupts() -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def _handle_signal(number: signal.Signals, handler: Any) -> Iterator[None]:
-    """Handles a signal in another way, if this is the main thread."""
+    """Replaces the handler of a signal during the block, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -90,7 +90,7 @@ def _handle_signal(number: signal.Signals, handler: Any) -> Iterator[None]:
 
 
 def print_legend(legend: Sequence[visualization.LegendEntry | visualization.ColorBar]) -> None:
-    """Prints what colours stand for; of numbers their histogram, the bar and its numbers."""
+    """Prints the legend of colours; for numbers a histogram, the colour bar and its ticks."""
     from rich.console import Console
     from rich.text import Text
 
@@ -104,12 +104,12 @@ def print_legend(legend: Sequence[visualization.LegendEntry | visualization.Colo
 
 
 def _color_bar_lines(bar: visualization.ColorBar, with_colors: bool) -> list[Text]:
-    columns_per_bin = 2  # Columns of the terminal that a bin of a colour bar takes.
+    columns_per_bin = 2  # Terminal columns per bin of a colour bar.
     block_characters = " ▁▂▃▄▅▆▇█"
     from rich.text import Text
 
-    most = max(1, *bar.counts)
-    levels = [-(-count * (len(block_characters) - 1) // most) for count in bar.counts]  # rounded up
+    peak = max(1, *bar.counts)
+    levels = [-(-count * (len(block_characters) - 1) // peak) for count in bar.counts]  # rounded up
     histogram, colors = Text(), Text()
     for level, color in zip(levels, bar.colors, strict=True):
         histogram.append(block_characters[level] * columns_per_bin, style=color)
@@ -120,10 +120,11 @@ def _color_bar_lines(bar: visualization.ColorBar, with_colors: bool) -> list[Tex
 
 
 def tick_line(ticks: Sequence[tuple[float, str]], width: int) -> str:
-    """Numbers below a bar of `width` columns, each below its place, as far as there is room.
+    """The line of tick labels below a bar of `width` columns, as far as there is room.
 
     Args:
-        ticks: places along the bar in [0, 1], rising, and texts; the first and last one stay.
+        ticks: positions along the bar in [0, 1], increasing, and labels; the first and the last
+            label are always shown.
     """
     (_, first), *inner, (_, last) = ticks
     line = first
@@ -136,7 +137,7 @@ def tick_line(ticks: Sequence[tuple[float, str]], width: int) -> str:
 
 
 def open_view(arguments: argparse.Namespace) -> Meshcat:
-    """The Meshcat that a verb draws into; an unwritable page is refused before any work.
+    """Opens Meshcat for a command; first checks that the page can be written.
 
     Raises:
         InvalidInputError: the page's folder cannot be written, or the port is taken.
@@ -163,15 +164,15 @@ def present_view(
     legend: Sequence[visualization.LegendEntry | visualization.ColorBar] = (),
     controls: visualization.GraspPicker | None = None,
 ) -> None:
-    """Saves the page if --html was given; else prints the address and waits, unless told not to.
+    """Saves the page if --html was given; else prints the address and waits, but for --no-wait.
 
     Args:
         meshcat: the view.
-        arguments: those of `add_view_options`.
+        arguments: of `add_view_options`.
         title: of the page.
         caption: lines of the page.
         legend: of the page.
-        controls: of the page; in the live view a slider of Meshcat does the same.
+        controls: of the page; the live view has a slider of Meshcat instead.
     """
     if arguments.html is not None:
         visualization.save_html(
@@ -179,7 +180,7 @@ def present_view(
         )
         print(f"wrote {arguments.html}")
         return
-    if arguments.no_wait:  # the address would be gone before anyone can open it
+    if arguments.no_wait:  # the address would be invalid before anyone could open it
         print(f"{title}: not kept open; give --html FILE for a page that stays")
         return
     print(f"{title}: open {meshcat.web_url()} in a browser", flush=True)
@@ -212,7 +213,7 @@ def wait_for_user(poll: Callable[[], None] | None = None) -> None:
 
 
 def open_in_browser(url: str) -> None:
-    """Opens a page in the user's browser, or says that there is none."""
+    """Opens a page in the user's browser; prints a message if there is no browser."""
     import webbrowser
 
     if not webbrowser.open(url):

@@ -34,13 +34,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopCamera:
-    """The camera of a loop.
+    """The simulated camera of a loop.
 
     Attributes:
-        name: in the station.
-        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
-        depth: the estimator gets the depth image, too, which says at what scale the board is.
-        period: between images [s]. If not given, there is one for every moment.
+        name: name in the station.
+        samples: rays along each side of a pixel of the colour image, see
+            `Camera.samples`.
+        depth: give the estimator the depth image, too, to measure the scale of the board.
+        period: time between images [s]; images are continuous if None.
 
     Raises:
         InvalidInputError: the period is not above 0.
@@ -60,10 +61,10 @@ class LoopCamera:
 
 @dataclass(frozen=True, eq=False)
 class BoardLoop:
-    """A built loop.
+    """A diagram of camera, estimator and overlay.
 
     Attributes:
-        diagram: the whole; keep it alive while its parts are used.
+        diagram: the whole diagram; keep it alive while its parts are used.
         built: the station in it.
         sensor: the camera.
         intrinsics: of the camera.
@@ -75,18 +76,18 @@ class BoardLoop:
     intrinsics: Intrinsics
 
     def X_SC(self, context: Context) -> Array:
-        """(4, 4) where the camera truly is; `context` is the whole diagram's."""
+        """(4, 4) true pose of the camera; `context` is the whole diagram's."""
         X_WC = self.sensor.GetX_PB(self.sensor.GetMyContextFromRoot(context)).GetAsMatrix4()
         X_SC: Array = inverse(self.built.station.document.X_WS.matrix()) @ X_WC
         return X_SC
 
     def place_camera(self, context: Context, X_SC: Array) -> None:
-        """Puts the camera elsewhere over the board."""
+        """Move the camera over the board."""
         mine = self.sensor.GetMyMutableContextFromRoot(context)
         self.sensor.SetX_PB(mine, self._in_world(X_SC))
 
     def place_object(self, context: Context, instance: str, X_SO: Array) -> None:
-        """Puts an object elsewhere, in the simulation only: the overlay shows where it belongs.
+        """Move an object, in the simulation only: the overlay shows its target.
 
         Raises:
             UnknownNameError: the scene has no such free instance.
@@ -125,12 +126,12 @@ def build_board_loop(
         overlay = loop.diagram.GetOutputPort("overlay_image").Eval(context).data
 
     Args:
-        scene: what stands on the board, and is drawn over the image at its place.
+        scene: objects on the board, which the overlay draws at their targets.
         station: has the camera.
-        camera: its name, or also how it takes images.
+        camera: its name, or a `LoopCamera` with its settings.
         robot, engine, meshcat: see `build_station_diagram`.
         style: of the overlay, if not the default.
-        filter: between estimate and overlay; the overlay gets the estimate itself if not given.
+        filter: filter between estimate and overlay; none if not given.
 
     Raises:
         UnknownNameError: there is no such camera.
@@ -178,7 +179,7 @@ def build_board_loop(
 def _camera_images_port(
     builder: DiagramBuilder, built: StationDiagram, camera: LoopCamera, kind: str
 ) -> OutputPort:
-    """A camera's images, held for a period if there is one."""
+    """Port of a camera's images, held for its period if there is one."""
     port = f"camera.{camera.name}.{kind}"
     images = built.diagram.GetOutputPort(port)
     if camera.period is None:

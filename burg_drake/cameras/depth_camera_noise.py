@@ -27,35 +27,35 @@ def noisy_depth(
     normals: Single | None = None,
     color: Bytes | None = None,
 ) -> Single:
-    """A depth image as a camera measures it.
+    """Add the noise of a depth camera to a depth image.
 
-    Edges fray and pixels at them mix; then depth gets its errors and steps; what light does not
-    reach or come back from, is lost. The same generator gives the same image. Where nothing was,
-    nothing is.
+    Edges get lateral noise and flying pixels; depth gets axial noise and quantization; occluded,
+    grazing and dark pixels are removed. Equal generators give equal images. Pixels without depth
+    stay without.
 
     Args:
-        depth: (H, W) without errors [m]; 0 where nothing is.
-        noise: what the camera does to it, see `depth_noise` for presets.
+        depth: (H, W) without errors [m]; 0 for none.
+        noise: noise of the camera, see `depth_noise` for presets.
         intrinsics: of the image.
-        rng: of all that is random.
-        normals: (H, W, 3) unit normals of the surfaces in the camera's frame, 0 where nothing is;
-            those of the depth image if None.
+        rng: random generator.
+        normals: (H, W, 3) unit normals of the surfaces in the camera's frame, 0 for none; computed
+            from the depth image if None.
         color: (H, W, 3) red, green, blue of the same pixels; no surface is dark if None.
 
     Returns:
-        (H, W) depth [m], 0 where nothing is measured; a new array.
+        (H, W) depth [m], 0 where none is measured; a new array.
 
     Raises:
-        InvalidInputError: an image has another size than the intrinsics or another kind of values,
-            or depth is not finite or below 0.
+        InvalidInputError: an image differs from the intrinsics in size or has the wrong type, or
+            depth is not finite or below 0.
     """
     depth = _checked_depth(depth, intrinsics)
     _check_image_shape("normals", normals, depth.shape, np.floating)
     _check_image_shape("color", color, depth.shape, np.uint8)
     angle = incidence_angle(depth, intrinsics, normals) if noise.uses_angles else None
-    lost = _missing_pixels(depth, angle, noise, intrinsics.focal[0], rng, color)
+    missing = _missing_pixels(depth, angle, noise, intrinsics.focal[0], rng, color)
     measured = _add_depth_errors(depth, angle, noise, intrinsics.focal[0], rng)
-    measured[lost] = 0.0
+    measured[missing] = 0.0
     return measured
 
 
@@ -66,7 +66,7 @@ def _add_depth_errors(
     focal: float,
     rng: np.random.Generator,
 ) -> Single:
-    """Depth with its errors, before anything is lost."""
+    """Add edge and depth errors, before pixels are removed."""
     measured = depth.copy()
     if noise.lateral_base or noise.lateral_angle or noise.flying:
         edges = depth_edges(depth)
@@ -93,17 +93,17 @@ def _missing_pixels(
     rng: np.random.Generator,
     color: Bytes | None,
 ) -> Booleans:
-    """(H, W) pixels that give no depth."""
+    """(H, W) pixels without measured depth."""
     kept = np.ones(depth.shape, dtype=np.float32)
     if angle is not None and noise.grazing_from_deg < 90.0:
         kept -= grazing_probability(angle, noise)
     if color is not None and noise.dark_below and noise.dark_probability:
         kept *= 1.0 - dark_probability(color, noise)
-    lost = random_holes(np.float32(1.0) - kept, noise.hole_size, rng)
+    holes = random_holes(np.float32(1.0) - kept, noise.hole_size, rng)
     if noise.second_view != "none":
         same = noise.second_view == "same"
-        lost |= hidden_from_second_imager(depth, focal, noise.baseline, same_view=same)
-    return lost
+        holes |= hidden_from_second_imager(depth, focal, noise.baseline, same_view=same)
+    return holes
 
 
 def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
@@ -114,11 +114,11 @@ def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
             " metres"
         )
     intrinsics.require_size(values.shape[1], values.shape[0], "the depth image")
-    wrong = ~(np.isfinite(values) & (values >= 0.0))
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
+    invalid = ~(np.isfinite(values) & (values >= 0.0))
+    if invalid.any():
+        row, column = np.argwhere(invalid)[0]
         raise InvalidInputError(
-            f"depth has {np.count_nonzero(wrong)} pixels that are negative or not finite, such as"
+            f"depth has {np.count_nonzero(invalid)} pixels that are negative or not finite, such as"
             f" {values[row, column]:g} in row {row}, column {column}; use 0 where nothing was"
             " measured"
         )
@@ -128,7 +128,7 @@ def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
 def _check_image_shape(
     name: str, image: np.ndarray | None, shape: tuple[int, ...], kind: type[np.generic]
 ) -> None:
-    """Refuses an image of other pixels than those of depth."""
+    """Check that an image has the depth image's size."""
     if image is None:
         return
     if image.shape != (*shape, 3) or not np.issubdtype(image.dtype, kind):
@@ -143,12 +143,12 @@ DEPTH_EDGE_THRESHOLD = 0.01
 
 
 def inverse_depth(depth: Single) -> Single:
-    """(H, W) 1 / z [1/m]; 0 where nothing is."""
+    """(H, W) 1 / z [1/m]; 0 without depth."""
     return np.reciprocal(np.where(depth > 0.0, depth, np.float32(np.inf)))
 
 
 def depth_edges(depth: Single) -> Booleans:
-    """(H, W) pixels beside which, in their row or column, another surface or nothing is.
+    """(H, W) pixels with another surface, or none, beside them in their row or column.
 
     Args:
         depth: (H, W) [m], 0 for none.
@@ -164,7 +164,7 @@ def depth_edges(depth: Single) -> Booleans:
 
 
 def incidence_angle(depth: Single, intrinsics: Intrinsics, normals: Single | None = None) -> Single:
-    """(H, W) angle between a surface's normal and the ray that sees it [rad]; 0 where nothing is.
+    """(H, W) angle between surface normal and viewing ray [rad]; 0 without depth.
 
     Args:
         depth: (H, W) [m], 0 for none.
@@ -200,8 +200,9 @@ def _incidence_cosine(w: Single, intrinsics: Intrinsics) -> Single:
 
 
 def _slope(w: Single) -> Single:
-    """(H, W) change along the rows, per pixel: towards the neighbour on the same surface, which is
-    the one with the smaller change."""
+    """(H, W) change along the rows per pixel, towards the neighbour with the smaller change, which
+    is taken to be on the same surface.
+    """
     steps = np.diff(w, axis=1)
     slope = np.empty_like(w)
     slope[:, 0], slope[:, 1:] = steps[:, 0], steps
@@ -212,7 +213,7 @@ def _slope(w: Single) -> Single:
 
 @lru_cache(maxsize=2)
 def _pixel_rays(intrinsics: Intrinsics) -> Single:
-    """(H, W, 3) unit vectors along which pixels look, in the camera's frame."""
+    """(H, W, 3) unit vectors of the pixels' rays in the camera's frame."""
     directions = FieldOfView(intrinsics).directions
     lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
     rays: Single = (directions / lengths).astype(np.float32)
@@ -229,8 +230,8 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
 
     `a + b (z - c)^2`, and beyond 60 degrees in addition `d / sqrt(z) (t / (pi/2 - t))^2`, with the
     angle t (Nguyen, Izadi and Lovell 2012, equations of the axial noise). Their angle is that of a
-    turned plane in the image's middle; here it is the one against the ray. The second term begins
-    with a step, as theirs does, of 0.4 mm at 1 m.
+    turned plane in the image's middle; here it is measured against the ray. As in their model, the
+    second term begins with a step (0.4 mm at 1 m).
 
     Args:
         depth: (H, W) [m], 0 for none.
@@ -253,7 +254,7 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
 def add_axial_noise(
     depth: Single, angle: Single | None, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Depth with normal errors of `axial_sigma`, each pixel's for itself; see there."""
+    """Add independent normal errors with the standard deviation `axial_sigma` to depth."""
     moved = rng.standard_normal(depth.shape, dtype=np.float32)
     moved *= axial_sigma(depth, angle, noise)
     moved += depth
@@ -263,19 +264,19 @@ def add_axial_noise(
 def add_disparity_noise(
     depth: Single, focal: float, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Depth of disparities with normal errors of `disparity_sigma`, in steps of `disparity_step`.
+    """Add normal errors of `disparity_sigma` to the disparities and round to `disparity_step`.
 
-    As long as they are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
+    While errors are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
     (Grunnet-Jepsen, Sweetser and Woodfill, "Tuning depth cameras for best performance"; Keselman et
     al., "Intel RealSense stereoscopic depth cameras", CVPR workshops 2017, equation 2), and steps
-    are `z^2 step / (f b)` apart (Khoshelham and Elberink, Sensors 12, 2012). A disparity that is 0
-    or below, gives no depth.
+    are `z^2 step / (f b)` apart (Khoshelham and Elberink, Sensors 12, 2012). Disparities of 0 or
+    less give no depth.
 
     Args:
         depth: (H, W) [m], 0 for none.
         focal: f_x [pixels].
         noise: has sigma and step, either of which may be 0, and the baseline b.
-        rng: of the errors; not asked if there are none.
+        rng: random generator; not used without errors.
     """
     scale = np.float32(focal * abs(noise.baseline))
     disparity = scale * inverse_depth(depth)
@@ -292,12 +293,12 @@ def add_disparity_noise(
 
 
 def _drop_invalid(moved: Single, depth: Single) -> Single:
-    """Nothing where nothing was, or where an error leads to the camera and beyond."""
+    """Remove pixels that had no depth, or whose noisy depth is not positive."""
     return np.where((depth > 0.0) & (moved > 0.0), moved, np.float32(0.0))
 
 
 def lateral_sigma(angle: Single | Array, noise: DepthNoise) -> Array:
-    """Standard deviation of where an edge is, along rows and along columns [pixels].
+    """Standard deviation of an edge's position along rows and columns [pixels].
 
     `a + b t / (pi/2 - t)`, with the angle of incidence t (Nguyen, Izadi and Lovell 2012, the
     equation of the lateral noise in pixels).
@@ -317,11 +318,11 @@ def add_lateral_noise(
     noise: DepthNoise,
     rng: np.random.Generator,
 ) -> Single:
-    """Depth with frayed edges: pixels near them show what is a random step away.
+    """Fray edges: pixels near them take the depth of a pixel a random step away.
 
-    Only pixels within reach of an edge do: their noise was measured at edges, and within a surface
-    it would add to the axial noise, which was measured as a whole. Barron and Malik ("Intrinsic
-    scene properties from a single RGB-D image", CVPR 2013) and Handa et al. ("A benchmark for RGB-D
+    Only pixels near an edge are changed: lateral noise was measured at edges, and inside a surface
+    it would add to the axial noise, which already includes it. Barron and Malik ("Intrinsic scene
+    properties from a single RGB-D image", CVPR 2013) and Handa et al. ("A benchmark for RGB-D
     visual odometry, 3D reconstruction and SLAM", ICRA 2014) displace all pixels, by a standard
     deviation of half a pixel, and interpolate, which puts pixels in between.
 
@@ -330,7 +331,7 @@ def add_lateral_noise(
         edges: (H, W) see `depth_edges`.
         angle: (H, W) of incidence [rad]; 0 everywhere if None.
         noise: see `lateral_sigma`.
-        rng: of the steps.
+        rng: random generator.
     """
     largest = float(lateral_sigma(np.array(MAX_NOISE_ANGLE if angle is not None else 0.0), noise))
     # Standard deviations of lateral noise that are sampled.
@@ -350,17 +351,17 @@ def add_lateral_noise(
 def add_flying_pixels(
     depth: Single, edges: Booleans, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Depth in which a share of the pixels at edges lie anywhere between near and far.
+    """Move a share of the pixels at edges to random depths between near and far.
 
     A pixel that sees two surfaces measures a mixture ("Color-guided flying pixel correction in
-    depth images", arXiv 2410.08084); of which of their parts, is random here, an estimate. There
-    is none at an edge beyond which nothing is.
+    depth images", arXiv 2410.08084); the mixing ratio is random here, an estimate. Edges without a
+    surface behind them have none.
 
     Args:
         depth: (H, W) [m], 0 for none.
         edges: (H, W) see `depth_edges`.
         noise: has the share, `flying`.
-        rng: of the choice and the mixture.
+        rng: random generator.
     """
     around = np.ones((3, 3), np.uint8)
     far = cv2.dilate(depth, around)
@@ -378,22 +379,22 @@ def add_flying_pixels(
 def hidden_from_second_imager(
     depth: Single, focal: float, baseline: float, *, same_view: bool
 ) -> Booleans:
-    """Pixels whose points are not seen from a second centre beside the camera's.
+    """Find pixels whose points are hidden from a second imager beside the camera.
 
-    Pixel u of depth z is seen there at `u - f b / z`, in the same row. Left of a box at z1 before a
-    wall at z2 the shadow of a centre to the right is `f b (1 / z1 - 1 / z2)` pixels wide. Points
-    that the camera itself does not see hide nothing. Images are taken as rectified: there is no
-    lens distortion.
+    The second imager sees pixel u of depth z at `u - f b / z`, in the same row. A box at z1 before
+    a wall at z2 casts a shadow of `f b (1 / z1 - 1 / z2)` pixels on its left if the second imager
+    is on the right. Points that the camera does not see hide nothing. Images are assumed to be
+    rectified.
 
     Args:
         depth: (H, W) [m], 0 for none.
         focal: f_x [pixels].
         baseline: x of the second centre in the camera's frame [m].
-        same_view: the second image is as wide as the first, so that a band at the side of the
-            second centre's opposite is not seen; else all is seen that nothing hides.
+        same_view: the second image is as wide as the first, so that it misses a band on the
+            opposite side; else it sees all points that are not hidden.
 
     Returns:
-        (H, W); False where nothing is.
+        (H, W) True for hidden pixels; False without depth.
     """
     if baseline < 0.0:
         turned = hidden_from_second_imager(depth[:, ::-1], focal, -baseline, same_view=same_view)
@@ -414,10 +415,10 @@ def hidden_from_second_imager(
 
 
 def _overtaken_pixels(there: Single, disparity: Single) -> Booleans:
-    """Pixels right of which another one is seen farther left from the second centre. Of surfaces
-    that both centres see there are none, however steep. Where a nearer surface begins, it does so
-    half a pixel before its first pixel's centre. What is not there has no disparity, and so
-    overtakes nothing."""
+    """Find pixels for which a pixel further right appears further left in the second image.
+    Surfaces that both imagers see have none, however steep. A nearer surface begins half a pixel
+    before its first pixel's centre. Pixels without depth hide nothing.
+    """
     begins = there.copy()
     nearer = disparity[:, 1:] > disparity[:, :-1] + np.float32(1.0)
     np.subtract(begins[:, 1:], np.float32(0.5), out=begins[:, 1:], where=nearer)
@@ -428,9 +429,10 @@ def _overtaken_pixels(there: Single, disparity: Single) -> Booleans:
 
 
 def _second_view_disparity(there: Single, disparity: Single) -> tuple[Single, Indices]:
-    """Largest disparity at each pixel of the second image (H, V), which reaches as far to the left
-    as needed, two widths at most; and the pixels (H, W), counted row by row, where the first
-    image's are in it. Gaps of one pixel, as in surfaces that are wider there, are filled."""
+    """Largest disparity at each pixel of the second image (H, V), extended to the left by up to two
+    widths; and flat indices (H, W) of the first image's pixels in it. Gaps of one pixel, as in
+    stretched surfaces, are filled.
+    """
     height, width = there.shape
     left = min(int(np.ceil(disparity.max())) + 1, 2 * width)
     image = np.zeros((height, left + width), dtype=np.float32)
@@ -472,11 +474,10 @@ def random_holes(probability: Single, size: float, rng: np.random.Generator) -> 
     """Random holes.
 
     Args:
-        probability: (H, W) of a hole in each pixel; with patches it holds
-            within 0.005.
-        size: standard deviation of the Gaussian that makes patches of single holes, at least
-            1 [pixels]; none if 0.
-        rng: of where they are.
+        probability: (H, W) of a hole in each pixel; accurate within 0.005 with patches.
+        size: standard deviation of the Gaussian that forms patches, at least 1 [pixels]; 0 for
+            single pixels.
+        rng: random generator.
 
     Returns:
         (H, W) True in a hole.
@@ -493,8 +494,9 @@ def random_holes(probability: Single, size: float, rng: np.random.Generator) -> 
 
 
 def _smooth_field(shape: tuple[int, ...], size: float, rng: np.random.Generator) -> Single:
-    """(H, W) standard normal numbers, neighbours of which are alike: smoothed uniform ones, whose
-    distribution function differs from the normal one by less than 0.005."""
+    """(H, W) standard normal numbers, correlated between neighbours: smoothed uniform ones, whose
+    distribution function differs from the normal one by less than 0.005.
+    """
     margin = int(np.ceil(3.0 * size))
     kernel = cv2.getGaussianKernel(2 * margin + 1, size, cv2.CV_32F)
     kernel /= np.linalg.norm(kernel)  # of unit variance after it

@@ -28,7 +28,7 @@ class Sensor:
 
     Attributes:
         name: of the preset.
-        color, depth: intrinsics of its images, one for every aspect; the first is the usual one.
+        color, depth: intrinsics of its images, one per aspect; the first is the default.
         depth_range: nearest and farthest depth that it is made for [m]; some measure nearer.
         baseline: x of the second imager, or of the projector, in the frame of the depth camera
             [m]; 0 of a time-of-flight camera, which has none.
@@ -129,13 +129,13 @@ def _scaled_images(
     sizes: tuple[Size, ...] = (),
     distortion: tuple[float, ...] = (),
 ) -> tuple[Intrinsics, ...]:
-    """Images of several sizes, from one calibration: scaled so that the whole just covers them,
-    then cut evenly. The whole itself may be a cut of the sensor, which covers smaller scales.
+    """Intrinsics of several image sizes from one calibration: scaled to just cover the size, then
+    cropped evenly.
 
     Args:
         camera: what the calibrations are called.
-        whole: size of the calibrated images.
-        focal, center: of these [pixels].
+        whole: size of the calibrated images, which may be a crop of the sensor.
+        focal, center: of the calibrated images [pixels].
         sizes: of the images, the usual one first; the whole if none is given.
         distortion: OpenCV's, of all sizes.
     """
@@ -366,7 +366,7 @@ class DepthNoise:
 
     @property
     def uses_angles(self) -> bool:
-        """Some effect depends on how surfaces are seen."""
+        """Whether some effect depends on the angle of incidence."""
         return bool(self.axial_angle or self.lateral_angle or self.grazing_from_deg < 90.0)
 
 

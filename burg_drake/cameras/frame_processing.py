@@ -37,7 +37,8 @@ class ViewSettings:
         footprints: draw where objects touch the board.
         steady: draw at the mean of the last poses while the camera stands still, so that the
             overlay does not tremble; see `PoseFilter`.
-        guide: show this instance alone, to place one object after the other; all if empty.
+        guide: name of the only instance to show, to place one object after the other; all if
+            empty.
         frozen: keep looking at the same frame.
     """
 
@@ -51,13 +52,14 @@ class ViewSettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LocatedFrame:
-    """A frame, and where its camera was.
+    """A frame with its camera's pose.
 
     Attributes:
-        frame: as the source gave it.
-        estimate: of the camera's pose, from this frame alone.
-        X_SC: (4, 4) pose to draw at: the estimate's, or the mean of several; NaN without one.
-        milliseconds: what stages took, by name.
+        frame: frame of the source.
+        estimate: estimate of the camera's pose, from this frame alone.
+        X_SC: (4, 4) camera pose for drawing: the estimate's, or the mean of several; NaN without
+            one.
+        milliseconds: duration of each stage, by name.
     """
 
     frame: Frame
@@ -67,13 +69,13 @@ class LocatedFrame:
 
 
 class FrameProcessor:
-    """Looks at frames of one camera over the board of one scene.
+    """Processes frames of one camera over the board of one scene.
 
     Args:
-        scene: what is to be shown.
-        intrinsics: of the camera.
-        print_scale: size of the printed board against the document's, along x and y.
-        style: of the overlay, as far as the view's settings leave it open.
+        scene: scene to draw.
+        intrinsics: intrinsics of the camera.
+        print_scale: printed size of the board over its nominal size, along x and y.
+        style: style of the overlay; the view's settings take precedence.
 
     Raises:
         UnknownNameError: a mesh file of the library is missing.
@@ -97,11 +99,11 @@ class FrameProcessor:
         self._track: Track | None = None
 
     def locate(self, frame: Frame, *, steady: bool = False) -> LocatedFrame:
-        """Estimates where the camera was.
+        """Estimate the pose of a frame's camera.
 
         Args:
-            frame: to look at.
-            steady: see `ViewSettings`; frames come one after the other then.
+            frame: frame to process.
+            steady: filter poses of successive frames, see `ViewSettings`.
 
         Raises:
             InvalidInputError: the frame has another size than the intrinsics.
@@ -117,11 +119,13 @@ class FrameProcessor:
         return LocatedFrame(frame=frame, estimate=estimate, X_SC=X_SC, milliseconds={"pose": ms})
 
     def _filtered(self, estimate: BoardEstimate) -> Array:
-        """The filtered pose, after one more estimate."""
+        """The filtered pose after a new estimate."""
         from burg_drake.cameras.pose_systems import PoseFilter, Track
 
         if self._filter is None:
-            self._filter = PoseFilter(period=1.0)  # of a Drake diagram; here frames set the pace
+            self._filter = PoseFilter(
+                period=1.0
+            )  # only a diagram updates by period; here each frame does
         self._track = self._filter.update(self._track or Track(), estimate)
         assert self._track.X_SC is not None
         return self._track.X_SC
@@ -129,7 +133,7 @@ class FrameProcessor:
     def draw(
         self, located: LocatedFrame, settings: ViewSettings, placement: PlacementCheck | None = None
     ) -> Bytes:
-        """The frame with the scene drawn over it, or with a line that says why not.
+        """Draw the scene over the frame, or a line with the reason why not.
 
         Returns:
             (H, W, 3) RGB.
@@ -147,7 +151,7 @@ class FrameProcessor:
         return self._overlay.draw(image, located.X_SC, placement=placement, style=style)
 
     def check(self, located: LocatedFrame) -> PlacementCheck:
-        """Measures how far the objects stand from their places; takes a while."""
+        """Check the placement of the objects; takes a while."""
         from burg_drake.cameras.placement.check import check_placement
 
         depth = located.frame.depth
@@ -162,23 +166,23 @@ class FrameProcessor:
 
 
 def placement_order(scene: Scene) -> tuple[str, ...]:
-    """Instances in the order in which one would place them by hand: from below upwards, and from
-    the far edge of the board, which reads upright, to the near one, so that nothing that stands
-    already is in the way. What is fixed comes first."""
+    """Instances in the order for placing them by hand: fixed ones first, then from low to high,
+    then from the far edge of the board to the near one, so that placed objects are not in the way.
+    """
 
     def key(name: str) -> tuple[bool, int, float]:
         X_SO, entry = scene.X_SO(name), scene.entry(name)
         corners = np.stack(np.meshgrid(*zip(entry.lower, entry.upper, strict=True)), axis=-1)
         p_SQ = corners.reshape(-1, 3) @ X_SO[:3, :3].T + X_SO[:3, 3]
         middle = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2
-        # Metres. Objects whose undersides differ by less are on one level.
-        return name in scene.instances, round(p_SQ[:, 2].min() / 0.01), -float(middle[1])
+        level = round(p_SQ[:, 2].min() / 0.01)  # undersides within 1 cm are on one level
+        return name in scene.instances, level, -float(middle[1])  # False sorts first
 
     return tuple(sorted((*scene.background, *scene.instances), key=key))
 
 
 def check_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
-    """The same settings, if they can be used.
+    """Check settings and return them unchanged.
 
     Raises:
         InvalidInputError: an opacity outside 0 to 1.
@@ -196,7 +200,7 @@ def check_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
 
 
 def change_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any]) -> ViewSettings:
-    """Settings with some of them changed, by name.
+    """Change settings by name.
 
     Raises:
         InvalidInputError: no such setting, or a value of another type or out of bounds.
@@ -221,7 +225,7 @@ def change_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any])
 
 
 def describe_pose(estimate: BoardEstimate, board: Board) -> str:
-    """What an image said about the camera's place, in words."""
+    """Describe the estimated pose of a camera in a line of text."""
     if not estimate.valid:
         return estimate.reason or "no pose"
     line = f"{len(estimate.ids)} of {len(board.layout.ids)} markers"
@@ -233,8 +237,8 @@ def describe_pose(estimate: BoardEstimate, board: Board) -> str:
 
 def position_sd(estimate: BoardEstimate) -> float:
     """Standard deviation of the camera's position along the direction where it is largest [m];
-    NaN where there is no pose."""
-    variance = estimate.covariance[3:, 3:]
+    NaN without a pose."""
+    variance = estimate.covariance[3:, 3:]  # of the translation; rotation comes first
     if not estimate.valid or not np.isfinite(variance).all():
         return float("nan")
     return float(np.sqrt(max(np.linalg.eigvalsh(variance)[-1], 0.0)))
@@ -247,7 +251,7 @@ def _format_two_digits(value: float) -> str:
 
 
 def time_call(work: Callable[[], T]) -> tuple[T, float]:
-    """What a piece of work gives, and how long it took [ms]."""
+    """Call `work`; return its result and its duration [ms]."""
     start = time.perf_counter()
     result = work()
     return result, 1e3 * (time.perf_counter() - start)

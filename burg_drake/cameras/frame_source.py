@@ -12,9 +12,9 @@ Image = Bytes
 
 
 class CameraLost(BurgError):
-    """A live camera gives no images (unplugged, another program's, no network).
+    """A live camera gives no images (unplugged, used by another program, no network).
 
-    The source keeps trying; `read` again goes on with the camera as soon as it is back.
+    The source keeps trying to reconnect; call `read` again to continue.
     """
 
 
@@ -26,9 +26,9 @@ class Frame:
         image: (H, W, 3) RGB.
         depth: (H, W) distance along the optical axis [m], NaN where nothing was measured; None if
             the source has no depth.
-        time: since the source was opened; of a video file its position; of photographs their
-            number [s].
-        name: what a message calls it, such as `photo.png` or `camera 0`.
+        time: time since the source was opened; position in a video file; number of a photograph
+            [s].
+        name: name in messages, such as `photo.png` or `camera 0`.
     """
 
     image: Image
@@ -38,13 +38,13 @@ class Frame:
 
 
 class FrameSource(ABC):
-    """Frames one after the other.
+    """A source of successive frames.
 
     Attributes:
-        name: what a message calls the source.
-        live: it has no end, and gives its newest frame whenever it is asked.
+        name: name in messages.
+        live: the source has no end, and `read` returns its newest frame.
         size: width and height of its frames [pixels]; of photographs, of the first.
-        fps: frames a second, where that is known.
+        fps: frames per second, if known.
     """
 
     name: str
@@ -57,14 +57,14 @@ class FrameSource(ABC):
         """The next frame; None after the last, and when the source is closed.
 
         Raises:
-            CameraLost: a live camera gives nothing at present. Read again, as often as you like:
-                that waits a moment for the camera to come back, so that no loop is a busy one.
-            InvalidInputError: one file of several cannot be read. Read again for the next.
+            CameraLost: a live camera gives no images. Call again, in a loop if you like: each call
+                waits a moment for the camera to come back.
+            InvalidInputError: one file of several cannot be read. Call again for the next one.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Lets go of the camera or file; another thread's `read` returns None."""
+        """Release the camera or file; another thread's `read` returns None."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Frames to the end; waits while a camera is away."""

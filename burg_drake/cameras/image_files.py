@@ -30,9 +30,9 @@ from burg_drake.station import MAX_IMAGE_SIDE
 
 @contextlib.contextmanager
 def silence_opencv() -> Iterator[None]:
-    """Keeps OpenCV and FFmpeg from writing to the terminal what becomes an error of ours."""
+    """Stop OpenCV and FFmpeg from writing errors to the terminal; errors are raised instead."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when FFmpeg is first used
-    log = getattr(cv2.utils, "logging", cv2)  # OpenCV 5; in OpenCV 4 they are in cv2 itself
+    log = getattr(cv2.utils, "logging", cv2)  # has the log functions in OpenCV 5; cv2 in OpenCV 4
     level = log.getLogLevel()
     log.setLogLevel(0)  # LOG_LEVEL_SILENT, which OpenCV 4 does not export to Python.
     try:
@@ -48,8 +48,8 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 def read_image(path: str | Path) -> Image:
     """Reads an image file.
 
-    A camera that was held upright writes the sensor's pixels and a note how to turn them (EXIF).
-    They stay as the sensor has them: intrinsics are of the sensor, and do not turn.
+    EXIF orientation is ignored: pixels stay in the sensor's orientation, as intrinsics are of the
+    sensor.
 
     Args:
         path: PNG, JPEG or another file that OpenCV reads; gray and 16-bit images become RGB of
@@ -68,7 +68,7 @@ def read_image(path: str | Path) -> Image:
         raise InvalidInputError(str(error).replace("read", "read image", 1)) from error
     if not data:
         raise InvalidInputError(f"image {path} is empty (0 bytes)")
-    require_image_size(data, f"image {path}")
+    refuse_huge_image(data, f"image {path}")
     image = decode_image(data)
     if image is None:
         raise InvalidInputError(
@@ -78,10 +78,11 @@ def read_image(path: str | Path) -> Image:
 
 
 def decode_image(data: bytes) -> Image | None:
-    """(H, W, 3) RGB of the contents of an image file; None if they are not an image, or one that is
-    too large."""
+    """Decode an image file's contents to (H, W, 3) RGB; None if they are not an image or too
+    large.
+    """
     try:
-        require_image_size(data, "")
+        refuse_huge_image(data, "")
     except InvalidInputError:
         return None
     if _is_cut_off(data):
@@ -93,13 +94,13 @@ def decode_image(data: bytes) -> Image | None:
     return None
 
 
-def require_image_size(data: bytes, name: str) -> None:
-    """Refuses the contents of an image file that would take too much memory, before it is decoded;
-    a small file may hold a large image of one colour.
+def refuse_huge_image(data: bytes, name: str) -> None:
+    """Reject an image that would take too much memory, before it is decoded; a small file may hold
+    a large image of one colour.
 
     Args:
-        data: of the file; what is no image passes.
-        name: stands for the file in messages.
+        data: contents of the file; data that is not an image passes, and decoding reports it.
+        name: name of the file in messages.
 
     Raises:
         InvalidInputError: the image has too many pixels.
@@ -123,20 +124,22 @@ def require_image_size(data: bytes, name: str) -> None:
 
 
 def _is_cut_off(data: bytes) -> bool:
-    """A JPEG without its end, which decoders fill up with grey; or a PNG without, about which
-    libpng writes a line of its own."""
+    """Whether a JPEG or PNG is truncated. Decoders fill up such a JPEG with grey; for a PNG libpng
+    writes a line to the terminal.
+    """
     if data.startswith(b"\x89PNG"):
         return b"IEND" not in data
     if not data.startswith(b"\xff\xd8"):
         return False
-    at = 2  # behind it segments, which may hold a small image, then the image itself
+    # Skip the header segments up to start of scan (0xDA): a thumbnail has its own end marker.
+    at = 2
     while data[at : at + 1] == b"\xff" and data[at + 1 : at + 2] != b"\xda":
         at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
     return data.find(b"\xff\xd9", at) < 0
 
 
 def require_image_format(path: str | Path) -> None:
-    """Refuses names of image files to write whose endings tell no format, before any work.
+    """Reject image file names without the suffix of a supported format.
 
     Raises:
         InvalidInputError: no such format.
@@ -166,7 +169,7 @@ def write_image(path: str | Path, image: Image) -> None:
 
 
 def encode_jpeg(image: Image, quality: int) -> bytes:
-    """JPEG of an RGB image (H, W, 3), of a quality from 0 to 100."""
+    """Encode an RGB image (H, W, 3) as JPEG, of a quality from 0 to 100."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     return bytes(data.tobytes())
 
@@ -179,7 +182,7 @@ def read_depth(path: str | Path, unit: float | None = None) -> Single:
         unit: of its numbers [m]; if None, whole numbers are millimetres, others metres.
 
     Returns:
-        (H, W) distances along the optical axis [m]; 0 where there is none.
+        (H, W) distances along the optical axis [m]; 0 where nothing was measured.
 
     Raises:
         InvalidInputError: no such file, or not a depth image.
@@ -207,7 +210,7 @@ def read_depth(path: str | Path, unit: float | None = None) -> Single:
 
 def _read_depth_image(path: Path) -> NDArray[Any]:
     data = read_bytes(path, FileLimits.image_bytes)
-    require_image_size(data, f"depth image {path}")
+    refuse_huge_image(data, f"depth image {path}")
     depth = None
     with silence_opencv(), contextlib.suppress(cv2.error):
         if data:

@@ -28,15 +28,15 @@ class CameraSource(LeafSystem):
 
     Ports:
         color_image (output, ImageRgba8U): the newest frame.
-        depth_image (output, ImageDepth32F): its depth [m], infinite where nothing was measured;
-            only if the source has depth.
+        depth_image (output, ImageDepth32F): its depth [m], infinite where none was measured; only
+        if the source has depth.
         valid (output, 1): 1 as long as the source gives frames; 0 when the camera is lost or the
-            source has ended, and the images are the last that there were.
-        frame_time (output, 1): time of the frame, as the source tells it [s].
+        source has ended, and the images are the last ones.
+        frame_time (output, 1): time of the frame by the source's clock [s].
 
-    Frames are read at the times of the periodic update and are state, so that all that depends on
-    them sees the same. A simulator runs as fast as it can: for a live camera set its target
-    real-time rate to 1. While a camera is lost, updates wait for it for a moment each.
+    Frames are read by a periodic update and stored as state, so that all outputs are of the same
+    frame. A simulator runs as fast as it can: for a live camera set its target real-time rate to 1.
+    While a camera is lost, updates wait for it for a moment each.
 
     Args:
         source: of frames; it stays the caller's to close.
@@ -89,16 +89,16 @@ class CameraSource(LeafSystem):
 
 
 def _next_frame(source: FrameSource) -> Frame | None:
-    """The next frame that can be read."""
+    """Read the next readable frame."""
     while True:
         try:
             return source.read()
-        except InvalidInputError:  # one broken file of several
+        except InvalidInputError:  # skip a broken file among several
             continue
 
 
 def rgba_image(pixels: Bytes) -> ImageRgba8U:
-    """Opaque image of pixels (H, W, 3) as Drake has them."""
+    """Convert pixels (H, W, 3) to an opaque Drake image."""
     image = ImageRgba8U(pixels.shape[1], pixels.shape[0])
     image.mutable_data[..., :3] = pixels
     image.mutable_data[..., 3] = 255
@@ -114,29 +114,29 @@ def _depth_image(frame: Frame) -> ImageDepth32F:
 
 
 class DepthNoiseSystem(LeafSystem):
-    """Makes of a perfect depth image one as a camera measures it.
+    """Adds the noise of a depth camera to a perfect depth image.
 
     Input ports:
-        depth_image: `ImageDepth32F` of the intrinsics' size [m]; 0, infinite or NaN where nothing
-            is, as `RgbdSensor` has it.
+        depth_image: `ImageDepth32F` of the intrinsics' size [m]; 0, infinite or NaN without depth,
+            as of `RgbdSensor`.
         color_image: `ImageRgba8U` of the same pixels, optional: dark surfaces have holes.
-        normals: `Value[object]`, optional: (H, W, 3) unit normals in the camera's frame; those of
-            the depth image are taken, if not connected.
+        normals: `Value[object]`, optional: (H, W, 3) unit normals in the camera's frame; computed
+            from the depth image if not connected.
 
     Output port:
-        depth_image: `ImageDepth32F` [m], infinite where nothing is measured.
+        depth_image: `ImageDepth32F` [m], infinite where none is measured.
 
     The output is a function of the inputs and of the time; there is no state. Noise is drawn from
-    the seed and the context's time: it is the same however often and in whatever order the output
-    is evaluated, and another one at another time or with another seed.
+    the seed and the context's time: it does not depend on how often and in which order the output
+    is evaluated, and differs between times and seeds.
 
     Args:
-        noise: what the camera does to the image.
+        noise: noise of the camera.
         intrinsics: of the image.
         seed: of the noise; cameras with the same seed have the same noise.
-        period: between images [s]: noise changes with each, and stays in between, as it must
-            behind an image that is held (`RgbdSensorDiscrete`). It changes with every time at
-            which the output is evaluated if None.
+        period: between images [s]: noise changes with each image and stays in between, as needed
+            behind a held image (`RgbdSensorDiscrete`). If None, it changes with every evaluated
+            time.
 
     Raises:
         InvalidInputError: the seed is below 0 or has more than 64 bits, or the period is not above
@@ -190,14 +190,14 @@ class DepthNoiseSystem(LeafSystem):
         output.set_value(result)
 
     def _moment(self, context: Context) -> float | int:
-        """What the noise is drawn for: the number of the image, or the time [s]."""
+        """Key of the noise: the number of the image, or the time [s]."""
         time = float(context.get_time())
         # Periods before an image at which a time belongs to it.
         return time if self._period is None else math.floor(time / self._period + 1e-6)
 
 
 class SceneOverlay(LeafSystem):
-    """Draws the objects of a scene, at their places, over images of a camera.
+    """Draws a scene's objects at their target poses over camera images.
 
     Input ports:
         color_image: `ImageRgba8U` of the intrinsics' size.
@@ -205,15 +205,15 @@ class SceneOverlay(LeafSystem):
         valid: (1,), optional: above 0.5 if `X_SC` can be used; always, if not connected.
         estimate: `Value[BoardEstimate]`, optional: its `reason` is written where `X_SC` is not
             valid; where `valid` is not connected, this one's counts.
-        placement: `Value[PlacementCheck]`, optional: how far the objects stand from their places;
-            None while that is not known.
+        placement: `Value[PlacementCheck]`, optional: deviations of the objects from their targets;
+            None while unknown.
 
     Output port:
-        overlay_image: `ImageRgba8U`; where the pose is not valid, the plain image with a line that
-            says why.
+        overlay_image: `ImageRgba8U`; without a valid pose, the plain image with a line that says
+            why.
 
-    The output is a function of the current inputs, computed when one of them has changed and
-    somebody asks; there is no state, and nothing lags by a frame.
+    The output is a function of the current inputs, evaluated on demand; there is no state and no
+    lag.
     """
 
     def __init__(
@@ -222,9 +222,9 @@ class SceneOverlay(LeafSystem):
         """Loads the objects' surfaces.
 
         Args:
-            scene: whose objects.
+            scene: scene to draw.
             intrinsics: of the camera.
-            style: for good, as part of the system; the default one if None.
+            style: fixed style of the system; the default one if None.
 
         Raises:
             UnknownNameError: a mesh file of the library is missing.

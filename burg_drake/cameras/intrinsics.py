@@ -37,12 +37,12 @@ MAX_REPORTED_ERROR_PX = 10.0
 def describe_accuracy(
     known_to: float, except_at: Sequence[str], bounds: Mapping[str, str] = {}
 ) -> str:
-    """How well a camera is known, such as `to 0.21 pixels over the whole image`.
+    """Text on the accuracy of a camera, such as `to 0.21 pixels over the whole image`.
 
     Args:
-        known_to: bound of its error outside of the parts that are excepted [pixels].
-        except_at: those, of `IMAGE_PARTS`; where they are most of the image, the others are named.
-        bounds: what to say of some of them.
+        known_to: error bound outside the excepted parts [pixels].
+        except_at: excepted `IMAGE_PARTS`; if they are most of the image, the text names the others.
+        bounds: text on the bounds of some parts.
     """
     if not known_to < MAX_REPORTED_ERROR_PX:
         return f"no better than to {MAX_REPORTED_ERROR_PX:g} pixels"
@@ -51,12 +51,12 @@ def describe_accuracy(
     others = ", ".join(f"{name} ({bounds[name]})" if name in bounds else name for name in except_at)
     if not excludes_most_parts(except_at):
         return f"to {known_to:.2f} pixels, but for the {others}"
-    held = ", ".join(name for name in IMAGE_PARTS if name not in except_at)
-    return f"in the {held} only, to {known_to:.2f} pixels there, and not in the {others}"
+    named = ", ".join(name for name in IMAGE_PARTS if name not in except_at)
+    return f"in the {named} only, to {known_to:.2f} pixels there, and not in the {others}"
 
 
 def excludes_most_parts(except_at: Sequence[str]) -> bool:
-    """Most parts of the image are excepted."""
+    """Whether most parts of the image are excepted."""
     return 2 * len(except_at) > len(IMAGE_PARTS)
 
 
@@ -65,7 +65,7 @@ FISHEYE_COEFFICIENTS = 4  # Number of coefficients of the fisheye model.
 
 @dataclass(frozen=True)
 class FisheyeLens:
-    """A lens.
+    """The fisheye lens model of OpenCV.
 
     Attributes:
         coefficients: k1, k2, k3, k4.
@@ -83,19 +83,20 @@ class FisheyeLens:
 
     @cached_property
     def max_angle(self) -> float:
-        """Angle at which the polynomial leads back to the middle, or pi [rad]. Beyond, the image
-        goes on at one focal length a radian, so that nothing from there is put into it."""
+        """Angle at which the polynomial stops growing, or pi [rad]. Beyond it the radius continues
+        with one focal length per radian, so that no point from there appears in the image.
+        """
         roots = self._slope.roots()
         real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)]
         return float(min(real.min(initial=np.pi), np.pi))
 
     def radius(self, angle: Array) -> Array:
-        """Distances from the middle, in focal lengths, of angles off the axis [rad]."""
+        """Image radius in focal lengths for angles from the axis [rad]."""
         within = np.minimum(angle, self.max_angle)
         return np.asarray(self._radius(within) + (angle - within))
 
     def angle(self, radius: Array) -> Array:
-        """Angles off the axis [rad] that are seen at distances from the middle; pi beyond."""
+        """Angles from the axis [rad] for image radii; pi beyond the lens's range."""
         # Start values of the inversion, which Newton's method refines.
         table = np.linspace(0.0, self.max_angle, 512)
         end = float(self._radius(self.max_angle))
@@ -107,24 +108,23 @@ class FisheyeLens:
         return np.minimum(angle + (radius - inner), np.pi)
 
     def project(self, p_CQ: Array) -> Array:
-        """(..., 2) where points (..., 3) in the camera's frame are seen, in focal lengths."""
+        """(..., 2) image points of points (..., 3) in the camera's frame, in focal lengths."""
         aside = np.linalg.norm(p_CQ[..., :2], axis=-1)
         radius = self.radius(np.arctan2(aside, p_CQ[..., 2]))
-        # On the axis all directions are alike: ahead the radius is 0, behind any is outside.
+        # No direction is defined on the axis: ahead the radius is 0, behind is outside anyway.
         toward = p_CQ[..., :2] / np.maximum(aside, 1e-300)[..., None]
         toward = np.where((aside == 0.0)[..., None], [1.0, 0.0], toward)
         return np.asarray(toward * radius[..., None])
 
     def rays(self, bent: Array) -> Array:
-        """(..., 3) unit vectors of what is seen at (..., 2), in focal lengths from the middle."""
+        """(..., 3) unit vectors of the rays through image points (..., 2), in focal lengths."""
         radius = np.linalg.norm(bent, axis=-1)
         angle = self.angle(radius)
         aside = np.sin(angle) / np.maximum(radius, 1e-300)
         return np.concatenate([bent * aside[..., None], np.cos(angle)[..., None]], axis=-1)
 
     def undistort(self, bent: Array) -> Array:
-        """(..., 2) the same as by a lens without distortion; what is further off the axis than
-        87 degrees, there."""
+        """(..., 2) image points without distortion; clipped to 87 degrees from the axis."""
         radius = np.linalg.norm(bent, axis=-1)
         # Radians. An undistorted image ends there, at 19 focal lengths.
         straight = np.tan(np.minimum(self.angle(radius), np.radians(87.0)))
@@ -242,20 +242,20 @@ class Intrinsics:
 
     @property
     def is_pinhole(self) -> bool:
-        """Straight lines are straight in the image."""
+        """Whether there is no distortion."""
         return not self.is_fisheye and not any(self.distortion)
 
     @property
     def is_fisheye(self) -> bool:
-        """The lens is of the fisheye model, whose rays may come from beside the camera."""
+        """Whether the lens has the fisheye model, whose rays may come from beside the camera."""
         return self.model == "fisheye"
 
     def require_size(self, width: int, height: int, source: str) -> None:
-        """Refuses images of another size than the one that was calibrated.
+        """Reject images of another size than the calibrated one.
 
         Args:
             width, height: of the image [pixels].
-            source: what the message calls it, such as `photo.png` or `camera 0`.
+            source: name in the message, such as `photo.png` or `camera 0`.
 
         Raises:
             InvalidInputError: the sizes differ.
@@ -271,8 +271,8 @@ class Intrinsics:
         """Image points of points in the camera's frame, lens distortion included.
 
         Args:
-            p_CQ: (..., 3) points before the camera (z > 0) [m]; of a fisheye anywhere, as it puts
-                those outside of the image that it does not see.
+            p_CQ: (..., 3) points in front of the camera (z > 0) [m]; anywhere for a fisheye, which
+                projects invisible points outside the image.
 
         Returns:
             (..., 2) pixels.
@@ -291,10 +291,10 @@ class Intrinsics:
         return np.asarray(pixels).reshape(*p.shape[:-1], 2)
 
     def undistort(self, pixels: Array) -> Array:
-        """(..., 2) pixels of the same camera without distortion, from those of the real one.
+        """(..., 2) pixels of the same camera without distortion, from distorted pixels.
 
-        That camera sees less than 180 degrees: what a fisheye sees more than 87 degrees off its
-        axis is put there.
+        That camera sees less than 180 degrees: rays of a fisheye are clipped to 87 degrees from the
+        axis.
         """
         import cv2
 
@@ -312,7 +312,7 @@ class Intrinsics:
         return np.asarray(straight).reshape(q.shape)
 
     def rays(self, pixels: Array) -> Array:
-        """(..., 3) unit vectors in the camera's frame along which pixels (..., 2) look."""
+        """(..., 3) unit vectors of the rays through pixels (..., 2), in the camera's frame."""
         if self.is_fisheye:
             bent = (np.asarray(pixels, dtype=float) - self.center) / self.focal
             return fisheye_lens(self.distortion).rays(bent)
@@ -333,7 +333,7 @@ def camera_intrinsics(camera: Camera) -> Intrinsics:
 
 
 def of_camera_info(info: Any) -> Intrinsics:
-    """From Drake's `CameraInfo`."""
+    """Convert Drake's `CameraInfo` to intrinsics."""
     return Intrinsics(
         width=info.width(),
         height=info.height(),
@@ -346,8 +346,8 @@ def camera_info(intrinsics: Intrinsics) -> Any:
     """Drake's `CameraInfo`.
 
     Raises:
-        InvalidInputError: the camera has distortion, or is a fisheye, which Drake's is not; or its
-            principal point is outside of the image.
+        InvalidInputError: the camera has distortion or is a fisheye, which Drake does not support;
+            or its principal point is outside the image.
     """
     from pydrake.systems.sensors import CameraInfo
 
@@ -381,8 +381,9 @@ class FieldOfView:
 
     @cached_property
     def directions(self) -> Array:
-        """(H, W, 3) where the centre of each pixel looks, in the camera's frame, at z = 1; at most
-        87 degrees off the axis of a fisheye."""
+        """(H, W, 3) points at z = 1 on the rays of the pixels' centres, in the camera's frame; up
+        to 87 degrees from the axis of a fisheye.
+        """
         width, height = self.intrinsics.width, self.intrinsics.height
         grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
         flat = (self.intrinsics.undistort(grid) - self.intrinsics.center) / self.intrinsics.focal
@@ -390,7 +391,7 @@ class FieldOfView:
 
     @cached_property
     def _field(self) -> tuple[Array, Array]:
-        """Least and largest x / z and y / z that are in view, with the margin."""
+        """Least and largest x / z and y / z in view, with a margin."""
         # Fraction of the image beyond its edge; lens models fold farther points back.
         margin = 0.05
         edges = self.directions[[0, -1]], self.directions[:, [0, -1]]
@@ -399,9 +400,10 @@ class FieldOfView:
         return lower - margin * (upper - lower), upper + margin * (upper - lower)
 
     def sees(self, p_CQ: Array) -> Booleans:
-        """(...) whether points (..., 3) lie before the camera and in its field of view, or barely
-        outside; only such may be projected."""
+        """(...) whether points (..., 3) are in front of the camera and in, or barely outside, its
+        field of view; only these may be projected.
+        """
         lower, upper = self._field
         depth = p_CQ[..., 2:]
-        beside = (p_CQ[..., :2] < lower * depth) | (p_CQ[..., :2] > upper * depth)
-        return np.asarray((depth[..., 0] >= NEAR_DISTANCE) & ~beside.any(axis=-1))
+        outside = (p_CQ[..., :2] < lower * depth) | (p_CQ[..., :2] > upper * depth)
+        return np.asarray((depth[..., 0] >= NEAR_DISTANCE) & ~outside.any(axis=-1))

@@ -38,10 +38,9 @@ DEFAULT_CAMERA = "board"  # Camera of a station with several cameras if the refe
 
 
 def find_simulated_camera(reference: str) -> tuple[Station, str]:
-    """Station and name of the camera of `sim:STATION[/CAMERA]`.
+    """Find the station and the camera's name for `sim:STATION[/CAMERA]`.
 
-    A station is a built-in name or a file. Without a name of a camera it is the one called
-    `board`, or the only one.
+    STATION is a built-in name or a file. CAMERA defaults to `board`, or to the only one.
 
     Raises:
         UnknownNameError: no such station or camera.
@@ -74,24 +73,24 @@ def find_simulated_camera(reference: str) -> tuple[Station, str]:
 
 
 def read_opencv(text: str, name: str) -> Tree:
-    """The contents of a file.
+    """Parse the contents of an OpenCV file.
 
     Args:
-        text: of the file.
+        text: contents of the file.
         name: stands for the file in messages.
 
     Raises:
-        DocumentError: it is neither such YAML nor such XML, or beyond the limits of documents.
+        DocumentError: it is neither OpenCV's YAML nor its XML, or exceeds the limits of documents.
     """
     if text.lstrip().startswith("<"):
         return _read_xml(text, name)
-    if text.startswith("%YAML"):  # `%YAML:1.0`, which YAML does not know, on a line of its own
+    if text.startswith("%YAML"):  # `%YAML:1.0`, which is not valid YAML, on a line of its own
         text = "#" + text
     return parse_plain_yaml(text, name, tags=STANDARD_TAGS | {"tag:yaml.org,2002:opencv-matrix"})
 
 
 def _read_xml(text: str, name: str) -> Tree:
-    """Elements as dicts by tag; the text of one that is called `data` is a list of words."""
+    """Parse XML elements to dicts by tag; text of `data` elements becomes a list of words."""
     parser: Any = ElementTree.XMLPullParser(("start", "end"))
     opened: list[dict[str, Any]] = [{}]
     values, line = 0, 1
@@ -251,15 +250,16 @@ def _intrinsics_from_ros(data: Tree, name: str) -> Intrinsics:
 
 
 def is_ros_fisheye(model: str, coefficients: Sequence[float]) -> bool:
-    """Whether a distortion model of ROS is a fisheye's. With four zeros it is one, whose angles are
-    even; messages without coefficients, or with five zeros, are of cameras without distortion."""
+    """Whether a distortion model of ROS is a fisheye. Four zeros are an equidistant fisheye;
+    messages without coefficients, or with five zeros, are of cameras without distortion.
+    """
     return model == ROS_FISHEYE_MODEL and (
         len(coefficients) == FISHEYE_COEFFICIENTS or any(coefficients)
     )
 
 
 def _refuse_cropped_image(data: Tree, name: str) -> None:
-    """A message tells K of the sensor's image, and which part of it the images are."""
+    """Reject messages whose images are a part of the sensor's image, to which K refers."""
     binning = [_read_integer(data, key, name) for key in ("binning_x", "binning_y") if key in data]
     roi = data.get("roi")
     roi = roi if isinstance(roi, dict) else {}
@@ -273,7 +273,7 @@ def _refuse_cropped_image(data: Tree, name: str) -> None:
 
 
 def _read_size(data: Tree, name: str) -> tuple[int, int]:
-    """Width and height, which messages call by other keys than files."""
+    """Width and height; messages and files use different keys."""
     keys = [
         side if side in data and f"image_{side}" not in data else f"image_{side}"
         for side in ("width", "height")
@@ -315,7 +315,7 @@ def _read_camera_matrix(data: Tree, name: str) -> list[float]:
 
 
 def _read_numbers(data: Tree, keys: tuple[str, ...], name: str) -> list[float]:
-    """A matrix of a file, or a list of a message, whose key may be any of some."""
+    """Numbers of the first of several keys: a matrix in a file, a list in a message."""
     key = next((key for key in keys if key in data), None)
     value = None if key is None else data[key]
     if isinstance(value, dict):
@@ -356,7 +356,7 @@ def _build_intrinsics(
     camera: str = "",
     residual: float | None = None,
 ) -> Intrinsics:
-    """Intrinsics from numbers of a file; what is wrong names the file."""
+    """Build intrinsics from a file's numbers; errors name the file."""
     width, height = _read_size(data, name)
     try:
         return Intrinsics(

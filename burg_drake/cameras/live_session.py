@@ -27,12 +27,12 @@ from burg_drake.core import BurgError, Bytes, InvalidInputError
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened.
+    """A reported event.
 
     Attributes:
-        number: counts events.
+        number: sequence number.
         text: one line.
-        bad: something went wrong.
+        bad: whether it is an error.
     """
 
     number: int
@@ -41,7 +41,7 @@ class Event:
 
 
 class EventLog:
-    """Events, from any thread.
+    """A thread-safe log of events.
 
     Args:
         on_event: called with each as it happens.
@@ -69,15 +69,15 @@ class EventLog:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Picture:
-    """What the view shows.
+    """A processed frame as the view shows it.
 
     Attributes:
-        number: counts pictures; changed settings make a new one of the same frame.
+        number: sequence number; changed settings make a new picture of the same frame.
         located: the frame and its estimate.
         overlay: (H, W, 3) RGB.
         jpeg: the overlay, encoded.
-        settings, placement: that it was drawn with.
-        milliseconds: what stages took, by name.
+        settings, placement: used for drawing.
+        milliseconds: duration of each stage, by name.
     """
 
     number: int
@@ -93,18 +93,18 @@ SourceState = Literal["waiting", "running", "lost", "ended"]
 
 
 class FrameReader:
-    """The next frame of a source.
+    """Reads the frames of a source in a thread.
 
-    Of a live source that is the newest: who is slow misses frames, and never sees old ones. Of
-    files it is every one, in turn.
+    A live source gives its newest frame: slow readers miss frames, but never get old ones. Files
+    give every frame in turn.
 
     Args:
-        source: is closed with the reader.
-        paced: play files as fast as they were taken, not as fast as frames are asked for.
+        source: source of frames; closed with the reader.
+        paced: play files at their frame rate, not as fast as frames are taken.
         changed: notified when a frame has come or the state has changed; notify it when frames
             may be wanted again.
-        events: are told when the camera is lost, is back, or a frame cannot be read.
-        wanted: whether anybody wants frames; as long as nobody does, none is read.
+        events: log for a lost or recovered camera and unreadable frames.
+        wanted: returns whether frames are wanted; none are read otherwise.
     """
 
     def __init__(
@@ -123,18 +123,18 @@ class FrameReader:
         self.failure: BaseException | None = None
         """What ended the thread, if that was no end of the source."""
         self._paced = paced and not source.live
-        self._changed, self._events, self._wanted = changed, events, wanted
+        self._changed, self._events, self._frames_wanted = changed, events, wanted
         self._next: Frame | None = None
         self._shown: tuple[float, float] | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name="frame reader", daemon=True)
 
     def start(self) -> None:
-        """Begins to read."""
+        """Start the thread."""
         self._thread.start()
 
     def take(self) -> Frame | None:
-        """The next frame, once; None if there is none yet."""
+        """Take the next frame; None if there is none yet."""
         with self._changed:
             frame, self._next = self._next, None
             self._changed.notify_all()
@@ -142,15 +142,15 @@ class FrameReader:
 
     @property
     def is_empty(self) -> bool:
-        """There is no next frame now."""
+        """Whether no next frame is available now."""
         return self._next is None
 
     def close(self) -> None:
-        """Ends the thread and closes the source."""
+        """End the thread and close the source."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
-        if self.source.live:  # a file is closed by its reader only: OpenCV's must not be disturbed
+        if self.source.live:  # only the reader closes a file: OpenCV's capture is not thread-safe
             self.source.close()
         if self._thread.ident is not None:
             self._thread.join()
@@ -160,13 +160,13 @@ class FrameReader:
         try:
             while not self._closed.is_set() and self._read_one():
                 with self._changed:
-                    self._changed.wait_for(lambda: self._closed.is_set() or self._wanted())
-        except BaseException as error:  # ends the thread; who waits for frames raises it
+                    self._changed.wait_for(lambda: self._closed.is_set() or self._frames_wanted())
+        except BaseException as error:  # ends the thread; raised again where frames are awaited
             self.failure = error
         self._set_state("ended")
 
     def _read_one(self) -> bool:
-        """Hands over a frame; whether there may be more."""
+        """Read and deliver a frame; return whether there may be more."""
         try:
             frame = self.source.read()
         except CameraLost as error:
@@ -182,10 +182,12 @@ class FrameReader:
         return frame is not None
 
     def _keep_time(self, frame: Frame) -> None:
-        """Waits until a file's frame is due; after a delay the rest comes later, not faster."""
+        """Wait until a file's frame is due; after a delay later frames are postponed, not sped
+        up.
+        """
         now = time.monotonic()
         due, before = self._shown or (now, frame.time)
-        # Seconds between two frames of a file, whatever their times say.
+        # Largest wait between two frames of a file, in seconds.
         due = max(due + min(max(frame.time - before, 0.0), 2.0), now)
         self._shown = (due, frame.time)
         self._closed.wait(due - now)
@@ -217,12 +219,12 @@ RATE_WINDOW = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class FrameCounts:
-    """Of the frames that were looked at.
+    """Counts of the processed frames.
 
     Attributes:
-        frames: all.
-        valid: those that gave a pose.
-        reason: why the last one without did not.
+        frames: all frames.
+        valid: frames with a pose.
+        reason: why the last frame without a pose had none.
     """
 
     frames: int = 0
@@ -231,20 +233,20 @@ class FrameCounts:
 
 
 class LiveSession:
-    """A running session; `start` it, and `close` it.
+    """A live view of a source; call `start`, and `close` at the end.
 
     Args:
-        processor: what looks at frames and draws.
-        source: of the frames; closed with this.
-        events: are told what happens to camera and pose, never once a frame.
-        settings: to begin with.
-        paced: play files as fast as they were taken; else as fast as they can be looked at.
-        idle_after: frames of a camera are neither read nor looked at when nobody has asked for a
-            picture, or kept it `awake`, for so long [s]. Whoever asks gets a new one.
+        processor: processes and draws frames.
+        source: source of frames; closed with the session.
+        events: log for changes of camera and pose, not for single frames.
+        settings: initial settings.
+        paced: play files at their frame rate; else as fast as they can be processed.
+        idle_after: stop reading and processing a camera's frames if for so long no picture was
+            requested and nothing kept the session awake [s]. The next request gets a new picture.
 
     Attributes:
-        picture: the newest; None before the first.
-        counts: of frames so far.
+        picture: the newest picture; None before the first.
+        counts: counts of frames so far.
         last_located: the last frame that gave a pose; before one did, the last frame.
 
     Raises:
@@ -275,7 +277,7 @@ class LiveSession:
             wanted=lambda: not self.is_idle,
         )
         self._idle_after = idle_after if source.live else math.inf
-        self._asked, self._waiting = math.inf, 0
+        self._last_request, self._waiter_count = math.inf, 0
         self._awake: list[Callable[[], bool]] = []
         self._settings = check_settings(processor.scene, settings)
         self._placement: PlacementCheck | None = None
@@ -285,17 +287,17 @@ class LiveSession:
         self._failure: BaseException | None = None
         self._moments: deque[float] = deque()
         self._reported: tuple[bool, bool] | None = None
-        self._same_since = (0.0, (False, False))
+        self._pose_state = (0.0, (False, False))
         self._worker = threading.Thread(target=self._run, name="live session", daemon=True)
 
     def start(self, frames: int | None = None) -> None:
-        """Begins to look at frames, no more than `frames` of them if given."""
-        self._limit, self._asked = frames, time.monotonic()
+        """Start processing frames, at most `frames` of them if given."""
+        self._limit, self._last_request = frames, time.monotonic()
         self.reader.start()
         self._worker.start()
 
     def close(self) -> None:
-        """Ends both threads, and the source."""
+        """End both threads and close the source."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -304,35 +306,37 @@ class LiveSession:
             self._worker.join()
 
     def on_frame(self, listener: Callable[[Picture], None]) -> None:
-        """Calls `listener` with the first picture of each frame, in the thread that draws."""
+        """Call `listener` with the first picture of each frame, in the drawing thread."""
         self._on_frame.append(listener)
 
     def keep_awake(self, reason: Callable[[], bool]) -> None:
-        """Does not idle as long as `reason` says so, such as while something is recorded."""
+        """Keep the session from idling while `reason()` is true, such as during a recording."""
         self._awake.append(reason)
 
     @property
     def is_idle(self) -> bool:
-        """Nobody wants pictures."""
-        unasked = not self._waiting and time.monotonic() - self._asked > self._idle_after
-        return unasked and not any(reason() for reason in self._awake)
+        """Whether the session idles, as no pictures are wanted."""
+        timed_out = (
+            not self._waiter_count and time.monotonic() - self._last_request > self._idle_after
+        )
+        return timed_out and not any(reason() for reason in self._awake)
 
     def request_pictures(self) -> int:
-        """Somebody wants pictures from now on; wakes the session where it idles.
+        """Request pictures, and wake the session if it idles.
 
         Returns:
-            The number of the newest picture, if it is from before an idle time, and stale; else 0.
+            The number of the newest picture if it is stale, from before an idle time; else 0.
         """
         with self._changed:
             waits = self.picture is not None and self.is_idle and not self._settings.frozen
             stale = self.picture.number if self.picture is not None and waits else 0
-            self._asked = time.monotonic()
+            self._last_request = time.monotonic()
             self._changed.notify_all()
         return stale
 
     @property
     def settings(self) -> ViewSettings:
-        """What viewers chose."""
+        """The viewers' settings."""
         return self._settings
 
     def change(self, /, **settings: Any) -> None:
@@ -348,7 +352,7 @@ class LiveSession:
 
     @property
     def placement(self) -> PlacementCheck | None:
-        """How the objects stand, as it was measured last; shown in the overlay."""
+        """The last placement check, shown in the overlay."""
         return self._placement
 
     @placement.setter
@@ -359,46 +363,46 @@ class LiveSession:
 
     @property
     def rate(self) -> float:
-        """Frames a second that were looked at, of late."""
+        """Processed frames per second in the last seconds."""
         now = time.monotonic()
         return sum(now - moment <= RATE_WINDOW for moment in tuple(self._moments)) / RATE_WINDOW
 
     def next_picture(self, after: int, seconds: float) -> Picture | None:
-        """The newest picture, as soon as its number is above `after`; None if that takes longer.
+        """Wait for a picture with a number above `after`; None after a timeout [s].
 
-        Of a session that idles it is the next one.
+        An idle session gives the next new picture.
         """
         with self._changed:
             after = max(after, self.request_pictures())
-            self._waiting += 1
+            self._waiter_count += 1
             self._changed.notify_all()
             try:
                 self._changed.wait_for(
                     lambda: self._closed or (self.picture and self.picture.number > after), seconds
                 )
             finally:
-                self._waiting -= 1
+                self._waiter_count -= 1
             picture = self.picture
         return picture if picture is not None and picture.number > after else None
 
     def newest_picture(self, seconds: float) -> Picture | None:
-        """The newest picture; of a session that idles, the next one within a time [s]."""
+        """The newest picture; an idle session gives the next one within a timeout [s]."""
         stale = self.request_pictures()
         return self.next_picture(stale, seconds) if stale else self.picture
 
     def wait(self, *, seconds: float | None = None, to_end: bool = True) -> None:
-        """Until all frames were looked at, or so much time has gone by.
+        """Wait until all frames are processed, or for a timeout.
 
         Args:
-            seconds: any time if None.
-            to_end: a file that has ended is an end.
+            seconds: timeout; none if None.
+            to_end: return at the end of a file, too.
 
         Raises:
-            BaseException: what ended a thread of the session.
+            BaseException: the error that ended a thread of the session.
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
         with self._changed:
-            # In pieces: an interrupt may have come in another thread, which does not wake this one.
+            # Polls: an interrupt in another thread does not wake this one.
             while not self._is_over(to_end) and (left := end - time.monotonic()) > 0:
                 # Seconds between checks for the end of the session.
                 self._changed.wait(min(left, 0.5))
@@ -408,7 +412,7 @@ class LiveSession:
 
     @property
     def is_over(self) -> bool:
-        """No frame will be looked at any more, such as after that of a photograph."""
+        """Whether no frame will be processed any more, such as after a photograph."""
         return self._is_over(to_end=True)
 
     def _is_over(self, to_end: bool) -> bool:
@@ -425,13 +429,13 @@ class LiveSession:
         try:
             while not self._closed:
                 self._run_once()
-        except BaseException as error:  # ends the thread; who waits for it raises it
+        except BaseException as error:  # ends the thread; raised again in `wait`
             self._failure = error
         with self._changed:
             self._changed.notify_all()
 
     def _run_once(self) -> None:
-        """Waits for something to do, and does it."""
+        """Wait for a frame or a changed setting and process it."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._redraw or self._wants_frame)
             if self._closed:
@@ -457,7 +461,7 @@ class LiveSession:
     def _process(self, frame: Frame) -> LocatedFrame | None:
         try:
             located = self.processor.locate(frame, steady=self._settings.steady)
-        except BurgError as error:  # one image of a folder may have another size
+        except BurgError as error:  # an image of a folder may have another size
             self.events.add(f"{error}; left out", bad=True)
             self.counts = replace(self.counts, frames=self.counts.frames + 1, reason=str(error))
             return None
@@ -477,7 +481,7 @@ class LiveSession:
         return located
 
     def picture_of(self, located: LocatedFrame, placement: PlacementCheck | None) -> Picture:
-        """Draws a picture with the settings as they are."""
+        """Draw a picture with the current settings."""
         settings = self._settings
         overlay, drawing = time_call(lambda: self.processor.draw(located, settings, placement))
         jpeg, encoding = time_call(lambda: encode_jpeg(overlay, 88))
@@ -500,13 +504,13 @@ class LiveSession:
             listener(picture)
 
     def _report_pose(self, located: LocatedFrame, now: float) -> None:
-        """An event when the pose comes or goes, and stays so for a while."""
+        """Add an event when a pose appears or disappears for some time."""
         state = (located.estimate.valid, bool(located.estimate.reason))
-        if self._same_since[1] != state:
-            self._same_since = (now, state)
+        if self._pose_state[1] != state:
+            self._pose_state = (now, state)
         # Seconds. A pose that appears or disappears for less time is not reported.
-        lasting = now - self._same_since[0] >= 1.0
-        if self._reported is None or (state != self._reported and lasting):
+        is_stable = now - self._pose_state[0] >= 1.0
+        if self._reported is None or (state != self._reported and is_stable):
             self._reported = state
             line = describe_pose(located.estimate, self.processor.scene.board)
             self.events.add(f"{located.frame.name}: {line}", bad=not state[0])

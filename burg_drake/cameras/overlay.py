@@ -105,7 +105,7 @@ ARC_SEGMENTS = 12  # Straight lines of an arc.
 
 @dataclass(frozen=True, eq=False)
 class _DrawState:
-    """What one `draw` works with."""
+    """State of one call of `draw`."""
 
     shape: SceneMesh
     X_CS: Array
@@ -118,7 +118,7 @@ class Overlay:
     """Draws the objects of a scene over images of one camera.
 
     Attributes:
-        scene: whose objects.
+        scene: scene to draw.
         intrinsics: of the camera.
         style: used where `draw` is given none; may be replaced at any time.
     """
@@ -140,9 +140,9 @@ class Overlay:
         self.scene, self.intrinsics = scene, intrinsics
         self.style = style or OverlayStyle()
         self._view = FieldOfView(intrinsics)
-        self._whole = build_scene_mesh(scene)
+        self._full_mesh = build_scene_mesh(scene)
         self._shown: dict[tuple[str, ...] | None, tuple[SurfaceCamera, Array, Indices]] = {}
-        self._colors = {name: _instance_color(i) for i, name in enumerate(self._whole.names)}
+        self._colors = {name: _instance_color(i) for i, name in enumerate(self._full_mesh.names)}
 
     def draw(
         self,
@@ -157,14 +157,14 @@ class Overlay:
         Args:
             image: (H, W, 3) red, green, blue.
             X_SC: (4, 4) camera's optical frame in the scene frame.
-            placement: how far the objects stand from their places, if that is known.
-            style: instead of the overlay's own.
+            placement: deviations of the objects from their targets, if known.
+            style: replaces the overlay's own.
 
         Returns:
-            (H, W, 3) another image; the given one stays as it is.
+            (H, W, 3) a new image.
 
         Raises:
-            InvalidInputError: the image is of another size or kind than the camera's.
+            InvalidInputError: the image has the wrong size or type.
             UnknownNameError: `style.shown` names an instance that the scene does not have.
         """
         style = style or self.style
@@ -192,7 +192,7 @@ class Overlay:
         return drawn
 
     def notice(self, image: Bytes, text: str) -> Bytes:
-        """The plain image with a line of text, such as why nothing is drawn over it.
+        """Draw a line of text over the image, such as why there is no overlay.
 
         Args:
             image: (H, W, 3) red, green, blue.
@@ -210,16 +210,18 @@ class Overlay:
         return np.array(image, order="C")
 
     def _camera(self, shown: tuple[str, ...] | None) -> tuple[SurfaceCamera, Array, Indices]:
-        """What looks at the instances shown, and their footprints with the instances' numbers."""
+        """Surface camera for the shown instances, and their footprints with the instances'
+        numbers.
+        """
         if shown not in self._shown:
-            shape = self._whole.select(shown)
+            shape = self._full_mesh.select(shown)
             self._shown[shown] = (SurfaceCamera(shape, self._view), *object_footprints(shape))
         return self._shown[shown]
 
     def _footprints(
         self, state: _DrawState, lines: Array, owner: Indices, colors: Array
     ) -> LineSet:
-        """Where objects stand, as far as no other object is seen there."""
+        """Lines of the footprints that no other object hides."""
         ends, line = clip_lines(transform_points(state.X_CS, lines), self._view)
         pixels, owner = self.intrinsics.project(ends), owner[line]
         height, width = state.surface.owner.shape
@@ -230,13 +232,13 @@ class Overlay:
         return _line_set(pixels[seen], colors[owner[seen]], 1.2, 0.7, INNER_RIM_OPACITY)
 
     def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
-        """Lines (N, 2, 3) in S, in the color of what they say."""
+        """Project lines (N, 2, 3) in S, in the color of their verdict."""
         ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
         colors = np.tile(np.array(VERDICT_COLORS[verdict], dtype=float), (len(ends), 1))
         return _line_set(self.intrinsics.project(ends), colors, 3.0, 1.0, RIM_OPACITY)
 
     def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
-        """Names of what can be seen, and how it stands."""
+        """Write names of visible objects, and their corrections."""
         owner = state.surface.owner
         seen = np.bincount(owner[owner != NO_OWNER], minlength=len(state.shape.names))
         boxes, plates = [], []
@@ -257,16 +259,16 @@ class Overlay:
 
 
 def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
-    """Which instance each pixel shows.
+    """Label each pixel with the instance that it shows.
 
     Args:
-        scene: whose objects, at their places; as loaded, or a reference for `load_scene`.
+        scene: scene with the objects at their targets; as loaded, or a reference for `load_scene`.
         intrinsics: of the camera.
         X_SC: (4, 4) camera's optical frame in the scene frame.
 
     Returns:
         (H, W) numbers of the instances, in the order of `scene.instances` and then
-        `scene.background`; -1 where there is none.
+        `scene.background`; -1 for none.
     """
     shape, view = build_scene_mesh(as_scene(scene)), FieldOfView(intrinsics)
     lines = visible_lines(shape, view, X_SC)
@@ -276,7 +278,7 @@ def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> ND
 def _correction_marks(
     shape: SceneMesh, placement: PlacementCheck | None, style: OverlayStyle
 ) -> dict[str, CorrectionMark]:
-    """By instance, what is left to do."""
+    """Correction marks by instance."""
     if placement is None or not style.errors:
         return {}
     return {
@@ -287,8 +289,9 @@ def _correction_marks(
 
 
 def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
-    """Outlines and inner lines; the former say by their colour how an object stands, and are dashed
-    where that is uncertain."""
+    """Outlines and inner lines. An outline's colour shows the placement; it is dashed if that is
+    uncertain.
+    """
     lines, rims = state.lines, np.array(colors)
     for number, name in enumerate(state.shape.names):
         if name in state.marks:
@@ -307,10 +310,11 @@ def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
 
 def _dash_mask(ends: Array) -> Booleans:
     """(N,) which of the short lines (N, 2, 2) around an object [pixels] belong to a dash: those in
-    every other sector about its middle, as lines do not come in the order of the outline."""
+    every other sector about its middle, as lines are not ordered along the outline.
+    """
     arms = ends.mean(axis=1) - ends.mean(axis=(0, 1))
     around = 2 * np.pi * np.linalg.norm(arms, axis=1).mean() if len(arms) else 0.0
-    dashes = max(round(around / (2 * 7.0)), 4)  # Pixels. About half the distance between dashes.
+    dashes = max(round(around / (2 * 7.0)), 4)  # Pixels. About half the period of dashes.
     share = np.arctan2(arms[:, 1], arms[:, 0]) / (2 * np.pi) % 1.0
     return np.asarray((share * dashes) % 1.0 < 0.6)
 
@@ -323,7 +327,9 @@ def _line_set(
 
 
 def _instance_color(number: int) -> tuple[int, int, int]:
-    """Of an instance by its place in the scene: the first ones' stay apart for all eyes."""
+    """Color of an instance by its index in the scene; the first ones are safe for color
+    blindness.
+    """
     rest = number - len(CATEGORY_COLORS)
     rgb = CATEGORY_COLORS[number][:3] if rest < 0 else distinct_colors(rest + 1)[rest]
     r, g, b = (round(255 * c) for c in rgb)
@@ -338,8 +344,8 @@ def _face_brightness(shape: SceneMesh) -> Bytes:
     """(F,) brightness of faces, lit from above."""
     ambient = 0.4  # Brightness of faces that the light does not reach.
     light = LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)
-    lit = np.clip(shape.outline.normals @ light, 0.0, 1.0)
-    return np.asarray(np.round(255 * (ambient + (1.0 - ambient) * lit)), np.uint8)
+    diffuse = np.clip(shape.outline.normals @ light, 0.0, 1.0)
+    return np.asarray(np.round(255 * (ambient + (1.0 - ambient) * diffuse)), np.uint8)
 
 
 PlacementVerdict = Literal["placed", "off", "uncertain", "not_seen"]
@@ -355,11 +361,11 @@ VERDICT_COLORS: dict[PlacementVerdict, tuple[int, int, int]] = {
 
 @dataclass(frozen=True, eq=False)
 class CorrectionMark:
-    """What is drawn for one object.
+    """Text and arrows for one object.
 
     Attributes:
-        verdict: how it stands.
-        text: in words; empty if there is nothing to say.
+        verdict: state of the placement.
+        text: correction as text; empty if there is none.
         lines: (N, 2, 3) arrows in S [m].
     """
 
@@ -369,12 +375,12 @@ class CorrectionMark:
 
 
 def correction_mark(placement: Placement, style: OverlayStyle, height: float) -> CorrectionMark:
-    """What is left to do with an object.
+    """Build the mark for the remaining correction of an object.
 
     Args:
-        placement: how it stands.
+        placement: of the object.
         style: has the tolerances.
-        height: at which arrows are drawn, z in S [m].
+        height: z of the arrows in S [m].
     """
     nothing = np.empty((0, 2, 3))
     uncertain = placement.status == "uncertain"
@@ -399,7 +405,7 @@ def correction_mark(placement: Placement, style: OverlayStyle, height: float) ->
 
 
 def circle_extra_object(extra: ExtraObject) -> Array:
-    """(N, 2, 3) lines on the board around something that is no object of the scene, in S [m]."""
+    """(N, 2, 3) lines of a circle on the board around an extra object, in S [m]."""
     around = np.linspace(0.0, 2.0 * np.pi, 2 * ARC_SEGMENTS + 1)
     radius = max(0.6 * extra.width, ARROW_HEAD_LENGTH)
     x, y = extra.position
@@ -409,11 +415,13 @@ def circle_extra_object(extra: ExtraObject) -> Array:
 
 
 def _correction_text(placement: Placement, uncertain: bool) -> str:
-    """Distance and turn, of an uncertain object with a question mark and standard deviations."""
+    """Distance and angle; with a question mark and standard deviations if uncertain."""
     far_sd = placement.displacement_sd if uncertain else None
     turn_sd = placement.angle_sd if uncertain else None
-    far = 1e3 * math.hypot(*(placement.displacement or (0.0, 0.0)))
-    text = _format_number(far, None if far_sd is None else 1e3 * math.hypot(*far_sd)) + " mm"
+    millimetres = 1e3 * math.hypot(*(placement.displacement or (0.0, 0.0)))
+    text = (
+        _format_number(millimetres, None if far_sd is None else 1e3 * math.hypot(*far_sd)) + " mm"
+    )
     if placement.angle is not None:
         turn = abs(math.degrees(placement.angle))
         text += f" {_format_number(turn, None if turn_sd is None else math.degrees(turn_sd))}°"
@@ -426,7 +434,7 @@ def _format_number(value: float, sd: float | None) -> str:
 
 
 def _arrow_lines(target: Array, move: Array) -> Array:
-    """To the target, along a move, drawn longer than that where it is short."""
+    """Lines of an arrow that ends at the target; short moves are drawn longer."""
     length = float(np.linalg.norm(move))
     drawn = max(length, 0.035)  # Metres. Arrows for shorter corrections are drawn this long.
     along = move / length
@@ -435,7 +443,7 @@ def _arrow_lines(target: Array, move: Array) -> Array:
 
 
 def _turn_arrow_lines(center: Array, angle: float) -> Array:
-    """An arc about the vertical, with a head at its end."""
+    """Lines of an arc about the vertical, with an arrow head."""
     share = np.linspace(-ARC_ANGLE / 2, ARC_ANGLE / 2, ARC_SEGMENTS + 1)
     around = math.copysign(1.0, angle) * share - math.pi / 2
     radial = np.column_stack([np.cos(around), np.sin(around), np.zeros_like(around)])
@@ -454,10 +462,10 @@ def _arrow_head_lines(tip: Array, along: Array, length: float) -> Array:
 
 
 def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: float) -> None:
-    """Blends surfaces into an image (H, W, 3), in place.
+    """Blend surfaces into an image (H, W, 3), in place.
 
     Args:
-        surface: what each pixel shows.
+        surface: instance and shade of each pixel.
         colors: (N, 3) of the instances, 0 to 255.
         opacity: 0 to 1.
     """
@@ -465,7 +473,7 @@ def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: 
     if not len(at) or opacity == 0.0:
         return
     weight = round(256 * opacity)
-    # All colours that occur, times their weight; the row is 256 times the instance plus the shade.
+    # Table of weighted colours; its row is 256 times the instance plus the shade.
     shaded = colors[:, None, :] * np.arange(256)[None, :, None] / 255.0
     table = np.round(weight * shaded).astype(np.uint16).reshape(-1, 3)
     row = surface.owner.ravel()[at].astype(np.int32) * 256 + surface.shade.ravel()[at]
@@ -478,10 +486,10 @@ def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: 
 
 @dataclass(frozen=True, eq=False)
 class LineSet:
-    """Lines to be drawn.
+    """Lines to draw.
 
     Attributes:
-        ends: (N, 2, 2) of short lines [pixels].
+        ends: (N, 2, 2) ends of short lines [pixels].
         colors: (N, 3), 0 to 255.
         width: (N,) [pixels].
         opacity: (N,) 0 to 1.
@@ -496,7 +504,7 @@ class LineSet:
 
 
 def blend_lines(image: Bytes, inks: Sequence[LineSet]) -> None:
-    """Draws lines into an image (H, W, 3), in place; a pixel takes the nearest."""
+    """Draw lines into an image (H, W, 3), in place; each pixel takes the nearest line."""
     rim_width = 1.2  # Pixels. Dark rim on both sides of a line, for contrast with white paper.
     ends, colors, width, opacity, rim = (
         np.concatenate([getattr(ink, field.name) for ink in inks]) for field in fields(LineSet)
@@ -515,12 +523,12 @@ def blend_lines(image: Bytes, inks: Sequence[LineSet]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class LinePixels:
-    """Pixels at lines.
+    """Pixels near lines.
 
     Attributes:
         at: (P,) indices into the flattened image.
-        distance: (P,) from the rim of the line, negative within it [pixels].
-        line: (P,) which of the lines is nearest.
+        distance: (P,) distance to the line's rim, negative inside the line [pixels].
+        line: (P,) index of the nearest line.
     """
 
     at: Indices
@@ -528,14 +536,14 @@ class LinePixels:
     line: Indices
 
     def cover(self, wider: float = 0.0) -> Array:
-        """(P,) share of each pixel that the line covers, or one that is wider on both sides."""
+        """(P,) coverage of each pixel by the line, widened by `wider` on both sides."""
         return np.clip(0.5 + wider - self.distance, 0.0, 1.0)
 
 
 def rasterize_lines(
     ends: Array, half_width: Array, reach: float, size: tuple[int, int]
 ) -> LinePixels:
-    """The pixels at lines.
+    """Find the pixels near lines.
 
     Args:
         ends: (N, 2, 2) ends of the lines [pixels], short ones.
@@ -544,7 +552,7 @@ def rasterize_lines(
         size: width and height of the image [pixels].
     """
     steps_per_pixel = 1 << 10  # Resolution of the distances.
-    unreached = np.iinfo(np.int64).max  # Value of pixels that no line reaches.
+    unreached = np.iinfo(np.int64).max  # Value of pixels without a line.
     width, height = size
     nearest = np.full(width * height, unreached)
     if len(ends):
@@ -559,7 +567,7 @@ def rasterize_lines(
 def _pixels_near_lines(
     ends: Array, limit: Array, size: tuple[int, int]
 ) -> tuple[Indices, Array, Indices]:
-    """Pixels nearer to each line than its limit: where, how near, and the line's index."""
+    """Pixels within each line's limit: their indices, distances and lines."""
     width, height = size
     center = np.round(ends.mean(axis=1)).astype(np.int64)
     half = 0.5 * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())

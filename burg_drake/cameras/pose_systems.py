@@ -22,12 +22,12 @@ from burg_drake.scene import Board
 class BoardPoseEstimator(LeafSystem):
     """Estimates where a camera is over a board.
 
-    A pure function of the images at its inputs: no state, no update, no lag. A picture is looked at
-    once, however many outputs are read, and the next one as soon as it is at the input.
+    A pure function of the input images: no state, no update, no lag. Each image is processed once,
+    however many outputs are read.
 
     Input ports:
-        color_image: `ImageRgba8U`, of the size of the intrinsics; one without pixels, as of a
-            source that has none yet, gives an estimate that is not valid.
+        color_image: `ImageRgba8U`, of the size of the intrinsics; an empty image, as of a source
+            without frames yet, gives an invalid estimate.
         depth_image: `ImageDepth32F` [m] of the same camera, to measure the print's size; may be
             left unconnected.
 
@@ -36,7 +36,7 @@ class BoardPoseEstimator(LeafSystem):
         valid: 1.0 if the pose can be used, else 0.0.
         reprojection_error: [pixels]; NaN while not valid.
         covariance: (36,) row by row, see `BoardEstimate.covariance`; NaN while not valid.
-        estimate: all of it, as `BoardEstimate`.
+        estimate: the whole `BoardEstimate`.
 
     Args:
         board: the board.
@@ -98,14 +98,14 @@ def evaluate_optional(port: InputPort, context: Context) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What a filter remembers.
+    """State of a pose filter.
 
     Attributes:
         X_SC: (4, 4) filtered pose; None before the first.
         information: (6, 6) sum of the estimates' inverse covariances, faded by age.
         covariance: (6, 6) of `X_SC`.
-        rejected_in_a_row: estimates in a row that were not near it.
-        age: updates since the last estimate that was.
+        rejected_in_a_row: consecutive estimates that were rejected.
+        age: updates since the last accepted estimate.
     """
 
     X_SC: Array | None = None
@@ -122,8 +122,8 @@ class PoseFilter(LeafSystem):
     the old information fades, so that at rest errors are those of a mean of `window` estimates,
     lower by the square root of that. An estimate farther from the filtered pose than noise explains
     (a chi-square of 33.1) is held back; with the `patience`-th in a row the filter starts again
-    from it. So what is shown lags behind a moved camera by less than `patience` updates, but for
-    moves that are smaller than the noise, which it follows within about `window` updates.
+    from it. So the output lags behind a moved camera by less than `patience` updates; moves smaller
+    than the noise are followed within about `window` updates.
 
     Input ports:
         estimate: `BoardEstimate`, from `BoardPoseEstimator`.
@@ -138,11 +138,11 @@ class PoseFilter(LeafSystem):
     Args:
         period: time between updates [s].
         offset: of the updates from whole periods [s], below `period`; a thousandth of it if not
-            given. Systems that are updated at the same moment see each other as they were before
-            it, so that without an offset a filter behind a held image is one image late.
-        window: number of estimates that the mean is as good as.
-        patience: estimates in a row that make a new pose.
-        hold: updates without a fitting estimate for which the last pose stays valid.
+            given. Systems updated at the same time see each other's previous state, so without an
+            offset a filter behind a held image is one image late.
+        window: number of estimates in an equivalent plain mean.
+        patience: consecutive rejected estimates after which the filter restarts.
+        hold: updates without an accepted estimate for which the last pose stays valid.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class PoseFilter(LeafSystem):
                 "a pose filter takes a period above 0 [s], a window and patience of at least 1, and"
                 " hold of at least 0"
             )
-        # Periods by which updates are later than the image's.
+        # Delay of updates after the image's, in periods.
         offset = 1e-3 * period if offset is None else offset
         if not 0.0 <= offset < period:
             raise InvalidInputError(
@@ -167,7 +167,7 @@ class PoseFilter(LeafSystem):
                 f" period of {period:g} s"
             )
         # The variance of an exponential mean with this factor is 1 / window of one estimate's.
-        self._keep = (window - 1.0) / (window + 1.0)
+        self._decay = (window - 1.0) / (window + 1.0)
         self._patience, self._hold = patience, hold
         self._input = self.DeclareAbstractInputPort("estimate", AbstractValue.Make(BoardEstimate()))
         self._state = self.DeclareAbstractState(AbstractValue.Make(Track()))
@@ -180,23 +180,25 @@ class PoseFilter(LeafSystem):
         self.DeclareVectorOutputPort("covariance", 36, self._calc_covariance, state)
 
     def update(self, track: Track, estimate: BoardEstimate) -> Track:
-        """What the filter remembers after one more estimate."""
+        """The filter's state after a new estimate."""
         aged = replace(track, age=track.age + 1)
         if not estimate.valid:
             return aged
         R = estimate.covariance
         seen = np.asarray(np.linalg.inv(R))
-        fresh = Track(estimate.X_SC, seen, R)
+        restarted = Track(estimate.X_SC, seen, R)
         if track.X_SC is None or not self._valid(track):
-            return fresh
+            return restarted
         step = pose_difference(track.X_SC, estimate.X_SC)
         # Chi-square of 6 degrees of freedom that 1 in 100,000 samples exceeds.
         if step @ np.linalg.solve(track.covariance + R, step) > 33.1:
             rejected = track.rejected_in_a_row + 1
             return (
-                fresh if rejected >= self._patience else replace(aged, rejected_in_a_row=rejected)
+                restarted
+                if rejected >= self._patience
+                else replace(aged, rejected_in_a_row=rejected)
             )
-        information = self._keep * track.information + seen
+        information = self._decay * track.information + seen
         gain = np.asarray(np.linalg.solve(information, seen))
         rest = np.eye(6) - gain
         covariance = rest @ track.covariance @ rest.T + gain @ R @ gain.T

@@ -54,7 +54,7 @@ class RecordingFiles:
 
     @property
     def videos(self) -> tuple[Path, ...]:
-        """One or both."""
+        """The videos: one or both."""
         return (self.video, self.plain) if self.with_plain else (self.video,)
 
     @property
@@ -68,31 +68,31 @@ class RecordingFiles:
         return self.video.with_suffix(".recording.yaml")
 
     @property
-    def growing(self) -> tuple[Path, ...]:
-        """What is written while the recording goes on."""
+    def growing_files(self) -> tuple[Path, ...]:
+        """The files written during the recording."""
         return (*self.videos, self.table)
 
     def existing(self) -> Path | None:
-        """The first of them that exists, finished or not; None if there is none."""
-        wanted = (*self.growing, self.document, *map(partial_path, self.growing))
+        """The first existing file of the recording, finished or partial; None if there is none."""
+        wanted = (*self.growing_files, self.document, *map(partial_path, self.growing_files))
         return next((path for path in wanted if os.path.lexists(path)), None)
 
 
 def partial_path(path: Path) -> Path:
-    """Where a file is written first; the suffix stays, which tells OpenCV the format."""
+    """Temporary path of a file while it is written; OpenCV needs the suffix for the format."""
     return path.with_name(f".{path.stem}.partial{path.suffix}")
 
 
 def require_video_path(path: str | Path, *, plain: bool = False) -> Path:
-    """Finds out whether a recording can be made there.
+    """Check that a recording can be written.
 
     Args:
         path: of the video.
         plain: there will be one without overlay, too.
 
     Raises:
-        InvalidInputError: another suffix than those of `VIDEO_CODECS`, a file exists that the
-            recording would replace, or no writable place.
+        InvalidInputError: the suffix is not in `VIDEO_CODECS`, a file exists, or the folder is not
+            writable.
     """
     path = Path(path)
     if path.suffix.lower() not in VIDEO_CODECS:
@@ -118,9 +118,9 @@ class RecordedPoses:
     """The table of a recording.
 
     Attributes:
-        frames: (N,) the frame of the video that first shows it.
+        frames: (N,) first frame of the video with each picture.
         times: (N,) of the pictures [s].
-        X_SC: (N, 4, 4) camera in the scene frame; NaN where there was no pose.
+        X_SC: (N, 4, 4) camera in the scene frame; NaN without a pose.
     """
 
     frames: Indices
@@ -129,7 +129,7 @@ class RecordedPoses:
 
 
 def table_row(frame: int, time: float, estimate: BoardEstimate) -> list[Any]:
-    """A row of `RECORDING_COLUMNS`.
+    """Build a row of `RECORDING_COLUMNS`.
 
     Args:
         frame: of the video.
@@ -218,7 +218,7 @@ class Recording:
     """Writes a recording, frame by frame, until it is closed.
 
     The video has a fixed rate: a picture is repeated until the next one was taken, so that it plays
-    as fast as things happened. Every picture that is added is in it.
+    in real time. It contains every added picture.
 
     Args:
         path: of the video, .mp4 or .avi; the others of `RecordingFiles` are written beside it.
@@ -308,11 +308,11 @@ class Recording:
         """Finishes the files and gives them their names.
 
         Returns:
-            The video; None if no picture was added, and then no file is left.
+            The video; None if no picture was added, in which case no file is left.
 
         Raises:
-            InvalidInputError: what was written cannot be read back (disk full), or a file of one of
-                the names was made meanwhile. What was recorded is left under its hidden names.
+            InvalidInputError: the video cannot be read back (disk full), or a file of that name was
+                created meanwhile. The recording stays under its temporary names.
         """
         if self._stream.closed:
             return self.path if self.pictures else None
@@ -328,7 +328,7 @@ class Recording:
                     f"{partial_path(path)} has {found} of the {self.frames} recorded frames; is the"
                     " disk full?"
                 )
-        for path in (*files.growing, files.document):
+        for path in (*files.growing_files, files.document):
             if os.path.lexists(path):
                 raise InvalidInputError(
                     f"{path} was created while recording; the recording is kept as"
@@ -340,7 +340,7 @@ class Recording:
         return self.path
 
     def _release(self) -> None:
-        """Closes what is open."""
+        """Close the open files."""
         for writer in self._writers:
             writer.release()
         try:
@@ -349,14 +349,14 @@ class Recording:
             raise InvalidInputError(f"cannot write {self._files.table}: {error}") from error
 
     def _abandon(self) -> None:
-        """Leaves nothing of a recording without pictures."""
+        """Delete the files of a recording without pictures."""
         with contextlib.suppress(BurgError):
             self._release()
-        for path in self._files.growing:
+        for path in self._files.growing_files:
             partial_path(path).unlink(missing_ok=True)
 
     def _fill(self, time: float) -> None:
-        """Repeats the last picture until a new one was taken."""
+        """Repeat the last picture up to the time of a new one."""
         assert self._last is not None
         before, pictures = self._last
         # Seconds. Longer pauses of a lost camera are shortened in the video.

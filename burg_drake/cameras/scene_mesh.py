@@ -24,11 +24,11 @@ from burg_drake.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class MeshContour:
-    """Edges of a mesh at which it turns away from a point of view.
+    """Contour edges of a mesh from a point of view.
 
     Attributes:
         edges: (N,) indices into `MeshOutline.edges`.
-        faces: (N,) a face at each that is seen from the front; for open edges the only one.
+        faces: (N,) a front face at each edge; for open edges the only face.
     """
 
     edges: Indices
@@ -36,17 +36,17 @@ class MeshContour:
 
 
 class MeshOutline:
-    """A mesh, prepared to tell its contour from any point of view.
+    """A mesh prepared for contours from any point of view.
 
-    Closed surfaces wound outward have exact contours. The boundary of an open one counts as
-    contour, as it does on a sheet. Where surfaces touch along an edge, each pair is told apart.
+    Closed surfaces wound outward have exact contours. The boundary of an open surface counts as
+    contour. Surfaces that touch along an edge are separated into pairs of faces.
 
     Attributes:
         vertices: (V, 3) in the object frame O [m].
-        faces: (F, 3) corners of the triangles that have an area.
-        kept: (F,) which of the given faces these are.
-        edges: (E, 2) vertices at the edges' ends; where more than two faces meet there is one for
-            every pair of them.
+        faces: (F, 3) corners of the non-degenerate triangles.
+        kept: (F,) their indices among the given faces.
+        edges: (E, 2) vertices at the edges' ends; an edge with more than two faces is repeated for
+            every pair.
         sides: (E, 2) faces at each edge; the second is -1 for an open one.
     """
 
@@ -67,10 +67,10 @@ class MeshOutline:
         offsets = -np.einsum("ij,ij->i", normals, corners[self.kept, 0])
         self._planes = np.column_stack([normals, offsets])
         self.edges, self.sides = _mesh_edges(self.faces)
-        self._bend = self._bends()
+        self._bend_angle = self._bends()
         self._open = self.sides[:, 1] < 0
-        self._rim = np.flatnonzero(self._open)
-        self._outward = ~self._open & (self._bend > 0.0)
+        self._open_edges = np.flatnonzero(self._open)
+        self._convex = ~self._open & (self._bend_angle > 0.0)
         self._first, self._second = self.sides.T.copy()
 
     @property
@@ -81,36 +81,38 @@ class MeshOutline:
     def contour(self, p_OC: Array) -> MeshContour:
         """The contour from a point of view.
 
-        Edges that the solid bends inwards at are left out: one of their faces hides them.
+        Concave edges are left out: one of their faces hides them.
 
         Args:
             p_OC: (3,) point of view in O [m].
         """
         front = self.front(p_OC)
-        turns = (front[self._first] != front[self._second]) & self._outward
+        turns = (front[self._first] != front[self._second]) & self._convex
         edges = np.flatnonzero(turns)
         first, second = self.sides[edges].T
         faces = np.where(front[first], first, second)
         return MeshContour(
-            np.concatenate([edges, self._rim]), np.concatenate([faces, self._first[self._rim]])
+            np.concatenate([edges, self._open_edges]),
+            np.concatenate([faces, self._first[self._open_edges]]),
         )
 
     def front(self, p_OC: Array, faces: Indices | None = None) -> Booleans:
-        """Which faces a point of view in O sees from the front, if nothing is before them.
+        """Which faces have their front towards a point of view in O, without occlusion.
 
         Args:
             p_OC: (3,) [m].
-            faces: indices of any shape, which is that of the result; all (F,) if None.
+            faces: indices of any shape, which the result shares; all (F,) if None.
         """
         planes = self._planes if faces is None else self._planes[faces]
         return np.asarray(planes @ np.append(p_OC, 1.0) > 0.0)
 
     @cached_property
     def creases(self) -> Indices:
-        """(N,) edges at which the surface bends outwards or inwards by more than 35 degrees,
-        as far as they hang together over 2 cm."""
+        """(N,) edges at which the surface bends by more than 35 degrees, in connected creases of at
+        least 2 cm.
+        """
         # Radians between two faces.
-        sharp = np.flatnonzero((np.abs(self._bend) > np.deg2rad(35.0)) & ~self._open)
+        sharp = np.flatnonzero((np.abs(self._bend_angle) > np.deg2rad(35.0)) & ~self._open)
         starts, ends = self.edges[sharp].T
         graph = coo_array((np.ones(len(sharp)), (starts, ends)), shape=(len(self.vertices),) * 2)
         _, group = connected_components(graph, directed=False)
@@ -120,7 +122,7 @@ class MeshOutline:
         return np.asarray(sharp[whole[group[starts]] > 0.02])
 
     def _bends(self) -> Array:
-        """(E,) angle between the faces at an edge, positive where it sticks out [rad]."""
+        """(E,) angle between the faces at an edge, positive if convex [rad]."""
         first, second = self.normals[self.sides[:, 0]], self.normals[self.sides[:, 1]]
         across = np.linalg.norm(np.cross(first, second), axis=1)
         angle = np.arctan2(across, np.einsum("ij,ij->i", first, second))
@@ -131,7 +133,7 @@ class MeshOutline:
 
 
 def _mesh_edges(faces: Indices) -> tuple[Indices, Indices]:
-    """Edges (E, 2) and the two faces at each (E, 2), -1 where there is no second."""
+    """Edges (E, 2) and their two faces (E, 2), -1 for a missing second one."""
     pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort(pairs.T)
@@ -150,7 +152,7 @@ TriangleArrays = tuple[Array, Indices]
 
 
 class SceneMesh:
-    """What of a scene can be seen.
+    """The visible surfaces of a scene.
 
     Attributes:
         names: instances, free ones first, in the scene's order; their index is their number.
@@ -178,7 +180,7 @@ class SceneMesh:
         self.boxes: Array = np.array(corners).reshape(-1, 2, 3)
 
     def select(self, names: tuple[str, ...] | None) -> SceneMesh:
-        """Some of the instances alone; all if None.
+        """Mesh of some of the instances; of all if None.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -198,7 +200,7 @@ class SceneMesh:
 
     @cached_property
     def rays(self) -> RayCaster:
-        """Casts rays at the surfaces, in S."""
+        """Ray caster for the surfaces, in S."""
         return RayCaster(self.outline.vertices, self.outline.faces)
 
 
@@ -217,19 +219,19 @@ def build_scene_mesh(scene: Scene) -> SceneMesh:
 
 
 def object_footprints(shape: SceneMesh) -> tuple[Array, Indices]:
-    """Outlines of where objects stand on the board, without their dents.
+    """Convex outlines of the objects' contact areas on the board.
 
     Returns:
-        (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) the number of the
-        instance of each; none for what stands on other objects.
+        (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) their instances'
+        numbers; none for objects that stand on others.
     """
     lines, owner = [np.empty((0, 2, 3))], [np.empty(0, np.int64)]
     for number, name in enumerate(shape.names):
         vertices = shape.vertices(name)
         # Metres. Lower points of an object are in contact with the board.
-        flat = vertices[vertices[:, 2] <= 2e-3, :2]
+        contact = vertices[vertices[:, 2] <= 2e-3, :2]
         try:
-            corners = flat[ConvexHull(flat).vertices]
+            corners = contact[ConvexHull(contact).vertices]
         except (QhullError, ValueError):  # no, or too few, points, or all on a line
             continue
         ring = np.column_stack([corners, np.zeros(len(corners))])

@@ -18,7 +18,7 @@ CREASE_KIND = 2  # A sharp edge of an object.
 
 @dataclass(frozen=True, eq=False)
 class VisibleLines:
-    """Bits of lines that a camera sees.
+    """Visible pieces of a scene's lines.
 
     Attributes:
         ends: (N, 2, 2) in the image [pixels].
@@ -32,7 +32,7 @@ class VisibleLines:
 
 
 def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLines:
-    """The lines of a scene that a camera sees.
+    """Find the visible lines of a scene.
 
     Args:
         shape: of the scene.
@@ -55,14 +55,14 @@ def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLi
 
 
 def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
-    """Lines cut to what is in view, and into short bits, which follow a lens where it bends them.
+    """Clip lines to the view and split them into short pieces, which follow the lens distortion.
 
     Args:
         p_CQ: (N, 2, 3) ends of the lines in the camera's frame [m].
         view: the camera's.
 
     Returns:
-        (M, 2, 3) ends of the bits, and (M,) the line that each is of.
+        (M, 2, 3) ends of the pieces, and (M,) indices of their lines.
     """
     depth = p_CQ[..., 2]
     line = np.flatnonzero((depth > NEAR_DISTANCE).any(axis=1))
@@ -80,7 +80,7 @@ def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
     count = np.maximum(np.ceil(length / 3.0), 1).astype(int)
     part = np.repeat(np.arange(len(count)), count)
     step = np.arange(len(part)) - np.repeat(np.cumsum(count) - count, count)
-    # Even steps in the image, so that bits near the camera are not longer than others.
+    # Even steps in the image, so that pieces near the camera are not longer than others.
     share = np.stack([step, step + 1], axis=1) / count[part, None]
     near, far = p_CQ[part, 0, 2][:, None], p_CQ[part, 1, 2][:, None]
     share = share * near / (share * near + (1.0 - share) * far)
@@ -98,10 +98,10 @@ def _find_visible(
     kind: Indices,
     owner: Indices,
 ) -> tuple[Booleans, Indices]:
-    """Which bits are seen, and their kinds.
+    """Which pieces are visible, and their kinds.
 
     Args:
-        inside: (N, 3) points of the surface beside each bit, in C.
+        inside: (N, 3) points of the surface beside each piece, in C.
     """
     if not len(p_CQ):
         return np.zeros(0, bool), kind
@@ -132,11 +132,11 @@ NO_OWNER = -1  # Owner of pixels that show no object.
 
 @dataclass(frozen=True, eq=False)
 class SurfaceImage:
-    """What the pixels show.
+    """Instance and shade of each pixel.
 
     Attributes:
-        owner: (H, W) number of the instance, `NO_OWNER` where there is none.
-        shade: (H, W) brightness of the surface as bytes; 0 where there is none.
+        owner: (H, W) number of the instance, `NO_OWNER` for none.
+        shade: (H, W) brightness of the surface as bytes; 0 for none.
     """
 
     owner: NDArray[np.int16]
@@ -144,7 +144,7 @@ class SurfaceImage:
 
 
 class SurfaceCamera:
-    """Sees the surfaces of a scene.
+    """Renders the surfaces of a scene.
 
     Attributes:
         shape: of the scene.
@@ -158,20 +158,20 @@ class SurfaceCamera:
         rows, columns = (
             np.minimum(np.arange(0, n + RAY_SPACING_PX, RAY_SPACING_PX), n - 1) for n in self._size
         )
-        # One node more than blocks in each direction; the last may stand nearer.
+        # One node more than blocks in each direction; the last may be closer.
         blocks = [-(-n // RAY_SPACING_PX) for n in self._size]
         self._nodes = np.ix_(rows[: blocks[0] + 1], columns[: blocks[1] + 1])
         self._x, self._y = np.moveaxis(directions[self._nodes][..., :2], 2, 0).copy()
 
     def render(self, X_SC: Array, lines: VisibleLines, shades: Bytes) -> SurfaceImage:
-        """The surfaces from a pose of the camera.
+        """Render the surfaces from a pose of the camera.
 
         Args:
             X_SC: (4, 4) camera's optical frame in the scene frame.
-            lines: that it sees from there, see `visible_lines`.
+            lines: visible lines from that pose, see `visible_lines`.
             shades: (F,) brightness of each face.
         """
-        owner, shade = self._at_nodes(X_SC, shades)
+        owner, shade = self._render_nodes(X_SC, shades)
         corners = np.stack([owner[:-1, :-1], owner[:-1, 1:], owner[1:, :-1], owner[1:, 1:]])
         mixed = (corners != corners[0]).any(axis=0) | self._outline_blocks(lines)
         whole = corners[0].repeat(RAY_SPACING_PX, axis=0).repeat(RAY_SPACING_PX, axis=1)
@@ -186,8 +186,8 @@ class SurfaceCamera:
         image.owner[at], image.shade[at] = self._cast(X_SC, self._directions[at], shades)
         return image
 
-    def _at_nodes(self, X_SC: Array, shades: Bytes) -> tuple[NDArray[np.int16], Bytes]:
-        """Owner and shade at the nodes; rays are cast where there may be something."""
+    def _render_nodes(self, X_SC: Array, shades: Bytes) -> tuple[NDArray[np.int16], Bytes]:
+        """Owner and shade at the nodes; rays are cast only near objects."""
         looking = self._candidate_nodes(X_SC)
         owner = np.full(looking.shape, NO_OWNER, np.int16)
         shade = np.zeros(looking.shape, np.uint8)
@@ -196,7 +196,7 @@ class SurfaceCamera:
         return owner, shade
 
     def _candidate_nodes(self, X_SC: Array) -> Booleans:
-        """Nodes that look into the smallest upright rectangle around an instance's box."""
+        """Nodes inside the image rectangle around an instance's bounding box."""
         showing = np.zeros(self._x.shape, bool)
         X_CS = inverse(X_SC)
         for lower, upper in self.shape.boxes:
@@ -215,7 +215,7 @@ class SurfaceCamera:
     def _cast(
         self, X_SC: Array, directions: Array, shades: Bytes
     ) -> tuple[NDArray[np.int16], Bytes]:
-        """Owner and shade of what rays (..., 3) in C meet."""
+        """Owner and shade of the surfaces that rays (..., 3) in C hit."""
         flat, size = directions.reshape(-1, 3) @ X_SC[:3, :3].T, directions.shape[:-1]
         if not len(flat):
             return np.empty(size, np.int16), np.empty(size, np.uint8)
@@ -226,7 +226,7 @@ class SurfaceCamera:
         return owner.reshape(size), shade.reshape(size)
 
     def _outline_blocks(self, lines: VisibleLines) -> Booleans:
-        """Blocks that an outline runs through, or within a pixel of; it is cut into short bits."""
+        """Blocks within a pixel of an outline, which consists of short pieces."""
         rows, columns = (-(-n // RAY_SPACING_PX) for n in self._size)
         crossed = np.zeros((rows, columns), bool)
         points = lines.ends[lines.kind == OUTLINE_KIND].reshape(-1, 2)
@@ -237,7 +237,7 @@ class SurfaceCamera:
         return crossed
 
     def _interpolate(self, shade: Bytes) -> Bytes:
-        """Shades between the nodes."""
+        """Interpolate shades between the nodes."""
         import cv2
 
         scale = np.array([[RAY_SPACING_PX, 0.0, 0.0], [0.0, RAY_SPACING_PX, 0.0]])

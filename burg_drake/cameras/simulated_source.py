@@ -24,18 +24,18 @@ SIMULATED_FPS = 10.0  # Frames per second of simulated cameras.
 
 
 class SimulatedSource(FrameSource):
-    """A camera of a station that looks at a scene, where everything stands as the scene says.
+    """A simulated camera of a station over a scene with all objects at their targets.
 
-    It renders in a thread of its own, so that any thread may read: a renderer belongs to the thread
-    that made it.
+    It renders in its own thread, so that any thread may read: a renderer belongs to the thread that
+    created it.
 
     Args:
-        scene: what stands on the board.
+        scene: objects on the board.
         station: has the camera; its robot is left out.
         camera: name of the camera.
         fps: frames a second, in simulated time and, if `live`, in real time.
-        X_WC: where the camera is at a time [s], (4, 4); where the station puts it if not given.
-        live: frames come as from a real camera, at `fps`; if not, as fast as they are rendered.
+        X_WC: returns the camera's pose (4, 4) at a time [s]; the station's pose if not given.
+        live: give frames at `fps`, as a real camera; else as fast as they are rendered.
 
     Attributes:
         station, camera: as given.
@@ -77,7 +77,7 @@ class SimulatedSource(FrameSource):
         moment = self._number / (self.fps or SIMULATED_FPS)
         if self.live:
             ahead = self._start + moment - time.monotonic()
-            if ahead < -max_delay:  # nobody has read for a while: time has gone on
+            if ahead < -max_delay:  # no reads for a while: catch up with real time
                 self._number = math.ceil((moment - ahead) * (self.fps or SIMULATED_FPS))
                 return self.read()
             self._closed.wait(ahead)
@@ -87,7 +87,7 @@ class SimulatedSource(FrameSource):
         try:
             return self._thread.submit(self._render, moment).result()
         except RuntimeError:
-            if self._closed.is_set():  # by another thread, just now
+            if self._closed.is_set():  # closed by another thread just now
                 return None
             raise
 
@@ -95,8 +95,8 @@ class SimulatedSource(FrameSource):
         """No more frames."""
         if not self._closed.is_set():
             self._closed.set()
-            gc.collect()  # here, what was rendered here: an engine ends in the thread it began in
-            self._thread.submit(self._drop)
+            gc.collect()  # a render engine must be destroyed in its own thread
+            self._thread.submit(self._release_renderer)
             self._thread.shutdown()
 
     def _build(self, scene: Scene) -> None:
@@ -110,13 +110,13 @@ class SimulatedSource(FrameSource):
         )
         return Frame(image, depth, moment, self.name)
 
-    def _drop(self) -> None:
+    def _release_renderer(self) -> None:
         self._renderer = None
         gc.collect()
 
 
 class _Renderer:
-    """The station's diagram, and the camera in it."""
+    """Renders one camera of a station's diagram."""
 
     def __init__(self, scene: Scene, station: Station, camera: str) -> None:
         self._diagram = build_station_diagram(scene, station, robot="none", cameras=True).diagram
@@ -124,7 +124,9 @@ class _Renderer:
         self._camera = f"camera.{camera}"
 
     def render(self, moment: float, X_WC: Array | None) -> tuple[Bytes, Array]:
-        """Colour (H, W, 3) and depth (H, W) at a time, from where the camera is or shall be."""
+        """Colour (H, W, 3) and depth (H, W) at a time, from the given or the station's camera
+        pose.
+        """
         self._context.SetTime(moment)
         if X_WC is not None:
             sensor = self._diagram.GetSubsystemByName(self._camera)

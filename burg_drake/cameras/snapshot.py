@@ -96,10 +96,10 @@ class SnapshotDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Snapshot:
-    """A picture, and what was drawn over it.
+    """A picture with its overlay and document.
 
     Attributes:
-        document: what is known about it.
+        document: pose and origin of the picture.
         image: (H, W, 3) uint8 RGB as the camera gave it.
         overlay: (H, W, 3) uint8 RGB.
         depth: (H, W) float32 distances along the optical axis [m], from cameras that have them.
@@ -112,7 +112,7 @@ class Snapshot:
 
 
 def describe_board(estimate: BoardEstimate) -> SeenBoard:
-    """An estimate as a document; numbers that are not known are left out."""
+    """Convert an estimate to a document; unknown numbers are left out."""
     known = bool(np.isfinite(estimate.covariance).all())
     return SeenBoard(
         X_SC=Pose.from_matrix(estimate.X_SC, quaternion=True) if estimate.valid else None,
@@ -125,40 +125,40 @@ def describe_board(estimate: BoardEstimate) -> SeenBoard:
 
 
 def describe_scene(scene: Scene) -> CheckedScene:
-    """What a document says about the scene it belongs to."""
+    """Entry of a document about its scene."""
     return CheckedScene(name=scene.name, path=str(scene.path), content=scene.content)
 
 
 def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
-    """Writes a new folder, whole or not at all.
+    """Write a new folder atomically.
 
     Raises:
         InvalidInputError: the folder exists, or cannot be written.
     """
     folder = require_new_folder(folder)
-    beside = None
+    partial = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        beside = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
-        beside.mkdir()
-        write_image(beside / IMAGE_FILE, snapshot.image)
-        write_image(beside / OVERLAY_FILE, snapshot.overlay)
+        partial = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
+        partial.mkdir()
+        write_image(partial / IMAGE_FILE, snapshot.image)
+        write_image(partial / OVERLAY_FILE, snapshot.overlay)
         if snapshot.depth is not None:
-            np.save(beside / DEPTH_FILE, snapshot.depth.astype(np.float32))
-        save_document(snapshot.document, beside / DOCUMENT_FILE)
-        save_document(snapshot.document.intrinsics, beside / "intrinsics.yaml")
-        beside.rename(folder)
+            np.save(partial / DEPTH_FILE, snapshot.depth.astype(np.float32))
+        save_document(snapshot.document, partial / DOCUMENT_FILE)
+        save_document(snapshot.document.intrinsics, partial / "intrinsics.yaml")
+        partial.rename(folder)
     except OSError as error:
         raise InvalidInputError(
             f"cannot write {folder}: {error.strerror or error}; choose a writable place"
         ) from error
     finally:
-        if beside is not None:
-            shutil.rmtree(beside, ignore_errors=True)
+        if partial is not None:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def require_new_folder(folder: str | Path) -> Path:
-    """Finds out whether a snapshot can be saved there.
+    """Check that a snapshot can be saved to a folder.
 
     Raises:
         InvalidInputError: something of that name exists, or nothing can be written there.
@@ -171,10 +171,10 @@ def require_new_folder(folder: str | Path) -> Path:
 
 
 def load_snapshot(folder: str | Path) -> Snapshot:
-    """Reads what `save_snapshot` wrote.
+    """Read a snapshot that `save_snapshot` wrote.
 
     Raises:
-        DocumentError: no snapshot there, or one that does not fit the schema.
+        DocumentError: no snapshot there, or it does not fit the schema.
         InvalidInputError: a picture or the depth is missing, damaged, or of another size than the
             intrinsics.
     """
@@ -198,7 +198,7 @@ def next_free_path(
     *,
     taken: Callable[[Path], bool] = Path.exists,
 ) -> Path:
-    """The first of `prefix_001`, `prefix_002`, ... in a folder that is not taken."""
+    """The first unused path of `prefix_001`, `prefix_002`, ... in a folder."""
     number = 1
     while taken(path := Path(folder) / f"{prefix}_{number:03d}{suffix}"):
         number += 1
@@ -216,7 +216,7 @@ def describe_snapshot(
     X_SC_drawn: Array | None = None,
     placement: PlacementCheck | None = None,
 ) -> SnapshotDocument:
-    """The document of a snapshot."""
+    """Build the document of a snapshot."""
     if X_SC_drawn is None or not estimate.valid or np.array_equal(X_SC_drawn, estimate.X_SC):
         drawn = None
     else:
@@ -240,7 +240,7 @@ def _finite_or_none(value: float) -> float | None:
 
 
 def _read(read: Callable[[Path], T], path: Path) -> T:
-    """What a file of a snapshot holds; of a missing or damaged one, the error says what to do."""
+    """Read a file of a snapshot; errors for missing or damaged files say what to do."""
     try:
         return read(path)
     except InvalidInputError as error:

@@ -38,12 +38,12 @@ def open_source(
             an image file, a folder of them, or a pattern such as `photos/*.jpg`;
             any other file: a video.
             A list of image files, folders and patterns is one sequence.
-        scene: for a simulated camera.
-        size: width and height that a camera of this machine shall have [pixels].
-        fps: images a second that a camera of this machine, or a simulated one, shall take.
+        scene: seen by a simulated camera.
+        size: requested width and height for a camera of this machine [pixels].
+        fps: requested frames per second of a local or simulated camera.
 
     Raises:
-        InvalidInputError: there is no such thing, or it cannot be read.
+        InvalidInputError: the source does not exist or cannot be read.
         UnknownNameError: no such station, or it has no such camera.
         MissingDependencyError: a simulated camera without the renderer's system libraries.
     """
@@ -84,7 +84,7 @@ def _open_images(references: Sequence[str]) -> FrameSource:
 
 
 def image_paths(references: Sequence[str]) -> list[Path]:
-    """Image files by their names, folders or patterns such as `photos/*.jpg`.
+    """Find image files by names, folders or patterns such as `photos/*.jpg`.
 
     Raises:
         InvalidInputError: there are none.
@@ -116,7 +116,8 @@ class ImageSource(FrameSource):
 
     Args:
         paths: of the files.
-        name: of the source; the file's, or the first's and how many there are, if not given.
+        name: of the source; by default the file's name, or the first file's and the number of
+            files.
 
     Raises:
         InvalidInputError: there are no files, or none can be read.
@@ -159,7 +160,7 @@ class ImageSource(FrameSource):
 
 
 def images_in(folder: Path) -> list[Path]:
-    """Image files of a folder, `view9.png` before `view10.png`.
+    """List the image files of a folder, `view9.png` before `view10.png`.
 
     Raises:
         InvalidInputError: there are none.
@@ -171,12 +172,12 @@ def images_in(folder: Path) -> list[Path]:
 
 
 def is_image(path: Path) -> bool:
-    """An image by its name; hidden files are not."""
+    """Whether a path names an image; hidden files do not count."""
     return path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
 
 
 def sort_naturally(paths: Sequence[Path]) -> list[Path]:
-    """Paths by name, numbers in them by value."""
+    """Sort paths by name, with numbers in them by value."""
 
     def key(path: Path) -> list[tuple[int, str]]:
         parts = re.split(r"(\d+)", str(path))
@@ -190,13 +191,13 @@ DEFAULT_VIDEO_FPS = 30.0
 
 
 class VideoSource(FrameSource):
-    """A video file, frame by frame; as with photographs, notes how to turn it are not followed.
+    """A video file, frame by frame; as for photographs, orientation metadata are ignored.
 
     Args:
         path: of the file.
 
     Attributes:
-        broken: frames so far that could not be read and were left out.
+        broken: number of unreadable frames so far, which were skipped.
 
     Raises:
         InvalidInputError: it cannot be read as a video.
@@ -214,18 +215,18 @@ class VideoSource(FrameSource):
         self._taken = 0
         self.fps = self._capture.get(cv2.CAP_PROP_FPS) or DEFAULT_VIDEO_FPS
         self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        self._ahead = self._next_image() if self._capture.isOpened() else None
-        if self._ahead is None:
+        self._first_image = self._next_image() if self._capture.isOpened() else None
+        if self._first_image is None:
             raise InvalidInputError(f"{path} is empty, or cannot be read as a video or image")
-        self.size = (self._ahead.shape[1], self._ahead.shape[0])
+        self.size = (self._first_image.shape[1], self._first_image.shape[0])
 
     def __len__(self) -> int:
-        """Frames that the file says it has."""
+        """Number of frames stated by the file."""
         return self._count
 
     def read(self) -> Frame | None:
         """See `FrameSource.read`."""
-        image, self._ahead = self._ahead, None
+        image, self._first_image = self._first_image, None
         if image is None:
             image = self._next_image()
         if image is None:
@@ -237,11 +238,11 @@ class VideoSource(FrameSource):
 
     def close(self) -> None:
         """Closes the file."""
-        self._ahead = None
+        self._first_image = None
         self._capture.release()
 
     def _next_image(self) -> Image | None:
-        """The next frame that can be read; None at the end."""
+        """Read the next readable frame; None at the end."""
         for _ in range(100):  # Consecutive unreadable frames after which the file ends.
             image = _read_rgb(self._capture)
             if image is not None:
@@ -275,9 +276,9 @@ class DeviceSource(FrameSource):
     """A camera that OpenCV opens.
 
     Args:
-        name: what messages call it.
-        open_capture: opens it; called again when it was lost. None where it does not open.
-        question: what to look at where it does not open.
+        name: name in messages.
+        open_capture: opens the camera, again after a loss; returns None on failure.
+        question: hint on what to check if it does not open.
 
     Raises:
         InvalidInputError: it does not open, or gives no images.
@@ -303,7 +304,7 @@ class DeviceSource(FrameSource):
         self._newest: Frame | None = None
         self._closed = threading.Event()
         self._fault = ""
-        self._put(first)
+        self._store_image(first)
         self._thread = threading.Thread(target=self._run, args=(capture,), daemon=True)
         self._thread.start()
 
@@ -340,7 +341,9 @@ class DeviceSource(FrameSource):
             capture.release()
 
     def _take_images(self, capture: cv2.VideoCapture) -> bool:
-        """Until there are no more, or the source is closed; whether there were any."""
+        """Take images until there are no more or the source is closed; return whether there were
+        any.
+        """
         any_taken = False
         while not self._closed.is_set():
             image = _read_rgb(capture)
@@ -351,11 +354,11 @@ class DeviceSource(FrameSource):
             if size != self.size:
                 self._fault = "now has {} x {} pixels, not {} x {}".format(*size, *self.size)
                 break
-            self._put(image)
+            self._store_image(image)
             any_taken = True
         return any_taken
 
-    def _put(self, image: Image) -> None:
+    def _store_image(self, image: Image) -> None:
         frame = Frame(image, None, time.monotonic() - self._start, self.name)
         with self._changed:
             self._newest, self._fault = frame, ""
@@ -369,8 +372,8 @@ def open_device(
 
     Args:
         device: its number, `/dev/videoN`, or the address of a stream (rtsp, http).
-        size: width and height that it shall have [pixels]; its own choice if not given.
-        fps: images a second that it shall take; some cameras take the nearest that they can.
+        size: requested width and height [pixels]; the camera's default if not given.
+        fps: requested frames per second; some cameras take the nearest supported rate.
 
     Raises:
         InvalidInputError: it does not open, or not with that size.
@@ -391,7 +394,7 @@ def open_device(
 
 
 def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Names and sizes of the cameras of this machine that give images, of the first `most`."""
+    """Names and sizes of the working cameras among the first `most` of this machine."""
     for device in _candidate_devices(most):
         capture = _open_capture(device, None, None)
         image = None if capture is None else _read_rgb(capture)
@@ -415,14 +418,14 @@ def _open_capture(
     stream_timeouts = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 5000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5000]
     with silence_opencv():
         if isinstance(device, int) or device.startswith("/dev/"):
-            # Without a choice OpenCV tries all that it has.
+            # Without a choice OpenCV tries all its backends.
             capture = cv2.VideoCapture(device, CAPTURE_BACKENDS.get(sys.platform, cv2.CAP_ANY))
         else:
             capture = cv2.VideoCapture(device, cv2.CAP_FFMPEG, stream_timeouts)
     if not capture.isOpened():
         return None
     if size is not None:
-        # Uncompressed, large images come at a few frames a second over USB.
+        # Large uncompressed images reach only a few frames per second over USB.
         capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, size[0])
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size[1])

@@ -24,7 +24,7 @@ Tag = tuple[Bytes, NDArray[np.uint16]]
 
 @lru_cache(maxsize=512)
 def render_tag(text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int = 14) -> Tag:
-    """A tag: a line of text on a dark rounded rectangle.
+    """Render a tag: a line of text on a dark rounded rectangle.
 
     Args:
         text: one line.
@@ -55,7 +55,7 @@ def render_tag(text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int 
 
 
 def draw_notice(image: Bytes, text: str) -> Bytes:
-    """A copy of an image (H, W, 3) with a line of text in its corner, wrapped where it is long."""
+    """Copy an image (H, W, 3) and draw a text in its corner, wrapped if it is long."""
     drawn = np.array(image, order="C")
     x, y = 8, 8
     for line in _wrap_text(text, drawn.shape[1] - 2 * x):
@@ -66,7 +66,7 @@ def draw_notice(image: Bytes, text: str) -> Bytes:
 
 
 def _wrap_text(text: str, width: int) -> list[str]:
-    """Lines of a text whose tags are at most `width` pixels wide; longer words stay whole."""
+    """Wrap a text to lines whose tags are at most `width` pixels wide; long words stay whole."""
     lines = [""]
     for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -78,10 +78,10 @@ def _wrap_text(text: str, width: int) -> list[str]:
 
 
 def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
-    """Draws a tag into an image (H, W, 3), in place; what lies outside is cut off.
+    """Draw a tag into an image (H, W, 3), in place, clipped to the image.
 
     Args:
-        corner: where its upper left corner goes: column, row.
+        corner: column and row of its upper left corner.
     """
     colors, opacity = tag
     x, y = corner
@@ -98,7 +98,7 @@ def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
 def draw_tags(image: Bytes, boxes: Array, tags: Sequence[Tag], keep_clear: Booleans) -> None:
     """Draws tags into an image (H, W, 3), in place; see `find_tag_corners`.
 
-    Tags that had to move away have a line to the middle of what they name.
+    Tags that had to move away get a line to the middle of their box.
     """
     sizes = [(colors.shape[1], colors.shape[0]) for colors, _ in tags]
     corners = find_tag_corners(boxes, sizes, keep_clear)
@@ -116,16 +116,16 @@ def draw_tags(image: Bytes, boxes: Array, tags: Sequence[Tag], keep_clear: Boole
 def find_tag_corners(
     boxes: Array, sizes: Sequence[tuple[int, int]], keep_clear: Booleans
 ) -> list[PixelCorner]:
-    """Finds a place for each tag.
+    """Find a place for each tag.
 
     Args:
-        boxes: (N, 2, 2) corners of what the tags name, least and largest x and y [pixels].
+        boxes: (N, 2, 2) boxes of the named objects, least and largest x and y [pixels].
         sizes: width and height of the tags [pixels].
-        keep_clear: (H, W) pixels of the image that show what the tags should not cover.
+        keep_clear: (H, W) pixels of the image that the tags should not cover.
 
     Returns:
-        Column and row of the tags' upper left corners: near the box, on no other tag where that is
-        possible, at the lowest cost, which is the covered share plus the distance from the box.
+        Column and row of the tags' upper left corners: near the box, without overlap if possible,
+        at the lowest cost: the covered share plus the distance from the box.
     """
     image = keep_clear.shape[1], keep_clear.shape[0]
     covered = cv2.integral(keep_clear.astype(np.uint8))
@@ -139,7 +139,7 @@ def find_tag_corners(
         # Cost of moving a tag by its height, as a covered fraction of the tag.
         return float(hidden) / (width * height) + 0.05 * step
 
-    # From the top of the image: tags go above, so that higher objects choose first.
+    # From the top of the image down: tags go above their boxes, so higher objects choose first.
     for i in np.argsort(boxes[:, 0, 1], kind="stable"):
         size = sizes[i]
         options = []
@@ -154,11 +154,13 @@ def find_tag_corners(
 
 
 def _candidate_corners(box: Array, width: int, height: int) -> list[tuple[PixelCorner, int]]:
-    """Corners of a tag about a box and their distance in steps; this order decides between ties."""
+    """Candidate corners of a tag around a box, with their distance in steps. Their order breaks
+    ties.
+    """
     (left, top), (right, bottom) = np.round(box).astype(int).tolist()
     x, y = (left + right - width) // 2, (top + bottom - height) // 2
     options: list[tuple[PixelCorner, int]] = []
-    for step in range(4):  # Distances from the box that are tried, a tag's height apart.
+    for step in range(4):  # Distances from the box, in heights of a tag.
         away = 4 + step * (height + 2)  # Pixels.
         for tag_x in (x, left, right - width):
             options += [((tag_x, top - height - away), step), ((tag_x, bottom + away), step)]

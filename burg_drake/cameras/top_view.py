@@ -32,7 +32,7 @@ from burg_drake.scene import Board
 DEFAULT_PIXEL_SIZE = 0.0005
 """Metres. Side of a pixel of the top view."""
 MAX_PICTURE_SIDE = 2048
-"""Pixels along a side of the top view; some graphics cards take no more."""
+"""Largest side of the top view in pixels; a limit of some graphics cards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class BoardPicture:
     Attributes:
         image: (H, W, 3) RGB; the first row lies along `upper[1]`, the first column along
             `lower[0]`.
-        lower, upper: corners of what it shows in the scene frame [m].
-        error: root mean square distance of the markers' corners from where they belong, measured in
-            the photo and taken to the sheet [m].
-        ids: markers by which the view was made.
-        note: what is doubtful about it; "" if nothing is.
+        lower, upper: corners of the shown area in the scene frame [m].
+        error: root mean square distance of the markers' corners in the photo from their places,
+            projected to the sheet [m].
+        ids: ids of the used markers.
+        note: reason to doubt the view; "" if there is none.
     """
 
     image: Image
@@ -62,10 +62,10 @@ class BoardRectifier:
 
     Args:
         board: the printed board.
-        intrinsics: of the camera; if None, markers alone say how the sheet lies in the image, and
-            how its lens bends straight lines, about.
-        margin: how much around the board is shown [m].
-        resolution: side of a pixel of the top view [m]; larger ones are taken for large boards.
+        intrinsics: of the camera; if None, homography and approximate distortion are fitted to the
+            markers.
+        margin: width of the shown area around the board [m].
+        resolution: side of a pixel of the top view [m]; increased for large boards.
 
     Raises:
         InvalidInputError: a number is out of its range.
@@ -94,14 +94,14 @@ class BoardRectifier:
         self._shape = tuple(int(n) for n in np.maximum(np.rint(extent / side), 1)[::-1])
 
     def picture(self, image: Image) -> BoardPicture:
-        """The top view of an image.
+        """Rectify an image to a top view.
 
         Args:
             image: (H, W, 3) RGB.
 
         Raises:
-            InvalidInputError: not an image, or of another size than the intrinsics; or it does not
-                show the board, or another one.
+            InvalidInputError: not an image, or of another size than the intrinsics; or it shows no
+                board, or another one.
         """
         image = np.asarray(image)
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
@@ -120,7 +120,7 @@ class BoardRectifier:
         return BoardPicture(top, lower, upper, error, ids, note)
 
     def _points(self) -> Array:
-        """(N, 2) middles of the top view's pixels in the scene frame [m], row by row."""
+        """(N, 2) centres of the top view's pixels in the scene frame [m], row by row."""
         (rows, columns), extent = self._shape, self._upper - self._lower
         x = self._lower[0] + (np.arange(columns) + 0.5) * extent[0] / columns
         y = self._upper[1] - (np.arange(rows) + 0.5) * extent[1] / rows
@@ -150,7 +150,7 @@ def board_picture(
     margin: float = 0.02,
     resolution: float = DEFAULT_PIXEL_SIZE,
 ) -> BoardPicture:
-    """The top view of one image; see `BoardRectifier`, which is for images that follow each other.
+    """Rectify one image to a top view; use `BoardRectifier` for successive images.
 
     Args:
         image: (H, W, 3) RGB.
@@ -164,8 +164,9 @@ def board_picture(
 
 
 def _sample_image(image: Image, pixels: Array) -> Image:
-    """(H, W, 3) colours of an image at pixels (H, W, 2); where these lie far apart, of as much of
-    the image as they stand for."""
+    """(H, W, 3) colours of an image at pixels (H, W, 2), averaged over the area of each sample
+    where these lie far apart.
+    """
     step = np.concatenate([np.diff(pixels, axis=axis).reshape(-1, 2) for axis in (0, 1)])
     shrink = max(1, int(np.median(np.linalg.norm(step, axis=1))))
     if shrink > 1:
@@ -176,7 +177,7 @@ def _sample_image(image: Image, pixels: Array) -> Image:
         )
         pixels = (pixels + 0.5) / shrink - 0.5
     u, v = np.moveaxis(pixels.astype(np.float32), 2, 0)
-    outside = (128, 128, 128)  # RGB of places that the photo does not show.
+    outside = (128, 128, 128)  # RGB of places outside the photo.
     return np.asarray(
         cv2.remap(
             image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=outside
@@ -186,16 +187,16 @@ def _sample_image(image: Image, pixels: Array) -> Image:
 
 @dataclass(frozen=True, eq=False)
 class SheetFit:
-    """A sheet in an image.
+    """The sheet's fitted projection into an image.
 
     Attributes:
         H: (3, 3) homography from x and y of the scene frame [m] to undistorted image coordinates,
             which have their origin in the image's middle and half its diagonal as their unit.
-        distortion: what a lens adds to a distance r from the middle: `r (1 + distortion r^2)`.
+        distortion: coefficient of the radius r from the middle: `r (1 + distortion r^2)`.
         middle: (2,) [pixels].
         radius: half the image's diagonal [pixels].
         error: root mean square distance of the markers' corners from their places on the sheet [m].
-        ids: markers that were used.
+        ids: ids of the used markers.
     """
 
     H: Array
@@ -206,8 +207,9 @@ class SheetFit:
     ids: tuple[int, ...]
 
     def project(self, p_SQ: Array) -> Array:
-        """(N, 2) pixels of points (N, 2) on the sheet [m]; far outside of the image for what no
-        camera could see there."""
+        """(N, 2) pixels of points (N, 2) on the sheet [m]; far outside the image for invisible
+        points.
+        """
         return _project(self.H, self.distortion, p_SQ) * self.radius + self.middle
 
 
@@ -219,7 +221,7 @@ class SheetFinder:
         self._detector = MarkerDetector(board.layout)
 
     def find(self, image: Bytes) -> SheetFit:
-        """Finds it.
+        """Find the sheet in an image.
 
         Args:
             image: (H, W) or RGB (H, W, 3).
@@ -251,7 +253,7 @@ class SheetFinder:
         off = _project(H, distortion, p_SQ) - corners
         scale = self._layout.side / float(side_lengths(corners.reshape(-1, 4, 2)).mean())
         error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
-        # Fraction of a marker's side; with more it is another board.
+        # Fraction of a marker's side; with larger errors it is another board.
         if error > 0.05 * self._layout.side:
             raise InvalidInputError(
                 "the image shows another board: the corners of its markers are off by"
@@ -262,8 +264,9 @@ class SheetFinder:
         return SheetFit(H, distortion, middle, radius, error, ids)
 
     def _require_no_foreign_markers(self, grey: Bytes, fit: int) -> None:
-        """Refuses a sheet that has more markers which are not this board's than fit: a part of the
-        first row is the same on boards of several sizes."""
+        """Reject a sheet with more foreign markers than fitting ones: boards of several sizes share
+        a part of the first row.
+        """
         layout = self._layout
         other = find_foreign_markers(grey, layout)
         if other is None or other.dictionary.lower() != layout.dictionary.lower():
@@ -277,8 +280,9 @@ class SheetFinder:
 
 
 def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:
-    """Homography and bend that put corners (N, 2) where they were seen; corners that are half
-    hidden, and were found beside their place, hardly count."""
+    """Fit homography and distortion to corners (N, 2), robust against misplaced corners of half
+    hidden markers.
+    """
     H, _ = cv2.findHomography(p_SQ, corners, 0)
     if H is None:
         raise InvalidInputError("the visible part of the board does not determine its pose")
@@ -298,10 +302,10 @@ def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple
     plain = fit((H / H[2, 2]).ravel()[:8], np.full(8, np.inf))
     if markers >= 6:  # Markers from which on the distortion is fitted.
         # Relative shift of an image corner from the centre.
-        bent = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), 0.3))
+        distorted = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), 0.3))
         # The distortion is used if it lowers the cost below this fraction.
-        if bent.cost < 0.5 * plain.cost:
-            return _homography(bent.x), float(bent.x[8])
+        if distorted.cost < 0.5 * plain.cost:
+            return _homography(distorted.x), float(distorted.x[8])
     return _homography(plain.x), 0.0
 
 
@@ -319,11 +323,11 @@ def _project(H: Array, distortion: float, p_SQ: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class BoardObservation:
-    """What one frame shows of the board.
+    """The board in one frame.
 
     Attributes:
         picture: the top view; None if there is none.
-        reason: why there is none, or what is doubtful about it; "" if all is well.
+        reason: why the view is missing or doubtful; "" if all is well.
     """
 
     picture: BoardPicture | None
@@ -337,18 +341,18 @@ def board_observations(
     period: float = 1.0,
     stop: threading.Event | None = None,
 ) -> Iterator[BoardObservation]:
-    """Observes the board, again and again.
+    """Observe the board repeatedly.
 
     Args:
-        source: of a live camera the newest frame is taken each time; of files each one in turn.
-            The caller closes it.
+        source: a live camera gives its newest frame each time, files give every frame. The caller
+            closes it.
         rectifier: makes the views.
-        period: least time from one observation to the next [s]; files are read without pauses.
-        stop: ends the observations, also while one is waited for.
+        period: least time between observations [s]; files are read without pauses.
+        stop: set to end the observations, also during a wait.
 
     Yields:
-        An observation a frame, also where the frame does not show the board, cannot be read or the
-        camera is away: then `reason` says so, and the next observation may find it again.
+        An observation per frame. If the board is not visible, the frame unreadable or the camera
+        lost, `reason` says so and later observations may find the board again.
     """
     stop = stop or threading.Event()
     while not stop.is_set():

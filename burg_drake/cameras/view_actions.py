@@ -25,12 +25,12 @@ FIRST_PICTURE_TIMEOUT = 5.0  # Seconds to wait for the first picture of an idle 
 
 
 class ViewActions:
-    """Acts on a live session; every method may be called from any thread.
+    """Actions on a live session; all methods are thread-safe.
 
     Args:
         live: the session.
-        folder: where snapshots and recordings are put that are not given a path.
-        plain: recordings also get the pictures without overlay.
+        folder: default folder of snapshots and recordings.
+        plain: also record the pictures without overlay.
     """
 
     def __init__(self, live: LiveSession, folder: str | Path = ".", *, plain: bool = False) -> None:
@@ -47,11 +47,11 @@ class ViewActions:
 
     @property
     def processor(self) -> FrameProcessor:
-        """What looks at the frames."""
+        """Processor of the session's frames."""
         return self.live.processor
 
     def snapshot(self, folder: str | Path | None = None, picture: Picture | None = None) -> Path:
-        """Saves a picture.
+        """Save a snapshot of a picture.
 
         Args:
             folder: new folder to make; `SCENE_snapshot_001` and so on if not given.
@@ -78,21 +78,21 @@ class ViewActions:
         snapshot = Snapshot(
             document=document, image=frame.image, overlay=picture.overlay, depth=frame.depth
         )
-        with self._lock:  # two at once must not choose the same number
+        with self._lock:  # concurrent calls must not choose the same number
             place = Path(folder) if folder is not None else self._free_path("snapshot")
             save_snapshot(snapshot, place)
         self.live.events.add(f"snapshot {place}")
         return place
 
     def start_recording(self, path: str | Path | None = None) -> Path:
-        """Records all frames from now on.
+        """Start to record all frames.
 
         Args:
             path: of the video; `SCENE_recording_001.mp4` and so on if not given.
 
         Raises:
-            InvalidInputError: it cannot be written, files of that name exist, a recording is being
-                written already, or no frame comes any more.
+            InvalidInputError: it cannot be written, files of that name exist, a recording is
+                already running, or there are no more frames.
         """
         with self._lock:
             if self.recording is not None:
@@ -124,10 +124,10 @@ class ViewActions:
             return self.recording.path
 
     def stop_recording(self) -> Path | None:
-        """Finishes the recording; None if there was none, or nothing in it.
+        """Finish the recording and return the video; None if there was none, or it was empty.
 
         Raises:
-            InvalidInputError: it could not be written whole.
+            InvalidInputError: it could not be written completely.
         """
         with self._lock:
             recording, self.recording = self.recording, None
@@ -146,10 +146,10 @@ class ViewActions:
         return path
 
     def start_check(self) -> None:
-        """Measures in a thread of its own how the objects of the newest picture stand.
+        """Start a placement check of the newest picture in its own thread.
 
         Raises:
-            InvalidInputError: there is no picture with a pose, or a check is at work.
+            InvalidInputError: there is no picture with a pose, or a check is running.
         """
         picture = self.live.newest_picture(FIRST_PICTURE_TIMEOUT)
         if picture is None or not picture.located.estimate.valid:
@@ -164,7 +164,7 @@ class ViewActions:
             self._check.start()
 
     def wait_for_check(self, seconds: float | None = None) -> None:
-        """Until the placement check that is at work, if any, is done."""
+        """Wait until the running placement check, if any, is done."""
         if self._check is not None:
             self._check.join(seconds)
 
@@ -188,12 +188,12 @@ class ViewActions:
                 self.recording.add(
                     picture.overlay, located.estimate, located.frame.time, located.frame.image
                 )
-            except Exception as error:  # whatever it is, the view goes on
+            except Exception as error:  # the view goes on after any error
                 self.live.events.add(f"recording ended: {error}", bad=True)
                 self._finish_on_close()
 
     def _finish_on_close(self) -> None:
-        """Finishes a recording that cannot go on; whoever reads the events learns where it is."""
+        """Finish a recording that cannot go on, and report its path as an event."""
         try:
             self.stop_recording()
         except Exception as error:
@@ -208,7 +208,7 @@ class ViewActions:
 
 
 def placement_summary(check: PlacementCheck) -> str:
-    """How many objects were measured, are doubtful and were not seen; or why none could be."""
+    """Numbers of measured, uncertain and unseen objects as text; or why none was measured."""
     if not check.instances:
         return check.reason
     counts = Counter(placed.status for placed in check.instances.values())

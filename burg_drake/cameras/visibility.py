@@ -14,19 +14,19 @@ from burg_drake.station import Station, StationLike, as_station
 
 
 def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[str, float]:
-    """The share of each free object's silhouette that a camera of the station sees.
+    """Compute the visible share of each free object's silhouette in a station's camera.
 
-    The silhouette is all that the camera would see of the object alone if its image had no edges.
-    Of it counts what lies within the image and is not hidden by another object, by the table or by
-    an obstacle of the station; the arm is not there.
+    The silhouette is that of the object alone in an unbounded image. Its visible part is in the
+    image and not hidden by another object, the table or an obstacle of the station. The arm is
+    ignored.
 
     Args:
-        scene: what stands where.
+        scene: objects with their poses.
         station: has the camera and the obstacles.
         camera: its name.
 
     Returns:
-        0 to 1 by instance, in the scene's order; 0 for what is behind the camera.
+        0 to 1 by instance, in the scene's order; 0 for objects behind the camera.
 
     Raises:
         UnknownNameError: there is no such camera, or a mesh file is missing.
@@ -43,7 +43,7 @@ def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[st
 
 
 def _scene_ray_caster(shape: SceneMesh, station: Station, X_SW: Array) -> RayCaster:
-    """Rays at the objects, whose faces come first, and at table and obstacles."""
+    """Ray caster for objects, whose faces come first, table and obstacles."""
     document = station.document
     x, y = document.table.center
     boxes = [(make_pose(np.eye(3), (x, y, -0.5 * document.table.size[2])), document.table.size)]
@@ -62,11 +62,11 @@ def _visible_share(
     max_slope = 20.0  # Points farther off the axis are outside of every camera's view.
     alone = shape.select((name,))
     p_CV = transform_points(inverse(X_SC), alone.outline.vertices)
-    ahead = p_CV[p_CV[:, 2] >= NEAR_DISTANCE]
-    if not len(ahead):
+    in_front = p_CV[p_CV[:, 2] >= NEAR_DISTANCE]
+    if not len(in_front):
         return 0.0
-    flat = np.clip(ahead[:, :2] / ahead[:, 2:], -max_slope, max_slope)
-    directions = _direction_grid(flat.min(axis=0), flat.max(axis=0))
+    image_points = np.clip(in_front[:, :2] / in_front[:, 2:], -max_slope, max_slope)
+    directions = _direction_grid(image_points.min(axis=0), image_points.max(axis=0))
     along_S = directions @ X_SC[:3, :3].T
     along_S /= np.linalg.norm(along_S, axis=1, keepdims=True)
     start = np.broadcast_to(X_SC[:3, 3], along_S.shape)
@@ -82,7 +82,7 @@ def _visible_share(
 
 
 def _direction_grid(lower: Array, upper: Array) -> Array:
-    """(N, 3) directions at z = 1, in the middles of equal cells of a rectangle."""
+    """(N, 3) directions at z = 1, at the centres of a rectangle's grid cells."""
     rays_per_side = 96  # Visible fractions are accurate to about 0.01.
     share = (np.arange(rays_per_side) + 0.5) / rays_per_side
     x, y = (low + share * (high - low) for low, high in zip(lower, upper, strict=True))

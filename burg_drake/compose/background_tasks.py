@@ -1,4 +1,4 @@
-"""A worker process for what takes long: settling the scene in physics, and counting grasps."""
+"""Long tasks in a worker process: settling the scene in simulation, and counting grasps."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 ProgressCallback = Callable[..., None]
-"""Takes a task's progress: the share that is done in [0, 1], a word for people and, if there is
-one, a partial result. Raises `TaskCancelled` if nobody waits for the result."""
+"""Takes a task's progress: the share that is done in [0, 1], a short text and, if there is one, a
+partial result. Raises `TaskCancelled` if the task was cancelled."""
 
 BackgroundTask = Callable[[ProgressCallback], T]
-"""What a worker does: a dataclass that can be pickled, as can its result. It raises a `BurgError`
-if it cannot be done."""
+"""A callable dataclass that a worker runs. It and its result can be pickled. It raises a
+`BurgError` on failure."""
 
 
 class BackgroundJob(Generic[T]):
-    """Something that was asked of a worker.
+    """A task that was submitted to a worker.
 
     Attributes:
-        progress: share that is done, in [0, 1], and a word.
-        partial: what came of it since the report before, if it tells.
-        cancelled: nobody waits for it any more.
-        done: it has a result or an error, or was cancelled.
-        error: why it has no result; None if it has, or is not done.
+        progress: share that is done, in [0, 1], and a short text.
+        partial: partial result of the latest report; None if the task reports none.
+        cancelled: whether the job was cancelled.
+        done: whether the job has a result or an error, or was cancelled.
+        error: why there is no result; None if there is one, or the job is not done.
     """
 
     def __init__(
@@ -65,42 +65,42 @@ class BackgroundJob(Generic[T]):
 
     @property
     def result(self) -> T:
-        """What came of it, once it is done.
+        """The result of the finished job.
 
         Raises:
-            BurgError: it cannot be done, or was cancelled.
+            BurgError: the task failed or was cancelled.
         """
         if self.error is not None:
             raise self.error
         return self._result[0]
 
     def wait(self, timeout: float | None = None) -> T:
-        """The result, when it is there and who listens has been told.
+        """Waits until the job is done and `on_change` has returned; returns the result.
 
         Args:
             timeout: [s].
 
         Raises:
-            TimeoutError: it is not there by then.
-            BurgError: it cannot be done, or was cancelled.
+            TimeoutError: the job is not done by then.
+            BurgError: the task failed or was cancelled.
         """
         if not self._finished.wait(timeout):
             raise TimeoutError(f"nothing after {timeout:g} s")
         return self.result
 
     def cancel(self) -> None:
-        """Ends it; nothing if it is done."""
+        """Cancels the job, unless it is done."""
         self._cancel(self)
 
     def report(self, message: tuple[float, str, Any]) -> None:
-        """The worker has told its progress, a word, and what came of it."""
+        """Takes a report of the worker: share done, short text, partial result."""
         if not self.cancelled:
             share, word, self.partial = message
             self.progress = (share, word)
             self._on_change(self)
 
     def finish(self, result: T | BurgError) -> None:
-        """It is done."""
+        """Sets the result or the error, and marks the job as done."""
         if isinstance(result, BurgError):
             self.error = result
         else:
@@ -111,7 +111,7 @@ class BackgroundJob(Generic[T]):
 
 
 class BackgroundWorker:
-    """One process, started with the first task, that does what it was asked last."""
+    """Runs the task submitted last, in one process that starts with the first task."""
 
     def __init__(self) -> None:
         self._pool = WorkerPool(1, retries=0)
@@ -128,11 +128,12 @@ class BackgroundWorker:
         task: BackgroundTask[T],
         on_change: Callable[[BackgroundJob[T]], None] = lambda job: None,
     ) -> BackgroundJob[T]:
-        """Asks for something; what it was asked before is cancelled, if that is not done.
+        """Submits a task; cancels the previous job if it is not done.
 
         Args:
-            task: what to do.
-            on_change: called with the job when it is further or done, in a thread of the worker.
+            task: to run.
+            on_change: called with the job when it reports progress or is done, in a thread of the
+                worker.
         """
         job = BackgroundJob(self.cancel, on_change)
         with self._lock:
@@ -141,7 +142,7 @@ class BackgroundWorker:
                 job._future = self._pool.submit_task(
                     Task(run_task_in_worker, (task,), on_progress=job.report)
                 )
-            except RuntimeError:  # it was closed
+            except RuntimeError:  # the worker was closed
                 job.cancelled = True
         if older is not None and not older.done and older._future is not None:
             older.cancelled = True
@@ -167,11 +168,11 @@ class BackgroundWorker:
         with self._lock:
             if self._newest is not None:
                 self._newest.cancelled = True
-        self._pool.kill_workers(5.0)  # seconds that the process has to end
+        self._pool.kill_workers(5.0)  # seconds until the process is killed
 
 
 def run_task_in_worker(task: BackgroundTask[T]) -> T:
-    """Does a task in a worker; raises what it raises, for `SystemExit` a `SimulationError`."""
+    """Runs a task in a worker; turns a `SystemExit` into a `SimulationError`."""
 
     def report(share: float, word: str, partial: Any = None) -> None:
         report_progress((share, word, partial))
@@ -179,11 +180,11 @@ def run_task_in_worker(task: BackgroundTask[T]) -> T:
     try:
         return task(report)
     except SystemExit as error:  # Drake ends some failed checks this way
-        raise _failure_of(error) from error
+        raise _simulation_error(error) from error
 
 
 def _job_result_or_error(job: BackgroundJob[Any], future: Future[Any]) -> Any:
-    """The result of a job, or why there is none."""
+    """The result of a job, or the error that it ended with."""
     if job.cancelled or future.cancelled():
         job.cancelled = True
         return TaskCancelled("this was cancelled")
@@ -192,22 +193,22 @@ def _job_result_or_error(job: BackgroundJob[Any], future: Future[Any]) -> Any:
         return future.result()
     if isinstance(error, WorkerDied):
         return SimulationError(f"{error}; the scene was not changed, try again")
-    return error if isinstance(error, BurgError) else _failure_of(error)
+    return error if isinstance(error, BurgError) else _simulation_error(error)
 
 
-def _failure_of(error: BaseException) -> SimulationError:
+def _simulation_error(error: BaseException) -> SimulationError:
     return SimulationError(f"this failed: {' '.join(str(error).split()) or type(error).__name__}")
 
 
 @dataclass(frozen=True)
 class SettlingProposal:
-    """What would become of a scene.
+    """The settled scene, to be accepted or reverted.
 
     Attributes:
-        start: the scene that it is made of; accepted only while the session still has it.
-        document: the scene as it would be, without what fell off the table.
-        displacements: how far each object came.
-        moving: instances that still move, and how fast: in words.
+        start: the scene before settling; accepted only while the session still has it.
+        document: the settled scene, without objects that fell off the table.
+        displacements: displacement of each object.
+        moving: speeds of instances that still move, as text.
         fallen: instances that fell off the table.
         duration: simulated time [s].
     """
@@ -224,11 +225,11 @@ class SettlingProposal:
 
 @dataclass(frozen=True)
 class SettlingTask:
-    """The task of a worker process.
+    """Settles a scene in a worker process.
 
     Attributes:
         scene: to settle.
-        station: where it stands.
+        station: of the scene.
         time_limit: simulated time allowed [s].
     """
 
@@ -267,7 +268,8 @@ class SettlingTask:
 def names_of_moved_instances(
     proposal: SettlingProposal, distance: float = 5e-4, angle_deg: float = 0.1
 ) -> list[str]:
-    """Instances that would move further, or turn by more, than given [m, degrees]."""
+    """Instances that settling moves further than `distance` [m] or turns by more than
+    `angle_deg`."""
     return [
         name
         for name, d in proposal.displacements.items()
@@ -277,12 +279,12 @@ def names_of_moved_instances(
 
 @dataclass(frozen=True)
 class GraspCountTask:
-    """The task of a worker process.
+    """Counts the grasps of a scene in a worker process.
 
     Attributes:
         scene: whose grasps are counted.
-        station: where it stands.
-        names: of instances, those first whose counts are wanted first.
+        station: of the scene.
+        names: of instances, in the order of counting.
         grasps_per_object: grasps that are sampled for each object.
     """
 
@@ -292,7 +294,7 @@ class GraspCountTask:
     grasps_per_object: int
 
     def __call__(self, report: ProgressCallback) -> Mapping[str, GraspCount]:
-        """Counts by instance; each is reported as soon as it is known."""
+        """Counts by instance; each is reported as soon as it is available."""
         from burg_drake.evaluation import grasp_counts
 
         found: dict[str, GraspCount] = {}
@@ -309,13 +311,13 @@ GraspCountJob = BackgroundJob[Mapping[str, "GraspCount"]]
 
 
 class GraspWatch:
-    """Counts the grasps of the newest scene that it was told of.
+    """Counts the grasps of the latest scene passed to `update`.
 
     Args:
-        station: where the scenes stand.
+        station: of the scenes.
         grasps_per_object: grasps that are sampled for each object.
-        on_change: called with the job that counts and the revision of its scene when it is further
-            or done, in a thread of the worker.
+        on_change: called with the counting job and the revision of its scene when the job reports
+            progress or is done, in a thread of the worker.
     """
 
     def __init__(
@@ -331,12 +333,12 @@ class GraspWatch:
         self._newest = -1
 
     def update(self, scene: Scene, revision: int, first: tuple[str, ...]) -> None:
-        """The scene has changed; nothing if this revision is known.
+        """Starts counting for a changed scene, unless this revision was passed before.
 
         Args:
-            scene: as it is now.
+            scene: the current scene.
             revision: its number.
-            first: instances whose counts are wanted first.
+            first: instances that are counted first.
         """
         if revision == self._newest:
             return
@@ -351,7 +353,7 @@ class GraspWatch:
         self._timer.start()
 
     def close(self) -> None:
-        """Counts no more."""
+        """Stops counting, and ends the worker."""
         self._newest = -1
         if self._timer is not None:
             self._timer.cancel()

@@ -23,13 +23,13 @@ class Command(Protocol):
 
     @property
     def label(self) -> str:
-        """What it does, for a button that undoes it: `move mug`."""
+        """What the command does, as text of the undo button: `move mug`."""
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
-        """The state after it, with what it changed selected.
+        """The state after the command, with the changed instances selected.
 
         Raises:
-            BurgError: it cannot be done; one clear line says why.
+            BurgError: the command cannot be applied; its one-line message says why.
         """
 
 
@@ -51,7 +51,7 @@ class InstancesCommand:
 
 
 def command_label(verb: str, names: Iterable[str]) -> str:
-    """A label that names what it is about, unless that is much."""
+    """The verb with the instance's name, or with the number of instances if there are several."""
     names = tuple(names)
     if not 0 < len(names) <= 2:
         return f"{verb} {len(names)} objects"
@@ -62,7 +62,7 @@ def require_number(value: float, what: str, lower: float, upper: float, unit: st
     """A number from a field.
 
     Raises:
-        InvalidInputError: it is none, not finite, or outside of the range.
+        InvalidInputError: it is not a number, not finite, or outside of the range.
     """
     try:
         number = float(value)
@@ -102,7 +102,7 @@ def board_size(name: str, *, upright: bool = False) -> tuple[float, float]:
     """Extents along x and y of a board of paper size [m], across unless `upright`.
 
     Raises:
-        UnknownNameError: no size of that name.
+        UnknownNameError: there is no size of that name.
     """
     if name not in BOARD_SIZES:
         raise UnknownNameError(
@@ -113,7 +113,7 @@ def board_size(name: str, *, upright: bool = False) -> tuple[float, float]:
 
 
 def board_size_name(size: tuple[float, float]) -> str | None:
-    """The name of a board's size, either way up; None if it is one's own."""
+    """The name of a board's size in either orientation; None for a custom size."""
     sides = sorted(size)
     for name, paper in BOARD_SIZES.items():
         if all(abs(a - b) < 1e-6 for a, b in zip(sides, paper, strict=True)):
@@ -125,8 +125,8 @@ def require_objects_of_scene(state: State, library: ObjectLibrary) -> None:
     """Refuses a library that lacks objects of a scene.
 
     Raises:
-        UnknownNameError: it does; the message lists them.
-        InvalidInputError: it gives a free instance no mass.
+        UnknownNameError: objects are missing; the message lists their instances.
+        InvalidInputError: a free instance has no mass in it.
     """
     used = {instance.object for instance in state.instances.values()}
     missing = sorted(used - library.objects.keys())
@@ -148,8 +148,8 @@ class UseLibrary:
     """Takes the objects from another library.
 
     Attributes:
-        library: which must have all objects of the scene.
-        reference: how the scene's document refers to it.
+        library: must have all objects of the scene.
+        reference: to the library, in the scene's document.
     """
 
     library: ObjectLibrary

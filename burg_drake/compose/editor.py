@@ -29,13 +29,13 @@ from burg_drake.station import StationLike, as_station
 
 
 class Drag:
-    """What `ComposeSession.drag` gives.
+    """A drag of instances, begun by `ComposeSession.drag`.
 
     `move` may be called from several threads, and faster than a scene is checked: then only the
-    newest poses are, and older calls come back with what is known by then.
+    newest poses are checked, and older calls return the latest view.
 
     Attributes:
-        names: instances that are held.
+        names: dragged instances.
     """
 
     def __init__(self, session: Editor, names: tuple[str, ...], start: SessionView) -> None:
@@ -49,21 +49,21 @@ class Drag:
 
     @property
     def is_over(self) -> bool:
-        """It was ended or cancelled, or something else changed the scene."""
+        """Whether the drag was ended or cancelled, or another change of the scene ended it."""
         return self._session._drag is not self
 
     def move(self, X_SO: Mapping[str, ArrayLike], *, changes_height: bool = False) -> SessionView:
-        """Holds instances at poses.
+        """Moves dragged instances to poses.
 
         Args:
-            X_SO: (4, 4) by name of all instances that are held, or of some.
+            X_SO: (4, 4) poses by name, of all dragged instances or of some.
             changes_height: Heights change even while objects are kept upright.
 
         Returns:
-            The scene with them there, and the status of all instances.
+            The scene with the instances moved, and the status of all instances.
 
         Raises:
-            InvalidInputError: a pose is none, an instance is not held, or the drag is over.
+            InvalidInputError: a pose is invalid, an instance is not dragged, or the drag is over.
         """
         for name in X_SO:
             if name not in self._start:
@@ -85,23 +85,23 @@ class Drag:
                 return session._show(move.apply(session._history.state, session._surroundings))
 
     def move_by(self, offset: tuple[float, float, float], yaw: float = 0.0) -> SessionView:
-        """Holds all instances away from where they were taken, as one.
+        """Moves all dragged instances together, relative to their poses at the start.
 
         Args:
             offset: along x, y and z of the scene [m].
-            yaw: turned about the vertical through the middle of their origins [rad].
+            yaw: about the vertical through the mean of their origins [rad].
         """
         middle = np.mean([X[:3, 3] for X in self._start.values()], axis=0)
         return self.transform(make_pose(rot_z(yaw), middle + offset) @ make_pose(p_AB=-middle))
 
     def transform(self, X: Array, *, changes_height: bool = False) -> SessionView:
-        """Holds all instances where a motion (4, 4) in S brings them from where they were taken;
-        see `move`."""
+        """Applies a motion (4, 4) in S to the start poses of all dragged instances; see
+        `move`."""
         X_SO = {name: X @ X_SOi for name, X_SOi in self._start.items()}
         return self.move(X_SO, changes_height=changes_height)
 
     def end(self) -> SessionView:
-        """Lets the instances go: one step, or none if they did not move."""
+        """Ends the drag and adds one step to the history, or none if nothing moved."""
         session = self._session
         with session._exclusive():
             self._require_current()
@@ -110,7 +110,7 @@ class Drag:
             return session._edit(command_label("move", self.names), state)
 
     def cancel(self) -> SessionView:
-        """Puts the instances back where they were taken."""
+        """Puts the instances back to their start poses."""
         session = self._session
         with session._exclusive():
             if self.is_over:
@@ -129,11 +129,11 @@ Callback = Callable[[SessionView], None]
 
 
 class Editor:
-    """What of a session needs neither other files nor other processes; see `ComposeSession`.
+    """The part of `ComposeSession` that needs neither other files nor other processes.
 
     Args:
         opened: the scene.
-        station: where it stands.
+        station: of the scene.
     """
 
     def __init__(self, opened: OpenedScene, station: StationLike) -> None:
@@ -143,7 +143,7 @@ class Editor:
         self._callbacks: list[Callback] = []
         self._last_reported = 0
         self._checker = SceneChecker(self.station)
-        self._amending = StepAmendment()
+        self._amendment = StepAmendment()
         self._planar = True
         self._serial = self._revision = 0
         self._notices: tuple[str, ...] = ()
@@ -159,16 +159,16 @@ class Editor:
 
     @property
     def view(self) -> SessionView:
-        """What there is to see now."""
+        """The current view."""
         return self._view
 
     def on_change(self, callback: Callback) -> Callable[[], None]:
-        """Calls `callback` with each new view, in the thread that caused it; of views that come
-        together only with the last. With several threads they may come out of order: see
+        """Calls `callback` with each new view, in the thread that caused it; if several views come
+        at once, with the last only. With several threads they may come out of order: see
         `SessionView.serial`.
 
         Returns:
-            What ends that.
+            A function that ends the calls.
         """
         with self._lock:
             self._callbacks.append(callback)
@@ -181,15 +181,15 @@ class Editor:
         return unsubscribe
 
     def do(self, command: Command, *, field: str = "") -> SessionView:
-        """Takes a step; none if the command changes nothing.
+        """Applies a command and adds a step to the history, unless it changes nothing.
 
         Args:
-            command: to do.
-            field: that the user is typing in: the step takes the place of the last one if that is
-                of the same field and recent, and neither was anything selected since.
+            command: to apply.
+            field: that the user is typing in. The step replaces the last one if that is of the
+                same field and recent, and nothing was selected since.
 
         Raises:
-            BurgError: it cannot be taken; one clear line says why.
+            BurgError: the command cannot be applied; its one-line message says why.
         """
         with self._exclusive():
             self._update_surroundings()
@@ -199,57 +199,57 @@ class Editor:
             return self._edit(command.label, state, field)
 
     def undo(self) -> SessionView:
-        """Takes the last step back, and selects what it had changed.
+        """Undoes the last step, and selects the instances that it had changed.
 
         Raises:
-            InvalidInputError: there is none.
+            InvalidInputError: there is nothing to undo.
         """
         return self._go_to_step(lambda: self._history.undo())
 
     def redo(self) -> SessionView:
-        """Takes the step again that was undone last.
+        """Redoes the step that was undone last.
 
         Raises:
-            InvalidInputError: there is none.
+            InvalidInputError: there is nothing to redo.
         """
         return self._go_to_step(lambda: self._history.redo())
 
     def select(self, names: Iterable[str]) -> SessionView:
-        """Selects instances, and no others; this is no step.
+        """Selects these instances only; adds no step to the history.
 
         Raises:
-            UnknownNameError: one is not there.
+            UnknownNameError: there is no such instance.
         """
         with self._exclusive():
-            self._amending.end()
+            self._amendment.end()
             return self._show(self._state.select(names))
 
     def restrict_movement(self, planar: bool) -> SessionView:
-        """Whether what is moved from now on keeps its tilt, and its height unless it is raised."""
+        """Sets whether moved objects keep their tilt, and their height unless they are raised."""
         with self._exclusive():
             self._planar = planar
             return self._publish()
 
     def notify(self, notice: str) -> SessionView:
-        """Adds a line to what the user should know."""
+        """Adds a notice for the user, one line."""
         with self._exclusive():
             if notice not in self._notices:
                 self._notices += (notice,)
             return self._publish()
 
     def dismiss(self, notice: str) -> SessionView:
-        """The user has read a notice."""
+        """Removes a notice that the user has read."""
         with self._exclusive():
             self._notices = tuple(n for n in self._notices if n != notice)
             self._dismissed.add(notice)
             return self._publish()
 
     def drag(self, names: Iterable[str]) -> Drag:
-        """Takes instances in the hand; they are selected. A drag that is not over yet is put back.
+        """Begins to drag instances, and selects them. Cancels a drag that is not over yet.
 
         Raises:
             InvalidInputError: no instance is given.
-            UnknownNameError: one is not there.
+            UnknownNameError: there is no such instance.
         """
         with self._exclusive():
             held = require_instance_names(names, self._history.state)
@@ -260,7 +260,7 @@ class Editor:
             return self._drag
 
     def _begin(self, opened: OpenedScene) -> None:
-        """Another scene, with its own history."""
+        """Starts with another scene, which has its own history."""
         self._drag = None
         self._history, self._storage = opened.history, opened.storage
         self._notices = opened.notices
@@ -270,10 +270,10 @@ class Editor:
         self._publish()
 
     def _update_surroundings(self) -> None:
-        """Called before each step: has anything around the session changed?"""
+        """Called before each step: handles changes of files outside the session."""
 
-    def _with_background(self, view: SessionView) -> SessionView:
-        """A view with what else there is to say."""
+    def _add_task_state(self, view: SessionView) -> SessionView:
+        """The view, completed with the state of background tasks."""
         return view
 
     @property
@@ -281,15 +281,15 @@ class Editor:
         return Surroundings(self.station, self._planar, self._storage.place, self._checker)
 
     @property
-    def _changed(self) -> bool:
-        """There are changes that are in no file."""
+    def _has_unsaved_changes(self) -> bool:
+        """Whether there are unsaved changes."""
         if self._storage.saved is None:
             return self._history.position > 0
         return self._history.state.document != self._storage.saved
 
     @contextlib.contextmanager
     def _exclusive(self) -> Iterator[None]:
-        """Keeps other threads out; then tells of the new view, when nothing is locked any more."""
+        """Keeps other threads out; calls the listeners after the lock is released."""
         view: SessionView | None = None
         try:
             with self._lock:
@@ -306,21 +306,21 @@ class Editor:
                 for callback in callbacks:
                     try:
                         callback(view)
-                    except Exception:  # what listens must not undo what was done
+                    except Exception:  # a failing listener must not affect the step
                         logging.getLogger(__name__).exception("a listener of a session failed")
 
     def _edit(self, label: str, state: State, field: str = "") -> SessionView:
-        """Takes a step after which the scene is not any more the one that was sampled."""
+        """Adds a step; the scene then no longer counts as sampled."""
         document = state.document
         if document != self._history.state.document and document.origin is not None:
             state = replace(state, document=replace(document, origin=None))
-        if self._amending.allows(field, self._history):
+        if self._amendment.allows(field, self._history):
             label = self._history.undo_label or label
             self._history.undo()
             self._storage.record_position(self._history)
             self._revision += 1
         step = HistoryStep(label, state)
-        self._amending.begin(field, step)
+        self._amendment.begin(field, step)
         return self._add_step(step)
 
     def _add_step(self, step: HistoryStep) -> SessionView:
@@ -332,11 +332,11 @@ class Editor:
         self._revision += 1
         return self._show(step.state)
 
-    def _go_to_step(self, there: Callable[[], State]) -> SessionView:
+    def _go_to_step(self, get_state: Callable[[], State]) -> SessionView:
         with self._exclusive():
-            state = there()
+            state = get_state()
             self._drag = None
-            self._amending.end()
+            self._amendment.end()
             self._storage.record_position(self._history)
             self._revision += 1
             return self._show(state)
@@ -357,12 +357,12 @@ class Editor:
         try:
             return self._checker.gaps(self._state, self._storage.place)
         except BurgError:
-            return {}  # `_issues` tells
+            return {}  # `_issues` reports the error
 
     def _publish(self) -> SessionView:
         self._serial += 1
         issues = self._issues()
-        self._view = self._with_background(
+        self._view = self._add_task_state(
             SessionView(
                 serial=self._serial,
                 revision=self._revision,
@@ -372,7 +372,7 @@ class Editor:
                 undo_label=self._history.undo_label,
                 redo_label=self._history.redo_label,
                 saved=self._history.state.document == self._storage.saved,
-                changed=self._changed,
+                changed=self._has_unsaved_changes,
                 path=self._storage.path,
                 planar=self._planar,
                 gaps=self._gaps(),

@@ -28,11 +28,11 @@ JOURNAL_VERSION = 1  # Version of the journal's format.
 DAMAGE_ERRORS = (BurgError, ValueError, KeyError, TypeError, AttributeError, OverflowError)
 """Exceptions that a damaged line raises."""
 JOURNAL_LINE_LIMITS = Limits(size=1 << 26, values=1_000_000, depth=8)
-"""Limits of one line; the deepest holds a list of instances with lists of numbers."""
+"""Limits of one line; the deepest nesting is a list of instances with lists of numbers."""
 
 
 class JournalWriter:
-    """Makes the lines of one journal; the numbers of instances count within it."""
+    """Makes the lines of one journal; numbers the instances in the order of writing."""
 
     def __init__(self) -> None:
         self._numbers: dict[Instance, int] = {}
@@ -43,12 +43,12 @@ class JournalWriter:
         """The first line.
 
         Args:
-            origin: what the session was opened with, where that was no file of its own.
+            origin: reference that the session was opened with; empty for a scene file.
         """
         return _json_line({"journal": JOURNAL_VERSION, "origin": origin})
 
     def step(self, step: HistoryStep, position: int) -> str:
-        """A step that was taken, and its number in the history."""
+        """The line for a new step, with its number in the history."""
         values: dict[str, Any] = {"step": step.label, "at": position}
         values["selection"] = list(step.state.selection)
         library = str(step.state.library.root)
@@ -57,15 +57,15 @@ class JournalWriter:
         return _json_line(values | self._document(step.state.document))
 
     def position(self, position: int) -> str:
-        """Where among the steps the session is."""
+        """The line for the session's position in the history."""
         return _json_line({"at": position})
 
     def saved(self, document: SceneDocument | None, known: str | None) -> str:
-        """What the scene's file holds.
+        """The line for the content of the scene's file.
 
         Args:
-            document: the scene in it; None if there is no file.
-            known: its fingerprint.
+            document: the scene in the file; None if there is no file.
+            known: fingerprint of the file.
         """
         values = {} if document is None else self._document(document)
         return _json_line({"saved": document is not None, "known": known} | values)
@@ -90,14 +90,14 @@ class JournalWriter:
 
 @dataclass
 class RecoveredSession:
-    """What a journal holds.
+    """The content of a journal.
 
     Attributes:
         history: of the session.
-        saved: what the scene's file held; None if there was none.
+        saved: scene in the scene's file; None if there was no file.
         known: fingerprint of that file.
-        origin: what the session was opened with, where that was no file of its own.
-        damage: what of the journal could not be read; empty if all of it was.
+        origin: reference that the session was opened with; empty for a scene file.
+        damage: lines of the journal that cannot be read, as text; empty if there are none.
     """
 
     history: History | None = None
@@ -114,7 +114,7 @@ class JournalReader:
         libraries: by their folders.
 
     Attributes:
-        session: what was read by now.
+        session: the content read so far.
     """
 
     def __init__(self, libraries: dict[str, ObjectLibrary]) -> None:
@@ -122,26 +122,26 @@ class JournalReader:
         self._libraries = libraries
         self._library: ObjectLibrary | None = None
         self._instances: dict[int, Instance] = {}
-        self._next: int | None = 0
+        self._next_number: int | None = 0
         self._positions: list[int] = []
         self._head: SceneDocument | None = None
         self._damaged = False
         self._whole_line = True
 
     def read(self, line: str) -> bool:
-        """Reads what can be read of the next line.
+        """Reads the next line as far as possible.
 
-        An instance that cannot be read is left out, of this line and of later ones.
+        An unreadable instance is left out, in this line and in later ones.
 
         Returns:
-            Whether that is all of the line.
+            Whether the whole line was read.
         """
         self._whole_line = True
         try:
             self._read_line(parse_json(line, "journal", JOURNAL_LINE_LIMITS))
         except DAMAGE_ERRORS:
             self._whole_line = False
-            self._next = None  # the number of instances in the line is unknown
+            self._next_number = None  # the number of instances in the line is unknown
         self._damaged |= not self._whole_line
         return self._whole_line
 
@@ -185,7 +185,7 @@ class JournalReader:
         self._positions[history.position :] = [position]
 
     def _go_to(self, position: int) -> None:
-        """Goes to a step by its number; to the one before it that was read if it was not."""
+        """Goes to the step of this number, or to the last readable one before it."""
         history = self.session.history
         if history is None or position < self._positions[0]:
             raise ValueError(f"no step {position}")
@@ -199,7 +199,7 @@ class JournalReader:
             raise ValueError("no head")
         new, written = {}, values.get("new", [])
         if written:
-            first = values.get("from", self._next)
+            first = values.get("from", self._next_number)
             new = self._read_instances(written, _read_integer(first))
         instances = self._instances | new
         document = replace(
@@ -211,8 +211,8 @@ class JournalReader:
         if len({instance_name(instance) for instance in placed}) < len(placed):
             raise ValueError("a name appears twice")
         self._head, self._instances = head, instances
-        if written and self._next is not None:
-            self._next += len(written)
+        if written and self._next_number is not None:
+            self._next_number += len(written)
         return document
 
     def _read_instances(self, written: list[Any], first: int) -> dict[int, Instance]:
@@ -228,7 +228,7 @@ class JournalReader:
     def _instances_of(
         self, numbers: list[Any], instances: dict[int, Instance]
     ) -> tuple[Instance, ...]:
-        """The instances of these numbers, without those that could not be read."""
+        """The instances of these numbers; unreadable ones are left out."""
         missing = [number for number in map(_read_integer, numbers) if number not in instances]
         if missing and self._whole_line and not self._damaged:
             raise KeyError(missing[0])
@@ -236,7 +236,7 @@ class JournalReader:
 
 
 def library_roots(lines: list[str]) -> list[str]:
-    """Folders of the libraries that lines name, in their order; damaged lines are left out."""
+    """Folders of the libraries named in the lines, in order; skips damaged lines."""
     roots: dict[str, None] = {}
     for line in lines:
         if '"library"' not in line:
@@ -277,7 +277,7 @@ def _read_floats(values: list[Any], count: int) -> tuple[float, ...]:
 
 
 def _read_text(value: Any) -> str:
-    value.encode()  # a half of a surrogate pair could not be shown
+    value.encode()  # a lone surrogate could not be shown
     return str(value)
 
 
@@ -288,7 +288,7 @@ def _read_integer(value: Any) -> int:
 
 
 class LibraryMissing(InvalidInputError):
-    """A journal needs a library that is not where it was."""
+    """A journal refers to a library that is no longer in its folder."""
 
 
 def journal_path(scene: Path) -> Path:
@@ -297,18 +297,18 @@ def journal_path(scene: Path) -> Path:
 
 
 def recover_journal(path: Path) -> RecoveredSession | None:
-    """Reads a journal that a session left.
+    """Reads the journal that an earlier session left.
 
-    A last line that was not written to its end is left out. Of a journal that is damaged, all that
-    can be read is recovered; see `set_journal_aside`.
+    An incomplete last line is left out. The readable part of a damaged journal is recovered; see
+    `set_journal_aside`.
 
     Returns:
-        What it holds; None if there is none.
+        The content; None if there is no journal.
 
     Raises:
-        LibraryMissing: the library of its last steps is not there.
+        LibraryMissing: the library of its last steps is missing.
     """
-    max_size = 1 << 30  # Bytes; a step takes some hundred.
+    max_size = 1 << 30  # Bytes; a step takes some hundred bytes.
     if not path.exists():
         return None
     try:
@@ -330,10 +330,10 @@ def recover_journal(path: Path) -> RecoveredSession | None:
 
 
 def set_journal_aside(path: Path) -> Path:
-    """Renames a damaged journal, so that no other one takes its place.
+    """Renames a damaged journal, so that a new one does not overwrite it.
 
     Returns:
-        Where it is; `path` itself where nothing can be renamed, and so nothing be written.
+        The new path; `path` itself if the folder is read-only, so that nothing overwrites it.
     """
     number = 1
     while (aside := path.with_name(f"{path.name}.damaged_{number}")).exists():
@@ -359,10 +359,10 @@ def _describe_damage(damaged: list[int], count: int) -> str:
 
 
 def _load_libraries(lines: list[str]) -> dict[str, ObjectLibrary]:
-    """Libraries by their folders; the one that came next stands for one that is gone.
+    """Libraries by folder; a missing library is replaced by the next one in the journal.
 
     Raises:
-        BurgError: the last one cannot be loaded.
+        BurgError: the last library cannot be loaded.
     """
     found: dict[str, ObjectLibrary] = {}
     later: ObjectLibrary | None = None
@@ -377,7 +377,7 @@ def _load_libraries(lines: list[str]) -> dict[str, ObjectLibrary]:
 
 
 def append_line(path: Path, line: bytes) -> None:
-    """Appends a line, or nothing."""
+    """Appends a line; on an error the file keeps its old content."""
     with path.open("r+b") as stream:
         end = stream.seek(0, os.SEEK_END)
         try:

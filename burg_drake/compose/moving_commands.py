@@ -1,4 +1,4 @@
-"""Commands that move objects: to poses, onto a grid, into line with each other, into contact."""
+"""Commands that move objects: to poses, onto a grid, into alignment, into contact."""
 
 from __future__ import annotations
 
@@ -31,11 +31,10 @@ from burg_drake.scene import TOUCH_TOLERANCE
 
 @dataclass(frozen=True, eq=False)
 class MoveObjects:
-    """Brings objects to other poses.
+    """Moves objects to given poses.
 
     Attributes:
-        X_SO: (4, 4) poses by instance. Where movement is planar, objects keep their height and
-            tilt.
+        X_SO: (4, 4) poses by instance. With planar movement, objects keep their height and tilt.
         changes_height: Heights change even while objects are kept upright.
     """
 
@@ -61,8 +60,7 @@ class MoveObjects:
 class SetPose(InstancesCommand):
     """Puts objects into a stable pose.
 
-    Each keeps where its centre of mass is above the board, its yaw, and the height that it stands
-    at.
+    Each keeps the horizontal position of its centre of mass, its yaw, and its support height.
 
     Attributes:
         names: instances.
@@ -121,11 +119,11 @@ class Turn(InstancesCommand):
 
 @dataclass(frozen=True)
 class SnapToGrid(InstancesCommand):
-    """Brings the origins of objects to the nearest points of a grid over the board.
+    """Moves the origins of objects to the nearest points of a grid over the board.
 
     Attributes:
         names: instances.
-        spacing: of the grid, which starts in the board's corner [m].
+        spacing: of the grid, which starts at the board's corner [m].
     """
 
     verb = "snap to grid"
@@ -144,22 +142,22 @@ class SnapToGrid(InstancesCommand):
 def pose_on_board(
     X_SO: Array, position: tuple[float, float], yaw: float = 0.0, height: float = 0.0
 ) -> Array:
-    """(4, 4) object that stands on the board.
+    """(4, 4) pose of an object on the board.
 
     Args:
-        X_SO: (4, 4) stable pose as a library has it, the centre of mass above the origin.
+        X_SO: (4, 4) stable pose as in a library, with the centre of mass above the origin.
         position: of the centre of mass in the scene [m].
-        yaw: by which it is turned [rad].
-        height: of what it stands on, above the board [m].
+        yaw: rotation about the vertical [rad].
+        height: of the support above the board [m].
     """
     return make_pose(rot_z(yaw), (*position, height)) @ X_SO
 
 
 def stable_pose_matrix(state: State, object: str, stable_pose: int) -> Array:
-    """(4, 4) stable pose of an object; furniture without any stands as its mesh does.
+    """(4, 4) stable pose of an object; furniture without stable poses stands as its mesh is.
 
     Raises:
-        InvalidInputError: it has no such stable pose.
+        InvalidInputError: the object has no such stable pose.
     """
     entry = state.library.entry(object)
     if not entry.stable_poses and stable_pose == 0:
@@ -196,11 +194,11 @@ Axis = Literal["x", "y"]
 
 @dataclass(frozen=True)
 class Align(InstancesCommand):
-    """Brings edges of objects, or their middles, onto one line.
+    """Aligns edges or middles of objects.
 
     Attributes:
         names: instances, two or more.
-        edge: of their footprints that is aligned, with that of the outermost object.
+        edge: of the footprints; all are aligned with that of the outermost object.
     """
 
     edge: Edge
@@ -210,7 +208,7 @@ class Align(InstancesCommand):
         return command_label(f"align {self.edge.replace('_', ' ')} of", self.names)
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
-        # Axis and part of the bounds by name, with y upwards as seen from above.
+        # Axis and part of the bounds by name, with y up in the view from above.
         edges = {
             "left": (0, "lower"),
             "right": (0, "upper"),
@@ -279,10 +277,10 @@ Direction = Literal["x", "-x", "y", "-y"]
 
 @dataclass(frozen=True)
 class SnapToContact(InstancesCommand):
-    """Moves objects along the board until they touch something, or are at its edge.
+    """Moves objects along the board until they touch something or reach its edge.
 
     Attributes:
-        names: instances; several move as one.
+        names: instances; several move together.
         direction: along an axis of the board.
     """
 
@@ -308,12 +306,12 @@ class SnapToContact(InstancesCommand):
 
 @dataclass(frozen=True)
 class PutDown(InstancesCommand):
-    """Lowers objects until they stand on the board or on what is below.
+    """Lowers objects until they stand on the board or on the object below.
 
-    What is in the board is lifted out of it.
+    Objects that reach below the board are lifted onto it.
 
     Attributes:
-        names: instances; each goes down on its own, the lowest one first.
+        names: instances; each is lowered on its own, the lowest first.
     """
 
     verb = "put down"
@@ -331,11 +329,11 @@ class PutDown(InstancesCommand):
 
 
 def _move_to_contact(
-    state: State, names: tuple[str, ...], direction: Array, limit: float, around: Surroundings
+    state: State, names: tuple[str, ...], direction: Array, limit: float, surroundings: Surroundings
 ) -> State:
-    """Instances moved together along a direction (3,) as far as they go, at most `limit` [m]."""
-    scene = scene_of_known_objects(state, around.path)
-    distance = around.checker.check(state).travel(scene, names, direction, limit)
+    """Moves instances together along a direction (3,) until contact, at most `limit` [m]."""
+    scene = scene_of_known_objects(state, surroundings.path)
+    distance = surroundings.checker.check(state).travel(scene, names, direction, limit)
     if distance <= 0.0:
         return state.select(names)
     X_SO = {name: _shifted_pose(state, name, distance * direction) for name in names}

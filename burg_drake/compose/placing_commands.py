@@ -55,11 +55,12 @@ class AddObject:
 
     Attributes:
         object: its name in the library.
-        stable_pose: that it stands in; if None, as its mesh stands where that is stable, else the
-            most probable one, or the next in which there is room.
-        position: x and y of its centre of mass [m]; a free place near the middle if None. It is
-            refused if there is none.
-        yaw_deg: by which it is turned; not at all if None, unless there is room only if it is.
+        stable_pose: number of the stable pose; if None, the orientation of its mesh if that is
+            stable, else the most probable stable pose, or the next one for which there is room.
+        position: x and y of its centre of mass [m]; a free place near the middle if None. The
+            command fails if there is none.
+        yaw_deg: rotation about the vertical; None for 0, or 45, 90 or 135 if there is no room
+            at 0.
     """
 
     object: str
@@ -90,7 +91,7 @@ class AddObject:
     def _free_place(
         self, state: State, surroundings: Surroundings, yaw_deg: float
     ) -> tuple[Array, float, tuple[float, float]]:
-        """Stable pose (4, 4), yaw [degrees] and position [m] where there is room."""
+        """Stable pose (4, 4), yaw [degrees] and position [m] of a free place."""
         library = state.library
         entry = library.entry(self.object)
         poses = [entry.proposed_pose, *range(len(entry.stable_poses))]
@@ -112,7 +113,7 @@ class AddObject:
 
 @dataclass(frozen=True)
 class Delete(InstancesCommand):
-    """Takes instances out of the scene."""
+    """Removes instances from the scene."""
 
     verb = "delete"
 
@@ -123,12 +124,12 @@ class Delete(InstancesCommand):
 
 @dataclass(frozen=True)
 class Duplicate(InstancesCommand):
-    """Puts copies beside instances.
+    """Puts copies of instances beside them.
 
     Attributes:
-        names: of what is copied; several keep their places to one another.
-        offset: from each to its copy along x and y [m]; to the nearest place where all of them are
-            on the board and free if None, or to the right of all that is there.
+        names: of the instances to copy; several keep their relative poses.
+        offset: from each instance to its copy along x and y [m]; if None, the shortest one with
+            all copies on the board and free, else to the right of all objects.
     """
 
     verb = "duplicate"
@@ -177,11 +178,11 @@ class Rename:
 
 @dataclass(frozen=True)
 class SetFixed(InstancesCommand):
-    """Makes free instances part of the background, or the other way round.
+    """Makes free instances part of the background, or background instances free.
 
     Attributes:
         names: instances.
-        fixed: whether they shall stay where they are when the scene is simulated.
+        fixed: whether they keep their poses when the scene is simulated.
     """
 
     fixed: bool = True
@@ -209,7 +210,7 @@ class SetFixed(InstancesCommand):
 
 @dataclass(frozen=True)
 class Clear:
-    """Takes everything off the board."""
+    """Removes all objects from the board."""
 
     label = "clear scene"
 
@@ -223,7 +224,7 @@ def _names_without_mass(state: State, instances: list[Instance]) -> set[str]:
 
 
 def _station_obstacles(surroundings: Surroundings, lower: float, upper: float) -> list[Array]:
-    """(N, 2) what the station's boxes that reach between two heights [m] cover of the board [m]."""
+    """(N, 2) footprints of the station's boxes between two heights [m], on the board [m]."""
     return [
         convex_polygon(p_SV[:, :2])
         for p_SV in obstacle_corners(surroundings.station)
@@ -234,8 +235,8 @@ def _station_obstacles(surroundings: Surroundings, lower: float, upper: float) -
 def _copy_offset(
     state: State, surroundings: Surroundings, names: tuple[str, ...]
 ) -> tuple[float, float]:
-    """Offset of copies: the shortest to where they are free on the board, or to the right of all
-    that is there."""
+    """Offset of copies: the shortest one to a free place on the board, else to the right of all
+    objects."""
     heights = [instance_bounds(state, name)[:, 2] for name in names]
     obstacles = _station_obstacles(surroundings, float(np.min(heights)), float(np.max(heights)))
     polygons = [instance_shadow(state, name) for name in names]
@@ -250,20 +251,20 @@ def _copy_offset(
 
 
 MAX_RANDOM_OBJECTS = 60
-"""Objects of one random configuration."""
+"""Maximum number of objects in a random configuration."""
 
 
 @dataclass(frozen=True)
 class RandomConfiguration:
-    """Gives free objects random places and stable poses; the background stays.
+    """Gives free objects random positions and stable poses; the background stays.
 
     Attributes:
-        seed: the same one gives the same configuration.
-        count: so many objects of the library take the place of the free ones; those that are there
-            stay, elsewhere, if None.
-        layout: how they stand to one another; see `scene.scene_document.LayoutName`.
+        seed: the same seed gives the same configuration.
+        count: number of objects of the library that replace the free objects; if None, the free
+            objects of the scene are placed anew.
+        layout: arrangement of the objects; see `scene.scene_document.LayoutName`.
         poses: how stable poses are drawn.
-        repeat: an object of the library may come several times.
+        repeat: whether an object of the library may be used several times.
     """
 
     seed: int = 0
@@ -276,7 +277,7 @@ class RandomConfiguration:
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
-        wanted = self._wanted(state, surroundings, rng)
+        wanted = self._object_requests(state, surroundings, rng)
         shapes, board = library_shapes(surroundings.checker, state), state.document.board
         covered = sum(min(map(polygon_area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
@@ -302,7 +303,7 @@ class RandomConfiguration:
         document = replace(state.document, instances=found.instances)
         return replace(state, document=document, selection=())
 
-    def _wanted(
+    def _object_requests(
         self, state: State, surroundings: Surroundings, rng: np.random.Generator
     ) -> tuple[ObjectRequest, ...]:
         scene = scene_of_known_objects(state, surroundings.path)
@@ -318,8 +319,8 @@ class RandomConfiguration:
 
 
 def _obstacle_bodies(state: State, surroundings: Surroundings) -> list[Array]:
-    """Points (N, 3) of convex bodies that are in the way: hulls of the background, and boxes of the
-    station that reach above the board [m]."""
+    """Points (N, 3) of the convex obstacles [m]: hulls of the background, and boxes of the station
+    that reach above the board."""
     scene = scene_of_known_objects(state, surroundings.path)
     bodies = [
         transform_points(scene.X_SO(name), object_vertices(state.library, instance.object))

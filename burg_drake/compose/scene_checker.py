@@ -35,7 +35,7 @@ def object_vertices(library: ObjectLibrary, name: str) -> Array:
     """(N, 3) vertices of an object's convex hull in its own frame [m].
 
     Raises:
-        UnknownNameError: no such object, or its mesh is missing.
+        UnknownNameError: there is no such object, or its mesh is missing.
         MeshError: its mesh is damaged.
     """
     entry = library.entry(name)
@@ -48,7 +48,7 @@ def object_vertices(library: ObjectLibrary, name: str) -> Array:
 
 @lru_cache(maxsize=1000)
 def _hull_vertices(path: Path, build: str) -> Array:
-    """The same, of a file; `build` is the hash of what it was made from."""
+    """The hull vertices of a mesh file; `build` is the hash of the mesh's source."""
     from scipy.spatial import ConvexHull, QhullError
 
     p_OV = read_vertices(path)
@@ -64,24 +64,24 @@ def instance_bounds(state: State, name: str) -> Array:
 
 
 def object_bounds(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
-    """(2, 3) the same of an object that need not be an instance."""
+    """(2, 3) lower and upper corner of an object's bounding box at a pose X_SO [m]."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
     return np.array([p_SV.min(axis=0), p_SV.max(axis=0)])
 
 
 def instance_shadow(state: State, name: str) -> Array:
-    """(N, 2) convex polygon that an instance covers of the board [m]; see `object_shadow`."""
+    """(N, 2) convex footprint of an instance on the board [m]; see `object_shadow`."""
     return object_shadow(state.library, state.instance(name).object, state.X_SO(name))
 
 
 def object_shadow(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
-    """(N, 2) what an object covers of the board, and at most 0.2 mm more [m]."""
+    """(N, 2) convex footprint of an object on the board [m], at most 0.2 mm too large."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
     return simplify_polygon(convex_polygon(p_SV[:, :2]), 2e-4)
 
 
 def yaw_between(R_SA: Array, R_SB: Array) -> float:
-    """The rotation about z that brings A nearest to B [rad].
+    """The rotation about z that brings A closest to B [rad].
 
     It maximises trace(R_SB^T Rz R_SA); (3, 3) rotation matrices.
     """
@@ -90,7 +90,7 @@ def yaw_between(R_SA: Array, R_SB: Array) -> float:
 
 
 def nearest_stable_pose(state: State, name: str) -> tuple[int, float] | None:
-    """The stable pose that an instance is in, or nearest to: its number and the yaw [rad].
+    """Number of the stable pose closest to an instance's orientation, and the yaw [rad].
 
     None for an object without stable poses.
     """
@@ -111,7 +111,7 @@ class SceneChecker:
     """Checks states on one station; to be used by one thread at a time.
 
     Args:
-        station: where scenes stand.
+        station: of the scenes.
     """
 
     def __init__(self, station: StationLike) -> None:
@@ -123,14 +123,14 @@ class SceneChecker:
         self._issues: tuple[SceneIssue, ...] = ()
 
     def issues(self, state: State, path: Path) -> tuple[SceneIssue, ...]:
-        """What is wrong, but for instances whose object is lost.
+        """Issues of the scene without the instances whose object is missing.
 
         Args:
             state: scene and library.
             path: of the scene's file, for messages.
 
         Raises:
-            BurgError: it cannot be checked: a file of an object is missing, for example.
+            BurgError: the scene cannot be checked, for example as an object's file is missing.
         """
         known = self._state
         if known and known.document == state.document and known.library is state.library:
@@ -140,7 +140,7 @@ class SceneChecker:
         return issues
 
     def gaps(self, state: State, path: Path) -> dict[str, float]:
-        """Free way straight down of each selected instance that touches nothing below it [m].
+        """Distance straight down to contact of each selected instance without support [m].
 
         Args:
             state: scene, library and selection.
@@ -163,7 +163,7 @@ class SceneChecker:
         return found
 
     def check(self, state: State) -> SceneCheck:
-        """What knows of the objects of a state's library, and of contact between them."""
+        """The collision check for the objects of a state's library."""
         from burg_drake.station import SceneCheck
 
         if self._check is None or self._library is not state.library:
@@ -172,19 +172,19 @@ class SceneChecker:
 
 
 def library_shapes(checker: SceneChecker, state: State) -> ObjectShapes:
-    """The shapes of a state's library, which a checker keeps as it keeps its other knowledge."""
+    """The shapes of a state's library, from the checker's cache."""
     if checker._shapes is None or checker._shapes.library is not state.library:
         checker._shapes = ObjectShapes(state.library)
     return checker._shapes
 
 
 def missing_objects(state: State) -> tuple[str, ...]:
-    """Instances whose object is not in the library any more."""
+    """Instances whose object is no longer in the library."""
     return tuple(n for n, i in state.instances.items() if i.object not in state.library.objects)
 
 
 def scene_of_known_objects(state: State, path: Path) -> Scene:
-    """The scene without lost instances."""
+    """The scene without the instances whose object is missing."""
     names = missing_objects(state)
     if not names:
         return state.scene(path)
@@ -198,7 +198,7 @@ def scene_of_known_objects(state: State, path: Path) -> Scene:
 
 
 def restore_missing_objects(document: SceneDocument, state: State) -> SceneDocument:
-    """What became of a `scene_of_known_objects`, with the instances that it was without."""
+    """Adds the left out instances to a document derived from `scene_of_known_objects`."""
     missing = [state.instance(name) for name in missing_objects(state)]
     return replace(
         document,
@@ -209,13 +209,13 @@ def restore_missing_objects(document: SceneDocument, state: State) -> SceneDocum
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What a command is applied in.
+    """The context in which a command is applied.
 
     Attributes:
-        station: where the scene stands.
-        planar: objects that are moved keep their tilt, and their height unless they are raised.
+        station: of the scene.
+        planar: whether moved objects keep their tilt, and their height unless they are raised.
         path: of the scene's file, for messages.
-        checker: knows what touches what.
+        checker: finds contacts and free places.
     """
 
     station: Station
@@ -228,10 +228,10 @@ class Surroundings:
         return {*state.instances, *MODEL_NAMES, *self.station.document.background}
 
     def require_unused(self, name: str, state: State) -> None:
-        """Refuses a name for an instance.
+        """Checks a name for a new instance.
 
         Raises:
-            FieldError: it is not a name, or something else is called so.
+            FieldError: it is not a valid name, or is already used.
         """
         require_name(name)
         if name in state.instances:
@@ -245,12 +245,12 @@ class Surroundings:
 def find_free_place(
     polygon: Array, state: State, obstacles: Sequence[Array] = ()
 ) -> tuple[float, float] | None:
-    """The place nearest to the board's middle where an object is beside all others.
+    """The free place for an object closest to the middle of the board.
 
     Args:
-        polygon: (N, 2) what it covers, its centre of mass above the origin [m].
-        state: what is there already.
-        obstacles: (N, 2) convex polygons of what else is in the way [m].
+        polygon: (N, 2) footprint of the object, with its centre of mass above the origin [m].
+        state: with the objects that are on the board.
+        obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:
         x and y of its centre of mass [m]; None if there is no room.
@@ -267,18 +267,17 @@ def find_free_place(
 def find_free_offset(
     polygons: Sequence[Array], state: State, obstacles: Sequence[Array] = ()
 ) -> Array | None:
-    """The shortest way by which objects can be shifted to be on the board and beside all that is
-    there.
+    """The shortest offset that moves objects to a free place on the board.
 
     Args:
-        polygons: (N, 2) what each covers now [m].
-        state: what is there already.
-        obstacles: (N, 2) convex polygons of what else is in the way [m].
+        polygons: (N, 2) footprint of each object now [m].
+        state: with the objects that are on the board.
+        obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:
-        (2,) the way [m]; None if there is no room.
+        (2,) offset [m]; None if there is no room.
     """
-    clearance = 0.005  # Metres between new objects and others, seen from above.
+    clearance = 0.005  # Horizontal distance between new objects and others, in metres.
     size = np.array(state.document.board.size)
     pitch = max(0.01, float(size.max()) / 60)  # Metres between the places that are tried.
     ticks = [np.arange(-(s // pitch), s // pitch + 1) * pitch for s in size]

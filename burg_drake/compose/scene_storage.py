@@ -40,18 +40,18 @@ from burg_drake.scene import Board, SceneDocument, load_scene
 
 
 class FileChanged(InvalidInputError):
-    """A file is not as the session left it; writing it would lose what somebody else wrote."""
+    """A file was changed by another program; writing it would lose those changes."""
 
 
 class UnsavedChanges(InvalidInputError):
-    """Going on would lose changes that are not in any file."""
+    """The operation would lose unsaved changes."""
 
 
 def file_fingerprint(path: Path) -> str | None:
-    """A hash of what a file holds; None if it is not there.
+    """A hash of a file's content; None if there is no file.
 
     Raises:
-        InvalidInputError: it is there and cannot be read.
+        InvalidInputError: the file cannot be read.
     """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -62,15 +62,15 @@ def file_fingerprint(path: Path) -> str | None:
 
 
 def scene_path(name: str, folder: Path) -> Path:
-    """The file of a scene by its name, in a folder and nowhere else.
+    """The file of a scene by its name, always directly in the folder.
 
     Args:
         name: `breakfast` or `breakfast.yaml`.
         folder: that was opened.
 
     Raises:
-        FieldError: it is not a name: it would lead elsewhere, or hide the file.
-        InvalidInputError: there is a link of that name, which leads elsewhere.
+        FieldError: the name is invalid: it leads out of the folder, or gives a hidden file.
+        InvalidInputError: a symbolic link of that name leads out of the folder.
     """
     stem = name.removesuffix(".yaml").removesuffix(".yml")
     require_name(stem)
@@ -83,21 +83,21 @@ def scene_path(name: str, folder: Path) -> Path:
 def write_scene(
     document: SceneDocument, library: ObjectLibrary, path: Path, *, known: str | None, force: bool
 ) -> tuple[SceneDocument, str]:
-    """Writes a scene file so that its library is found from there.
+    """Writes a scene file, with a reference to its library that is valid from its folder.
 
     Args:
         document: the scene.
         library: its library.
         path: the file.
-        known: `file_fingerprint` that the file should have.
-        force: writes it all the same.
+        known: expected `file_fingerprint` of the existing file.
+        force: write even if the fingerprint differs.
 
     Returns:
-        The document as it was written, and the file's fingerprint.
+        The written document, and the file's new fingerprint.
 
     Raises:
         FileChanged: the file has another fingerprint.
-        InvalidInputError: it cannot be written; then it is as it was.
+        InvalidInputError: the file cannot be written; it keeps its old content.
     """
     found = file_fingerprint(path)
     if found not in (known, None) and not force:
@@ -112,8 +112,8 @@ def write_scene(
 
 
 def library_reference(document: SceneDocument, library: ObjectLibrary, folder: Path) -> str:
-    """How a scene file in `folder` refers to its library: as the document does if that leads there,
-    else by package:// or the relative path."""
+    """The reference to its library for a scene file in `folder`: that of the document if it is
+    valid there, else package:// or the relative path."""
     if document.library in builtin_names("models"):
         return document.library
     try:
@@ -128,7 +128,7 @@ class SceneInUse(InvalidInputError):
     """A scene is open in another session.
 
     Attributes:
-        address: of its page; empty if it has not told.
+        address: of the other session's page; empty if unknown.
     """
 
     def __init__(self, message: str, address: str) -> None:
@@ -137,34 +137,34 @@ class SceneInUse(InvalidInputError):
 
 
 class SceneLock:
-    """A lock that its holder's end releases, however that comes about.
+    """A lock on a scene, released even if its process is killed.
 
-    Where nothing can be written there is no lock, and nothing that it would protect.
+    In a read-only folder there is no lock, and no file that it would protect.
     """
 
     def __init__(self, scene: Path, address: str = "") -> None:
         """Takes the lock.
 
         Args:
-            scene: the scene's file, which need not be there.
+            scene: the scene's file, which need not exist.
             address: of the session's page.
 
         Raises:
-            SceneInUse: another session has it.
+            SceneInUse: another session holds the lock.
         """
         self.path = scene.with_name(f".{scene.name}.lock")
         self._file = _lock_file(self.path, scene)
         self.announce(address)
 
     def announce(self, address: str) -> None:
-        """Says where the session's page is."""
+        """Writes the address of the session's page into the lock file."""
         if self._file is not None:
             with contextlib.suppress(OSError):  # a full disk
                 os.ftruncate(self._file, 0)
                 os.pwrite(self._file, address.encode(), 0)
 
     def release(self) -> None:
-        """Lets others open the scene."""
+        """Releases the lock, so that others can open the scene."""
         if self._file is not None:
             with contextlib.suppress(OSError):
                 self.path.unlink(missing_ok=True)
@@ -173,7 +173,7 @@ class SceneLock:
 
 
 def _lock_file(path: Path, scene: Path) -> int | None:
-    """The descriptor of the locked file."""
+    """Locks a file; returns its descriptor."""
     while True:
         try:
             file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
@@ -193,17 +193,17 @@ def _lock_file(path: Path, scene: Path) -> int | None:
         with contextlib.suppress(OSError):
             if os.path.samestat(os.fstat(file), os.stat(path)):
                 return file
-        os.close(file)  # its last holder has removed it meanwhile
+        os.close(file)  # the last holder has removed the file meanwhile
 
 
 class SceneStorage:
     """The files of one scene.
 
     Attributes:
-        place: where the scene's file is, or would be if it had one.
+        place: path of the scene's file, whether or not the file exists.
         path: the scene's file; None if it has none.
-        known: `file_fingerprint` that the file should have.
-        saved: what it holds.
+        known: expected `file_fingerprint` of the file.
+        saved: the scene in the file.
         problem: why the last steps are not in the journal; None if they are.
     """
 
@@ -223,20 +223,20 @@ class SceneStorage:
         self._journal: JournalWriter | None = None  # a new journal is begun if None
 
     def announce(self, address: str) -> None:
-        """Says where the session's page is, for those who find the scene in use."""
+        """Publishes the address of the session's page, for others who try to open the scene."""
         self._lock.announce(address)
 
     def record_step(self, history: History) -> None:
-        """The history has one more step, and is there."""
+        """Writes the newest step of the history to the journal."""
         position = history.position
         self._append(lambda journal: journal.step(history.steps[position], position), history)
 
     def record_position(self, history: History) -> None:
-        """The history is at another step."""
+        """Writes the position in the history to the journal."""
         self._append(lambda journal: journal.position(history.position), history)
 
     def record_all(self, history: History) -> None:
-        """Writes the whole journal again, as the history is another one."""
+        """Writes the whole journal again, for another history."""
         journal = JournalWriter()
         lines = [journal.begin(self._origin)]
         lines += [journal.step(step, position) for position, step in enumerate(history.steps)]
@@ -249,7 +249,7 @@ class SceneStorage:
             self._journal, self.problem = journal, None
 
     def _append(self, line: Callable[[JournalWriter], str], history: History) -> None:
-        """Adds a line to the journal. After an error all of it is written with the next line."""
+        """Adds a line to the journal. After an error, the next call writes the whole journal."""
         if self._journal is None:
             self.record_all(history)
             return
@@ -261,7 +261,7 @@ class SceneStorage:
             self.problem = f"cannot write {path}: {error.strerror or error}"
 
     def _remove_journal(self) -> None:
-        """All that it has is in the scene's file, or is not wanted."""
+        """Deletes the journal, whose steps are saved or discarded."""
         self._journal = None
         with contextlib.suppress(OSError):
             journal_path(self.place).unlink(missing_ok=True)
@@ -294,10 +294,10 @@ class SceneStorage:
         self.record_all(history)
 
     def close(self, *, keep: bool) -> None:
-        """Lets others open the scene.
+        """Releases the scene, so that others can open it.
 
         Args:
-            keep: the journal, as there is something in it that is in no file.
+            keep: whether to keep the journal, as it holds unsaved changes.
         """
         if not keep:
             self._remove_journal()
@@ -306,12 +306,12 @@ class SceneStorage:
 
 @dataclass(frozen=True)
 class OpenedScene:
-    """What was opened.
+    """An opened scene.
 
     Attributes:
-        history: with the scene's state, and what came before it if it was recovered.
-        storage: its files.
-        notices: what the user should know, one line each.
+        history: with the scene's state, and the earlier steps of a recovered session.
+        storage: files of the scene.
+        notices: for the user, one line each.
     """
 
     history: History
@@ -337,17 +337,17 @@ def open_reference(reference: str | Path, folder: str | Path | None, address: st
 
 
 def open_scene_file(path: Path, address: str = "") -> OpenedScene:
-    """Opens a scene's file, or what a session that was killed has left of it.
+    """Opens a scene's file, or the unsaved changes that a killed session left of it.
 
     Raises:
-        SceneInUse: another session has it.
-        UnknownNameError: there is none, or an instance's object is unknown.
-        DocumentError: it does not fit the schema.
+        SceneInUse: the scene is open in another session.
+        UnknownNameError: there is no such file, or an instance's object is unknown.
+        DocumentError: the file does not fit the schema.
     """
     lock = SceneLock(path, address)
     try:
         found = recover_journal(journal_path(path))
-        notices = _keep_damaged(found, path)
+        notices = _set_damaged_aside(found, path)
         known = file_fingerprint(path)
         if found and found.history and found.history.state.document != found.saved:
             if found.known != known:
@@ -368,7 +368,7 @@ def open_scene_file(path: Path, address: str = "") -> OpenedScene:
 
 
 def new_scene(library: str | Path, folder: Path, address: str = "") -> OpenedScene:
-    """An empty board, A3 across, with the objects of a library at hand."""
+    """A new scene with an empty A3 board in landscape, for the objects of a library."""
     loaded = load_library(library)
     built_in = str(library) in builtin_names("models")
     reference = str(library) if built_in else portable_reference(loaded.root, folder)
@@ -381,7 +381,7 @@ def new_scene(library: str | Path, folder: Path, address: str = "") -> OpenedSce
 
 
 def _open_built_in_scene(path: Path, folder: Path, address: str) -> OpenedScene:
-    """A scene that the package installs: the start of a new one, as its file is not the user's."""
+    """A new scene that starts as a copy of a built-in one."""
     scene = load_scene(path)
 
     def make(name: str) -> State:
@@ -393,9 +393,9 @@ def _open_built_in_scene(path: Path, folder: Path, address: str) -> OpenedScene:
 def _open_unsaved_scene(
     name: str, make: Callable[[str], State], folder: Path, origin: str, address: str
 ) -> OpenedScene:
-    """A scene without a file, by the first name that is nobody else's: numbers are put behind it.
+    """A scene without a file, under the first unused name of `name`, `name_2` and so on.
 
-    What a session of the same origin has left is recovered.
+    Recovers the unsaved changes of a session with the same origin.
     """
     notices: tuple[str, ...] = ()
     for number in count(1):
@@ -410,14 +410,14 @@ def _open_unsaved_scene(
             found = recover_journal(journal_path(place))
             first = make(place.stem)
             if found is None or found.history is None:
-                notices += _keep_damaged(found, place)
+                notices += _set_damaged_aside(found, place)
                 return OpenedScene(
                     History(first), SceneStorage(place, lock, origin=origin), notices
                 )
             same_library = found.history.state.library.root == first.library.root
             lost_origin = not found.origin and bool(found.damage) and same_library
             if (found.origin == origin or lost_origin) and found.saved is None:
-                notices += _keep_damaged(found, place)
+                notices += _set_damaged_aside(found, place)
                 found = replace(found, origin=origin)
                 return _open_recovered(place, None, found, lock, notices)
         except LibraryMissing as error:
@@ -449,8 +449,8 @@ def _open_recovered(
     return OpenedScene(history, storage, notices)
 
 
-def _keep_damaged(found: RecoveredSession | None, scene: Path) -> tuple[str, ...]:
-    """Puts a damaged journal aside, and says so."""
+def _set_damaged_aside(found: RecoveredSession | None, scene: Path) -> tuple[str, ...]:
+    """Sets a damaged journal aside; returns the notice about it."""
     if found is None or not found.damage:
         return ()
     return (
@@ -460,10 +460,10 @@ def _keep_damaged(found: RecoveredSession | None, scene: Path) -> tuple[str, ...
 
 
 def _scene_folder(folder: str | Path | None) -> Path:
-    """The folder for scenes.
+    """The folder for scenes; the working directory if None.
 
     Raises:
-        InvalidInputError: it is none.
+        InvalidInputError: there is no such folder.
     """
     path = Path.cwd() if folder is None else Path(folder)
     if not path.is_dir():

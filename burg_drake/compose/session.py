@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 def library_change_notice(state: State, library: ObjectLibrary) -> str:
-    """One line on what a changed library means for a scene."""
+    """One line on the effects of a changed library on a scene."""
     missing = missing_objects(replace(state, library=library))
     used = dict.fromkeys(instance.object for instance in state.instances.values())
     other = [
@@ -70,7 +70,7 @@ def library_change_notice(state: State, library: ObjectLibrary) -> str:
 
 
 def _library_stamp(root: Path) -> tuple[int, int, int] | None:
-    """What differs if a library's document was written again; None if it is not there."""
+    """Time, size and inode of a library's document, to detect changes; None if it is missing."""
     try:
         stat = (root / LIBRARY_FILE).stat()
     except OSError:
@@ -81,13 +81,13 @@ def _library_stamp(root: Path) -> tuple[int, int, int] | None:
 class ComposeSession(Editor):
     """Document, selection, commands and history of one scene, without any user interface.
 
-    All methods may be called from any thread. What is refused raises a `BurgError`, and changes
-    nothing. Each step is in a journal beside the scene, from which a session that was killed is
-    opened again, its history included.
+    All methods may be called from any thread. A method that raises a `BurgError` changes nothing.
+    Each step is written to a journal beside the scene, from which a killed session is recovered
+    with its history.
 
     Attributes:
-        station: where the scene stands.
-        folder: scenes are saved to and loaded from here, and nowhere else.
+        station: of the scene.
+        folder: the only folder that scenes are saved to and loaded from.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class ComposeSession(Editor):
         self.folder = folder
         self._address = address
         self._library_seen: tuple[Path, object] | None = None
-        self._seen: str | None = opened.storage.known
+        self._seen_fingerprint: str | None = opened.storage.known
         self._settler = BackgroundWorker()
         self._settling: BackgroundJob[SettlingProposal] | None = None
         self._proposal: SettlingProposal | None = None
@@ -116,18 +116,19 @@ class ComposeSession(Editor):
     ) -> ComposeSession:
         """Opens a scene, or begins a new one with the objects of a library.
 
-        What a session that was killed has left is recovered, and a notice says so.
+        Unsaved changes of a killed session are recovered, with a notice.
 
         Args:
             reference: of a scene (path or built-in name) or a library (folder or built-in name). A
-                built-in scene is the start of a new one: it has no file until it is saved.
-            station: where it stands.
+                built-in scene is copied to a new one, which has no file until it is saved.
+            station: of the scene.
             folder: for scenes; that of the scene's file, or the working directory, if None.
-            address: of the page, for those who find the scene in use; see `announce`.
+            address: of the page, for others who try to open the scene; see `announce`.
 
         Raises:
-            SceneInUse: another session has it; the error tells its address.
-            UnknownNameError: there is neither, or an instance's object is unknown.
+            SceneInUse: the scene is open in another session; the error has its address.
+            UnknownNameError: there is no such scene or library, or an instance's object is
+                unknown.
             DocumentError: the file does not fit the schema.
         """
         opened = open_reference(reference, folder, address)
@@ -141,32 +142,32 @@ class ComposeSession(Editor):
         self.close()
 
     def announce(self, address: str) -> None:
-        """Says where the session's page is, for those who find the scene in use."""
+        """Publishes the address of the session's page, for others who try to open the scene."""
         with self._lock:
             self._address = address
             self._storage.announce(address)
 
     def close(self) -> None:
-        """Lets others open the scene. Changes that are in no file stay in the journal, and are
-        there when the scene is opened again."""
+        """Closes the session, so that others can open the scene. Unsaved changes stay in the
+        journal, and are recovered when the scene is opened again."""
         self.watch_grasps(None)
         self._settler.close()
         with self._exclusive():
             self._callbacks.clear()
-            self._storage.close(keep=self._changed)
+            self._storage.close(keep=self._has_unsaved_changes)
 
     def save(self, name: str | None = None, *, overwrite: bool = False) -> SessionView:
-        """Writes the scene to its file, or to another one in the folder, which is its file then.
+        """Saves the scene to its file, or under another name, which then becomes its own.
 
         Args:
-            name: of the file, which is the scene's name then; its own if None.
-            overwrite: also a file that something else has changed, or another scene.
+            name: new name of the scene and its file in the folder; None to keep the name.
+            overwrite: replace the file even if another program changed it, or it is another
+                scene.
 
         Raises:
-            FileChanged: the file is not as this session knows it.
-            SceneInUse: another session has it.
-            InvalidInputError: it cannot be written; the old file is as it was, and so is the
-                session.
+            FileChanged: another program changed the file.
+            SceneInUse: the scene of that name is open in another session.
+            InvalidInputError: the file cannot be written; file and session stay unchanged.
         """
         with self._exclusive():
             self._storage.save(self._history, name, self.folder, overwrite=overwrite)
@@ -176,18 +177,18 @@ class ComposeSession(Editor):
             return self._show(replace(self._history.state, selection=selection))
 
     def load(self, name: str | None = None, *, discard: bool = False) -> SessionView:
-        """Opens a scene of the folder. Its own file is a step, which can be undone; with another
-        one the history begins anew.
+        """Loads a scene of the folder. Reloading the own file is a step, which can be undone;
+        another scene starts a new history.
 
         Args:
-            name: of the file; its own if None.
-            discard: changes that were not saved.
+            name: of the file; None for the scene's own file.
+            discard: discard unsaved changes.
 
         Raises:
-            UnsavedChanges: there are such.
-            SceneInUse: another session has it.
-            InvalidInputError: the scene has no file, or the name would lead elsewhere.
-            BurgError: the file cannot be read, or does not fit.
+            UnsavedChanges: there are unsaved changes.
+            SceneInUse: the scene is open in another session.
+            InvalidInputError: the scene has no file, or the name leads out of the folder.
+            BurgError: the file cannot be read, or is invalid.
         """
         with self._exclusive():
             path = self._storage.path if name is None else scene_path(name, self.folder)
@@ -209,10 +210,10 @@ class ComposeSession(Editor):
 
         Args:
             library: see `use_library`; that of this scene if None.
-            discard: changes that were not saved.
+            discard: discard unsaved changes.
 
         Raises:
-            UnsavedChanges: there are such.
+            UnsavedChanges: there are unsaved changes.
             UnknownNameError: there is no such library.
             DocumentError: its document does not fit the schema.
         """
@@ -226,10 +227,10 @@ class ComposeSession(Editor):
             return self._switch_scene(new_scene(reference, self.folder, self._address))
 
     def printout(self, settings: PrintSettings | None = None) -> Printout:
-        """The board with the scene as it is, as PDF; see `printout.print_board`.
+        """PDF of the board with the current scene; see `printout.print_board`.
 
         Raises:
-            InvalidInputError: the settings do not fit, or the markers do not.
+            InvalidInputError: the settings or the markers do not fit the board.
         """
         from burg_drake.printout import print_board
 
@@ -238,8 +239,8 @@ class ComposeSession(Editor):
         )
 
     def libraries(self) -> tuple[str, ...]:
-        """References of libraries that a page may offer: built-in ones, and folders of the folder
-        that was opened."""
+        """References of the libraries that a page may offer: built-in ones, and subfolders of the
+        opened folder."""
         try:
             own = sorted(p.parent.name for p in self.folder.glob(f"*/{LIBRARY_FILE}"))
         except OSError:
@@ -247,7 +248,7 @@ class ComposeSession(Editor):
         return (*builtin_names("models"), *(name for name in own if not name.startswith(".")))
 
     def use_library(self, reference: str | Path) -> SessionView:
-        """Takes the objects from another library; a step.
+        """Takes the objects from another library; adds a step.
 
         Args:
             reference: one of `libraries`, or any folder as a `Path`.
@@ -262,7 +263,7 @@ class ComposeSession(Editor):
         return self.do(UseLibrary(library, written))
 
     def _library_path(self, reference: str | Path) -> str | Path:
-        """Where one of `libraries` is; a `Path` is what it is, as no page gives one.
+        """The path of one of `libraries`. A `Path` is returned as it is: pages pass strings only.
 
         Raises:
             UnknownNameError: there is no such library.
@@ -277,16 +278,16 @@ class ComposeSession(Editor):
         return reference if reference in builtin_names("models") else self.folder / reference
 
     def refresh(self) -> SessionView:
-        """Looks whether the library or the scene's file has changed on the disk; notices say so.
+        """Checks whether the library or the scene's file has changed on disk, and adds notices.
         Each step does that first."""
         with self._exclusive():
             self._update_surroundings()
             return self._view
 
     def settle(self, *, time_limit: float = 10.0) -> BackgroundJob[SettlingProposal]:
-        """Lets the scene come to rest in a worker process; editing goes on meanwhile.
+        """Settles the scene in a worker process, while editing goes on.
 
-        What comes of it is `SessionView.proposal`. What was asked before is cancelled.
+        The result becomes `SessionView.proposal`. An earlier job is cancelled.
 
         Args:
             time_limit: simulated time allowed [s].
@@ -295,19 +296,19 @@ class ComposeSession(Editor):
             self._drop_settling()
             scene = scene_of_known_objects(self._history.state, self._storage.place)
             self._settling = self._settler.submit(
-                SettlingTask(scene, self.station, time_limit), self._settled
+                SettlingTask(scene, self.station, time_limit), self._on_settling_change
             )
             self._publish()
             return self._settling
 
     def accept(self, proposal: SettlingProposal | None = None) -> SessionView:
-        """Makes a proposal a step.
+        """Accepts a settling proposal; adds a step.
 
         Args:
-            proposal: the one in the view if None.
+            proposal: that of the view if None.
 
         Raises:
-            InvalidInputError: there is none, or the scene has changed since it was made.
+            InvalidInputError: there is no proposal, or the scene has changed since then.
         """
         with self._exclusive():
             proposal = proposal or self._proposal
@@ -325,38 +326,38 @@ class ComposeSession(Editor):
             return self._edit(proposal.label, state.select(moved))
 
     def revert(self) -> SessionView:
-        """Drops the proposal, and what is being done for one."""
+        """Drops the proposal, and cancels settling."""
         with self._exclusive():
             self._drop_settling()
             return self._publish()
 
     def watch_grasps(self, grasps_per_object: int | None = 50) -> SessionView:
-        """Counts grasps from now on, in a worker process, a while after each change: how many of
-        each object are clear and reachable, and what is in the way of the others. They are in
+        """Counts grasps in a worker process shortly after each change: how many of each object are
+        clear and reachable, and what is in the way of the others. The counts are in
         `SessionView.grasps`.
 
         Args:
-            grasps_per_object: grasps that are sampled for each object; no more counting if None.
+            grasps_per_object: grasps that are sampled for each object; None stops counting.
         """
         with self._exclusive():
             watch, self._grasp_watch = self._grasp_watch, None
             if grasps_per_object is not None:
-                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
+                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._on_counts)
             view = self._publish()
         if watch is not None:
             watch.close()
         return view
 
     def _switch_scene(self, opened: OpenedScene) -> SessionView:
-        """Goes over to another scene."""
+        """Switches to another scene."""
         self._drop_settling()
         self._storage.close(keep=False)
-        self._seen = opened.storage.known
+        self._seen_fingerprint = opened.storage.known
         self._begin(opened)
         return self.refresh()
 
     def _require_saved(self, *, discard: bool) -> None:
-        if self._changed and not discard:
+        if self._has_unsaved_changes and not discard:
             name = self._history.state.document.name
             raise UnsavedChanges(f"scene {name!r} has unsaved changes; save or discard them")
 
@@ -368,7 +369,7 @@ class ComposeSession(Editor):
             return
         try:
             changed = load_library(library.root)
-        except BurgError as error:  # tried again when the library has changed once more
+        except BurgError as error:  # tried again after the next change of the library
             self.notify(f"library {library.root} can no longer be read: {error}")
             return
         if changed.document == library.document and changed.content == library.content:
@@ -379,35 +380,35 @@ class ComposeSession(Editor):
         self._show(replace(self._state, library=changed))
 
     def _check_scene_file(self) -> None:
-        """Tells once of each change of the scene's file that is not this session's."""
+        """Adds one notice for each change of the scene's file by another program."""
         path = self._storage.path
         if path is None:
             return
         try:
             found = file_fingerprint(path)
         except InvalidInputError:
-            return  # saving tells
-        if found not in (self._storage.known, self._seen):
+            return  # saving reports the error
+        if found not in (self._storage.known, self._seen_fingerprint):
             what = "is gone" if found is None else "was changed by another program"
             self.notify(f"{path} {what}; load it, or overwrite it by saving")
-        self._seen = found
+        self._seen_fingerprint = found
 
-    def _counted(self, job: GraspCountJob, revision: int) -> None:
-        """Called by the worker's thread."""
+    def _on_counts(self, job: GraspCountJob, revision: int) -> None:
+        """Called in the thread of the worker."""
         with self._exclusive():
             if self._grasp_watch is None or job.cancelled:
                 return
             if job.error is not None:
                 self.notify(f"grasps cannot be counted: {job.error}")
-                self._grasps = ({}, revision)  # nobody waits for more
+                self._grasps = ({}, revision)  # counting was cancelled
             elif job.done:
                 self._grasps = (job.result, revision)
             elif job.partial is not None:
                 self._grasps = ({**self._grasps[0], **job.partial}, self._grasps[1])
             self._publish()
 
-    def _settled(self, job: BackgroundJob[SettlingProposal]) -> None:
-        """Called by the worker's thread."""
+    def _on_settling_change(self, job: BackgroundJob[SettlingProposal]) -> None:
+        """Called in the thread of the worker."""
         with self._exclusive():
             if job is not self._settling:
                 return
@@ -425,7 +426,7 @@ class ComposeSession(Editor):
         if job is not None:
             job.cancel()
 
-    def _with_background(self, view: SessionView) -> SessionView:
+    def _add_task_state(self, view: SessionView) -> SessionView:
         if self._grasp_watch is not None:
             scene = scene_of_known_objects(self._history.state, self._storage.place)
             self._grasp_watch.update(scene, self._revision, self._state.selection)

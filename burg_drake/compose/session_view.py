@@ -1,4 +1,4 @@
-"""The view of a session at one moment: all that a page needs to draw."""
+"""The view of a session at one moment, with all that a page draws."""
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ class SessionView:
     """A session at one moment.
 
     Attributes:
-        serial: rises with every view of a session, whatever changed; of two, the larger is newer.
-        revision: rises with every change of the scene; a drag's moves do not count until its end.
-        state: the scene, its library and the selection; while something is dragged, as it is held.
-        issues: what is wrong with the scene.
+        serial: increases with every view of a session; of two views, the larger is newer.
+        revision: increases with every change of the scene, once at the end of a drag.
+        state: the scene, its library and the selection, with the current poses of a drag.
+        issues: of the scene.
         status: of every instance, the worst first; background is `ok` unless something is in it.
         undo_label: of the step that undo takes back; None if there is none.
         redo_label: of the step that redo takes again; None if there is none.
-        saved: the file holds the scene as it is.
-        changed: there are changes that are in no file.
+        saved: whether the file holds the current scene.
+        changed: whether there are unsaved changes.
         path: the file; None if the scene was never saved.
-        planar: objects that are moved keep their tilt, and their height unless they are raised.
-        gaps: of selected instances that touch nothing below, how far they are above it [m].
+        planar: whether moved objects keep their tilt, and their height unless they are raised.
+        gaps: heights of selected instances above the surface below, if they do not touch it [m].
         dragging: instances that are being dragged.
-        notices: what the user should know, one line each, until `ComposeSession.dismiss`.
-        working: what is being done beside, and how far it is; None if nothing is.
-        proposal: what came of it, to be accepted or reverted.
+        notices: for the user, one line each, until `ComposeSession.dismiss`.
+        working: progress of settling, as text; None if no settling runs.
+        proposal: result of settling, to be accepted or reverted.
         grasps: how many grasps of each instance are clear and reachable, as far as they are
             counted; see `ComposeSession.watch_grasps`.
-        grasps_revision: the revision that all of these counts belong to; while a newer one is
-            counted, some are of that one already.
+        grasps_revision: the revision of these counts; while a newer revision is counted, some
+            counts are already of that one.
     """
 
     serial: int
@@ -86,7 +86,7 @@ class SessionView:
 
     @property
     def library(self) -> ObjectLibrary:
-        """That the instances refer to."""
+        """The library that the instances refer to."""
         return self.state.library
 
     @property
@@ -107,11 +107,11 @@ class SessionView:
 def instance_statuses(
     state: State, issues: Iterable[SceneIssue] | None
 ) -> dict[str, InstanceStatus]:
-    """The worst that is said of each instance; both of a pair that overlaps are in collision.
+    """The worst status of each instance; both instances of an overlap are in collision.
 
     Args:
         state: with the instances.
-        issues: of the scene; None if it cannot be checked.
+        issues: of the scene; None if the scene cannot be checked.
     """
     worst_first = ("collision", "in_ground", "out_of_bounds", "hovering", "sunken", "ok")
     if issues is None:

@@ -16,11 +16,11 @@ from burg_drake.scene import Instance, Scene, SceneDocument
 
 @dataclass(frozen=True)
 class State:
-    """A scene and what of it is selected; commands make new ones of it.
+    """A scene and the selected instances; commands return new states.
 
     Attributes:
         document: the scene.
-        library: that the instances refer to.
+        library: the library that the instances refer to.
         selection: names of selected instances, in the order in which they were selected.
     """
 
@@ -38,7 +38,7 @@ class State:
         """An instance, free or fixed.
 
         Raises:
-            UnknownNameError: there is none of that name.
+            UnknownNameError: there is no instance of that name.
         """
         known = self.instances
         if name not in known:
@@ -57,14 +57,14 @@ class State:
         return self.instance(name).X_SO.matrix()
 
     def scene(self, path: Path) -> Scene:
-        """The scene, as if it were read from `path`."""
+        """The scene, as if read from `path`."""
         return Scene(self.document, self.library, path)
 
     def select(self, names: Iterable[str]) -> State:
-        """The same with other instances selected.
+        """The state with these instances selected.
 
         Raises:
-            UnknownNameError: one of them is not there.
+            UnknownNameError: there is no such instance.
         """
         selection = tuple(dict.fromkeys(names))
         for name in selection:
@@ -72,23 +72,23 @@ class State:
         return replace(self, selection=selection)
 
     def replace_instances(self, change: Callable[[Instance], Instance | None]) -> State:
-        """The same with each instance replaced, or taken away where `change` gives None."""
+        """The state with each instance replaced, or removed where `change` returns None."""
         document = replace(
             self.document,
             instances=tuple(filter(None, map(change, self.document.instances))),
             background=tuple(filter(None, map(change, self.document.background))),
         )
         changed = replace(self, document=document)
-        there = changed.instances
-        return replace(changed, selection=tuple(n for n in self.selection if n in there))
+        instances = changed.instances
+        return replace(changed, selection=tuple(n for n in self.selection if n in instances))
 
     def with_poses(self, X_SO: Mapping[str, Array]) -> State:
-        """The same with instances at other poses (4, 4); rounded as `Pose.readable` has it.
+        """The state with instances at new poses (4, 4), rounded by `Pose.readable`.
 
         Raises:
-            UnknownNameError: one of them is not there.
+            UnknownNameError: there is no such instance.
         """
-        # Entries of matrices that differ by less are equal; the instance keeps its digits.
+        # An instance keeps its digits if all matrix entries differ by less.
         pose_tolerance = 1e-9
         for name in X_SO:
             self.instance(name)
@@ -102,7 +102,7 @@ class State:
         return self.replace_instances(place)
 
     def with_instances(self, new: Iterable[Instance], *, fixed: Collection[str] = ()) -> State:
-        """The same with more instances, selected; those named in `fixed` are background."""
+        """The state with new instances, selected; those named in `fixed` are background."""
         new = tuple(new)
         document = self.document
         document = replace(
@@ -114,21 +114,21 @@ class State:
 
 
 def instance_name(instance: Instance) -> str:
-    """What an instance goes by."""
+    """The name of an instance; that of its object if it has none of its own."""
     return instance.name or instance.object
 
 
 def rename_instance(instance: Instance, name: str) -> Instance:
-    """The same instance by another name, which is not written where it is the object's."""
+    """The instance with another name, left out if it is the object's name."""
     return replace(instance, name="" if name == instance.object else name)
 
 
 def require_instance_names(names: Iterable[str], state: State, least: int = 1) -> tuple[str, ...]:
-    """Names that a command was given, each once.
+    """The names given to a command, without repetitions.
 
     Raises:
-        InvalidInputError: fewer than `least`.
-        UnknownNameError: one is not there.
+        InvalidInputError: there are fewer than `least`.
+        UnknownNameError: there is no such instance.
     """
     names = tuple(dict.fromkeys(names))
     for name in names:
@@ -143,11 +143,11 @@ def require_instance_names(names: Iterable[str], state: State, least: int = 1) -
 
 @dataclass(frozen=True)
 class HistoryStep:
-    """A state, and what led to it.
+    """A state, and the label of the command that led to it.
 
     Attributes:
         label: of the command.
-        state: after it.
+        state: after the command.
     """
 
     label: str
@@ -155,9 +155,9 @@ class HistoryStep:
 
 
 class History:
-    """States from the first to the last, and where among them the session is.
+    """States from the first to the last, and the current position.
 
-    States share all instances that a step leaves alone, so that a step takes little memory.
+    States share all unchanged instances, so that a step takes little memory.
     """
 
     def __init__(self, first: State) -> None:
@@ -166,29 +166,29 @@ class History:
 
     @property
     def state(self) -> State:
-        """The present state."""
+        """The current state."""
         return self.steps[self.position].state
 
     @property
     def undo_label(self) -> str | None:
-        """Of the step that `undo` takes back; None at the beginning."""
+        """Label of the step that `undo` takes back; None at the beginning."""
         return self.steps[self.position].label if self.position else None
 
     @property
     def redo_label(self) -> str | None:
-        """Of the step that `redo` takes again; None at the end."""
+        """Label of the step that `redo` takes again; None at the end."""
         return self.steps[self.position + 1].label if self._can_redo else None
 
     def add(self, step: HistoryStep) -> None:
-        """Adds a step behind the present one; what was undone is gone."""
+        """Adds a step after the current one, and drops the undone steps."""
         self.steps[self.position + 1 :] = [step]
         self.position += 1
 
     def undo(self) -> State:
-        """The state before the present step, with what that step changed selected.
+        """Goes back one step; returns that state with the changed instances selected.
 
         Raises:
-            InvalidInputError: there is none.
+            InvalidInputError: there is nothing to undo.
         """
         if not self.position:
             raise InvalidInputError("there is nothing to undo")
@@ -196,10 +196,10 @@ class History:
         return _select_changes(self.state, self.steps[self.position + 1].state)
 
     def redo(self) -> State:
-        """The state after the step that was undone last.
+        """Goes forward to the step that was undone last; returns its state.
 
         Raises:
-            InvalidInputError: there is none.
+            InvalidInputError: there is nothing to redo.
         """
         if not self._can_redo:
             raise InvalidInputError("there is nothing to redo")
@@ -207,7 +207,7 @@ class History:
         return self.state
 
     def rename(self, name: str, reference: str, library: ObjectLibrary) -> None:
-        """Gives the scene of every step another name, and a library another reference."""
+        """Changes the scene's name and the reference to a library in every step."""
 
         def renamed(state: State) -> State:
             document = replace(state.document, name=name)
@@ -218,7 +218,7 @@ class History:
         self.steps = [HistoryStep(step.label, renamed(step.state)) for step in self.steps]
 
     def replace_library(self, library: ObjectLibrary) -> None:
-        """Puts what a library's folder holds now in place of what it held before."""
+        """Replaces the states' library of the same folder with its reloaded content."""
         self.steps = [
             HistoryStep(s.label, replace(s.state, library=library))
             if s.state.library.root == library.root
@@ -232,24 +232,24 @@ class History:
 
 
 def _select_changes(state: State, other: State) -> State:
-    """`state` with those instances selected that are not the same in `other`."""
-    there = other.instances
+    """`state` with the instances selected that differ from `other`."""
+    instances = other.instances
     fixed = set(state.document.background), set(other.document.background)
     changed = [
         name
         for name, instance in state.instances.items()
-        if there.get(name) != instance or (instance in fixed[0]) != (instance in fixed[1])
+        if instances.get(name) != instance or (instance in fixed[0]) != (instance in fixed[1])
     ]
     return replace(state, selection=tuple(changed))
 
 
 AMEND_PERIOD = 3.0
-"""Seconds after a step in which a further one may replace it."""
+"""Seconds after a step during which a further step may replace it."""
 
 
 class StepAmendment:
-    """The last step, as long as a further one may take its place: a number that is typed digit by
-    digit is one step."""
+    """Decides whether a step replaces the last one, so that a number typed digit by digit is one
+    step."""
 
     def __init__(self) -> None:
         self._field = ""
@@ -257,7 +257,7 @@ class StepAmendment:
         self._end = 0.0
 
     def allows(self, field: str, history: History) -> bool:
-        """Whether the last step is of the same field, recent, and nothing has happened since."""
+        """Whether the last step is recent, of the same field, and still the last."""
         return (
             bool(field)
             and field == self._field
@@ -267,11 +267,11 @@ class StepAmendment:
         )
 
     def begin(self, field: str, step: HistoryStep) -> None:
-        """A step of a field is taken; of none if that is empty."""
+        """Remembers a step of a field; of no field if `field` is empty."""
         self._field = field
         self._step = step
         self._end = time.monotonic() + AMEND_PERIOD
 
     def end(self) -> None:
-        """What comes next is a step of its own."""
+        """Makes the next step a separate one."""
         self._field = ""

@@ -1,7 +1,7 @@
-"""What all rooms need: frames, documents, grasp sets, verdicts, workers; nothing needs Drake.
+"""Shared code of all rooms: frames, documents, grasp sets, verdicts, workers; without Drake.
 
-Read `frames` and `errors` first; then `documents` and `grasp_set`, which the project's files are
-made of.
+Read `frames` and `errors` first; then `documents` and `grasp_set`, which define the project's
+files.
 """
 
 import lazy_loader

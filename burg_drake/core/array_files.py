@@ -1,9 +1,9 @@
 """Arrays in NumPy and HDF5 files, whose shape, type and size are checked before their data is read.
 
-An HDF5 file can refer to other files (soft and external links, external storage, virtual
-datasets) and can declare less than it unpacks to (unallocated chunks, chunks that inflate beyond
-their size, texts that share their bytes). Nothing outside the file is read here, and no more
-memory is used than `ReadBudget` allows.
+An HDF5 file can refer to other files (soft and external links, external storage, virtual datasets)
+and can declare less than it unpacks to (unallocated chunks, chunks that inflate beyond their size,
+texts that share their bytes). Only the file itself is read here, and memory is limited by
+`ReadBudget`.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ MAX_ARRAY_BYTES = 3 << 30
 """Memory for the arrays of one file. A million grasps with 100 columns take 1.0 GiB."""
 
 NUMBER_KINDS = "fiub"
-"""Kinds of numbers and truth values, as in `numpy.dtype.kind`."""
+"""Kinds of numbers and booleans, as in `numpy.dtype.kind`."""
 
 
 class ReadBudget:
-    """Memory that the arrays of a file may still take.
+    """Remaining memory for the arrays of one file.
 
     Attributes:
-        path: of the file.
-        bytes_left: the memory.
+        path: path of the file.
+        bytes_left: remaining memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,10 +54,10 @@ class ReadBudget:
         self.bytes_left = MAX_ARRAY_BYTES
 
     def require(self, where: str, nbytes: int) -> None:
-        """Refuses an array that takes more than is left.
+        """Rejects an array that exceeds the remaining memory.
 
         Raises:
-            InvalidInputError: it does.
+            InvalidInputError: it is too large.
         """
         if nbytes > self.bytes_left:
             raise InvalidInputError(
@@ -66,23 +66,23 @@ class ReadBudget:
             )
 
     def take(self, where: str, nbytes: int) -> None:
-        """The same, and counts what is not refused."""
+        """As `require`, and subtracts the memory from the budget."""
         self.require(where, nbytes)
         self.bytes_left -= nbytes
 
 
 @dataclass(frozen=True)
 class StoredArray:
-    """What a file says of an array, none of whose data is read yet.
+    """Description of an array in a file, before its data is read.
 
     Attributes:
         where: file and name, for messages.
-        shape: of the array.
+        shape: shape of the array.
         kind: `numpy.dtype.kind` of its values when they are read.
         type: its type, for messages.
-        itemsize: bytes of memory that a value takes; 0 where only the values tell.
+        itemsize: bytes of memory per value; 0 if unknown before reading.
         load: reads the data.
-        allowance: of the file.
+        allowance: memory budget of the file.
     """
 
     where: str
@@ -94,14 +94,14 @@ class StoredArray:
     allowance: ReadBudget
 
     def read(self, kinds: str, *shapes: ArrayShape) -> NDArray[Any]:
-        """The data, if it is what is expected.
+        """Reads the data, after checking its type and shape.
 
         Args:
-            kinds: allowed ones, of `numpy.dtype.kind`.
-            shapes: allowed ones; none for any.
+            kinds: allowed kinds, as in `numpy.dtype.kind`.
+            shapes: allowed shapes; any if empty.
 
         Raises:
-            InvalidInputError: other values or another shape, or too much of either.
+            InvalidInputError: wrong type or shape, or too much data.
         """
         descriptions = {
             "f": "floating-point numbers",
@@ -121,7 +121,7 @@ class StoredArray:
         return self.load()
 
     def require_rows(self, *shape: int) -> int:
-        """How many grasps there are if the array has a value of this shape for each.
+        """Number of grasps N of an array that must have shape (N, *shape).
 
         Raises:
             InvalidInputError: it has another shape, or too many values.
@@ -134,12 +134,12 @@ class StoredArray:
 
 
 def require_grasp_count(where: str, n: int) -> None:
-    """Refuses more grasps than a file may have.
+    """Rejects more grasps than a file may have.
 
     Raises:
         InvalidInputError: there are too many.
     """
-    # The largest known sets have two million grasps for all of their objects.
+    # The largest known sets have two million grasps for all their objects.
     max_grasps = 5_000_000
     if n > max_grasps:
         raise InvalidInputError(
@@ -148,7 +148,7 @@ def require_grasp_count(where: str, n: int) -> None:
 
 
 def text_array(where: str, texts: list[str], allowance: ReadBudget) -> NDArray[np.str_]:
-    """(N,) texts, which numpy keeps as long as the longest one.
+    """Converts texts to an array (N,), in which each takes the memory of the longest one.
 
     Raises:
         InvalidInputError: they take too much memory.
@@ -172,8 +172,7 @@ class NpzFile:
     """An open `.npz` file.
 
     Attributes:
-        path: of the file.
-    """
+        path: path of the file."""
 
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.path = path
@@ -187,8 +186,8 @@ class NpzFile:
         """An array by its name.
 
         Raises:
-            InvalidInputError: there is none, or it is damaged, compressed in another way than numpy
-                does, or of Python objects.
+            InvalidInputError: it is missing, damaged, compressed by another method than numpy's, or
+                has Python objects.
         """
         if name not in self.names:
             raise InvalidInputError(
@@ -249,14 +248,15 @@ def npy_shape(path: Path) -> ArrayShape | None:
 
 
 def write_npy(path: Path, values: NDArray[Any]) -> None:
-    """Writes a `.npy` file, whole or not at all."""
+    """Writes a `.npy` file atomically."""
     buffer = io.BytesIO()
     np.save(buffer, values, allow_pickle=False)
     atomic_write(path, buffer.getvalue())
 
 
 def _read_header(stream: IO[bytes], where: str, size: int) -> tuple[ArrayShape, np.dtype[Any]]:
-    """Shape and type of an array in a stream of some bytes; refuses what does not fit."""
+    """Reads shape and type of an array from a stream with `size` bytes, and rejects invalid
+    ones."""
     shape, _, dtype = NPY_HEADER_READERS[np.lib.format.read_magic(stream)](stream)
     if dtype.hasobject:
         raise InvalidInputError(
@@ -280,8 +280,7 @@ class Hdf5File:
     """An open HDF5 file.
 
     Attributes:
-        path: of the file.
-    """
+        path: path of the file."""
 
     def __init__(self, path: Path, file: Any) -> None:
         self.path = path
@@ -289,21 +288,21 @@ class Hdf5File:
         self._allowance = ReadBudget(path)
 
     def __contains__(self, key: str) -> bool:
-        return self._find(key) is not None
+        return self._find_object(key) is not None
 
     def names(self, key: str) -> list[str]:
-        """What a group holds, in the order of the file.
+        """Names of a group's members, in the order of the file.
 
         Raises:
             InvalidInputError: it is not a group.
         """
-        group = self._required(key)
+        group = self._require_object(key)
         if not hasattr(group, "items"):
             raise InvalidInputError(f"{self.path}: {key} is a dataset; expected a group")
         return list(group)
 
     def attribute(self, name: str) -> Any:
-        """A single value that the file has as attribute, such as a text.
+        """The value of a scalar attribute of the file, such as a text.
 
         Raises:
             InvalidInputError: it has several values.
@@ -319,7 +318,7 @@ class Hdf5File:
         Raises:
             InvalidInputError: it is missing or a group, or its data is not in this file.
         """
-        data = self._required(key)
+        data = self._require_object(key)
         where = f"{self.path}: {key}"
         if not hasattr(data, "dtype") or not hasattr(data, "shape"):
             raise InvalidInputError(f"{where} is a group; expected a dataset")
@@ -330,20 +329,20 @@ class Hdf5File:
             )
         if data.shape is None:
             raise InvalidInputError(f"{where} is empty")
-        return self._stored(where, data)
+        return self._describe_dataset(where, data)
 
-    def _stored(self, where: str, data: Any) -> StoredArray:
+    def _describe_dataset(self, where: str, data: Any) -> StoredArray:
         import h5py
 
         kind, itemsize = data.dtype.kind, data.dtype.itemsize
         text = h5py.check_string_dtype(data.dtype)
         if text is not None:
-            kind, itemsize = "U", 5 * (text.length or 0)  # bytes, and four each as a text
+            kind, itemsize = "U", 5 * (text.length or 0)  # bytes in the file, and as UTF-32
         self._allowance.require(where, data.dtype.itemsize * math.prod(data.chunks or ()))
 
         def load() -> NDArray[Any]:
             if text is not None and text.length is None:
-                return self._free_texts(where, data)
+                return self._read_variable_texts(where, data)
             _require_declared_size(where, data)
             values = np.asarray(data[()])
             return values if text is None else np.char.decode(values, "utf-8")
@@ -351,14 +350,14 @@ class Hdf5File:
         type = "text" if text is not None else str(data.dtype)
         return StoredArray(where, data.shape, kind, type, itemsize, load, self._allowance)
 
-    def _free_texts(self, where: str, data: Any) -> NDArray[np.str_]:
+    def _read_variable_texts(self, where: str, data: Any) -> NDArray[np.str_]:
         """Texts of any length, many of which may share the same bytes of the file."""
         texts = data.asstr("utf-8")
         if data.shape == ():
             return np.array(texts[()], dtype=str)
         if len(data.shape) != 1:
             raise InvalidInputError(f"{where} has shape {data.shape}; expected (N,)")
-        if data.chunks is None:  # no more at once than would fit if each were as long as the file
+        if data.chunks is None:  # chunks that fit even if each text is as long as the file
             part = max(1, self._allowance.bytes_left // (4 * self.path.stat().st_size))
         else:
             part = max(1, len(data))
@@ -370,14 +369,14 @@ class Hdf5File:
             found += more
         return text_array(where, found, self._allowance)
 
-    def _required(self, key: str) -> Any:
-        found = self._find(key)
+    def _require_object(self, key: str) -> Any:
+        found = self._find_object(key)
         if found is None:
             raise InvalidInputError(f"{self.path}: {key} is missing")
         return found
 
-    def _find(self, key: str) -> Any:
-        """A group or dataset of this file; None if there is none."""
+    def _find_object(self, key: str) -> Any:
+        """A group or dataset of this file; None if missing."""
         import h5py
 
         found = self._file
@@ -404,7 +403,7 @@ def open_hdf5(path: Path) -> Iterator[Hdf5File]:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 files do.
+    """Whether a file has the signature of HDF5 files.
 
     Raises:
         InvalidInputError: it cannot be read.
@@ -415,8 +414,8 @@ def is_hdf5(path: Path) -> bool:
 
 
 def _inflated_chunks(where: str, data: Any, itemsize: int, above: int = 0) -> Iterator[bytes]:
-    """What the chunks of a dataset inflate to, those that take more bytes of the file than `above`;
-    refuses chunks that inflate to more than their size."""
+    """Inflated contents of a dataset's chunks that have more than `above` bytes in the file;
+    rejects chunks that inflate to more than their size."""
     checksum_size = 4  # Bytes.
     filters = _filters_of(where, data)
     size = itemsize * math.prod(data.chunks)
@@ -434,17 +433,17 @@ def _inflated_chunks(where: str, data: Any, itemsize: int, above: int = 0) -> It
 
 
 def _require_declared_size(where: str, data: Any) -> None:
-    """Refuses a dataset that unpacks to more than its size."""
+    """Rejects a dataset that inflates to more than its declared size."""
     if DEFLATE_FILTER in _filters_of(where, data):
-        # A byte inflates to at most 1032 (zlib.net/zlib_tech.html): 64 MiB are not checked.
+        # A byte inflates to at most 1032 (zlib.net/zlib_tech.html): up to 64 MiB are not checked.
         for _ in _inflated_chunks(where, data, data.dtype.itemsize, above=(64 << 20) // 1032):
             pass
 
 
 def _total_text_bytes(where: str, data: Any) -> int:
-    """How long all texts of a chunked dataset are together. Each is stored as its length, 4 bytes,
-    and its place in the file (HDF5 File Format Specification, "Variable-length type"); HDF5 does
-    not shuffle them."""
+    """Total length of all texts of a chunked dataset. Each is stored as its length, 4 bytes, and
+    its address in the file (HDF5 File Format Specification, "Variable-length type"); HDF5 does not
+    shuffle them."""
     address, _ = data.file.id.get_create_plist().get_sizes()
     item = 4 + address + 4
     total = 0

@@ -1,4 +1,4 @@
-"""Types of arrays by what they hold.
+"""Types of arrays by their values.
 
 Shapes are stated in the docstrings.
 """
@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 """Numbers in single precision."""
 Indices = NDArray[np.intp]
-"""Positions in another array."""
+"""Indices into another array."""
 Booleans = NDArray[np.bool_]
-"""What holds and what does not."""
+"""Masks and other truth values."""
 Bytes = NDArray[np.uint8]
-"""Channels of pictures."""
+"""Channels of images."""

@@ -1,9 +1,9 @@
 """Cache of arrays that are slow to compute and depend on content only.
 
-The cache folder has one `.npz` file per entry. Its name is the hash of what its arrays were
-computed from. It also records a hash of the code that computed them and the versions of numpy,
-scipy and Drake: an entry of another version is not used. A damaged entry is computed again, to the
-same bits, and replaced. If the folder cannot be used, arrays are computed each time.
+The cache folder has one `.npz` file per entry. Its name is the hash of its inputs. It also records
+a hash of the code that computed them and the versions of numpy, scipy and Drake: an entry of
+another version is not used. A damaged entry is computed again, to the same bits, and replaced. If
+the folder cannot be used, arrays are computed each time.
 
 The folder is `BURG_DRAKE_CACHE` if that is set (`off`: no cache), otherwise `burg_drake` in
 `XDG_CACHE_HOME`, `~/Library/Caches` on macOS, or `~/.cache`. It may be deleted at any time.
@@ -42,10 +42,10 @@ _log = logging.getLogger("burg_drake")
 
 
 def cache_folder() -> Path | None:
-    """Where entries are kept; None if they are not.
+    """Folder of the cache; None if there is no cache.
 
     Raises:
-        InvalidInputError: the variable names a home folder that nobody has.
+        InvalidInputError: the variable refers to the home folder of an unknown user.
     """
     variable = "BURG_DRAKE_CACHE"
     given = os.environ.get(variable, "").strip()
@@ -66,13 +66,13 @@ def cache_folder() -> Path | None:
 
 
 def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
-    """Arrays from the cache, or computed and kept there.
+    """Arrays from the cache, or else computed and stored there.
 
     Args:
-        kind: what they are, in words with hyphens.
-        content: hash of all that they follow from, but for the code.
-        make: computes them: arrays of numbers by names that are identifiers. They may be changed by
-            nobody afterwards.
+        kind: kind of the arrays, in words with hyphens.
+        content: hash of all inputs except the code.
+        make: computes the arrays: numbers, by names that are identifiers. They must not be
+            modified.
     """
     folder = cache_folder()
     if folder is None:
@@ -87,11 +87,11 @@ def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
 
 
 def _read_entry(path: Path, made_by: str) -> Arrays | None:
-    """What an entry holds; None, and a line that says why, where it cannot be used."""
+    """Reads the arrays of an entry; if it cannot be used, logs the reason and returns None."""
     try:
         mark = path.stat().st_mtime
     except OSError:
-        return None  # there is none
+        return None  # no entry
     try:
         with report_read_errors(path, "an entry of the cache"), open_npz(path) as archive:
             origin = archive.array("made_by").read("U", ()).item()
@@ -106,7 +106,7 @@ def _read_entry(path: Path, made_by: str) -> Arrays | None:
         return None
     if found is None:
         _log_other_version(path.parent)
-    elif time.time() - mark > 86_400.0:  # once a day
+    elif time.time() - mark > 86_400.0:  # updated once a day
         with contextlib.suppress(OSError):
             os.utime(path)
     return found
@@ -114,8 +114,8 @@ def _read_entry(path: Path, made_by: str) -> Arrays | None:
 
 @functools.cache
 def _log_other_version(folder: Path) -> None:
-    """One line, as after an update that is so of all entries: the first process that finds one
-    leaves a mark for its workers and for those that come later."""
+    """Logs once that entries are from another version, as all are after an update: the first
+    process leaves a mark file for its workers and later processes."""
     marker_prefix = ".told-"  # Empty files that record which version has logged the warning.
     mark = folder / f"{marker_prefix}{content_hash(*_code_version())[:16]}"
     try:
@@ -123,7 +123,7 @@ def _log_other_version(folder: Path) -> None:
     except FileExistsError:
         return
     except OSError as error:
-        _log.debug("%s", error)  # a folder that is read-only: each process tells it
+        _log.debug("%s", error)  # read-only folder: each process logs the warning
     for other in folder.glob(f"{marker_prefix}*"):
         if other != mark:
             with contextlib.suppress(OSError):
@@ -137,21 +137,21 @@ def _log_other_version(folder: Path) -> None:
 
 
 def _write_entry(path: Path, arrays: Arrays, made_by: str) -> None:
-    """Writes an entry, if that is possible."""
+    """Writes an entry if possible."""
     buffer = io.BytesIO()
     every: dict[str, Any] = {"made_by": np.array(made_by), **arrays}
     np.savez(buffer, **every)
     try:
         atomic_write(path, buffer.getvalue())
     except InvalidInputError as error:
-        _log.debug("%s", error)  # a folder that is full or read-only: nothing is lost but time
+        _log.debug("%s", error)  # full or read-only folder: only costs time
         return
     with contextlib.suppress(OSError):
         _remove_old_entries(path.parent)
 
 
 def _remove_old_entries(folder: Path) -> None:
-    """Removes entries beyond `MAX_CACHE_BYTES`, the longest unused first, and unfinished files."""
+    """Removes unfinished files, and the least recently used entries beyond `MAX_CACHE_BYTES`."""
     entries, now = [], time.time()
     for path in folder.iterdir():
         with contextlib.suppress(OSError):  # another process has removed it
@@ -159,7 +159,7 @@ def _remove_old_entries(folder: Path) -> None:
             if path.suffix == ".npz" and not path.name.startswith("."):
                 entries.append((found.st_mtime, found.st_size, path))
             elif UNFINISHED_FILE.fullmatch(path.name) and now - found.st_mtime > 3_600.0:
-                path.unlink()  # of a killed process
+                path.unlink()  # left by a killed process
     total = 0
     for _, size, path in sorted(entries, reverse=True):
         total += size
@@ -170,7 +170,7 @@ def _remove_old_entries(folder: Path) -> None:
 
 @functools.cache
 def _code_version() -> tuple[str, ...]:
-    """Hash of the code, and versions of what it computes with."""
+    """Hash of the code, and versions of the packages that it uses."""
     rooms = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
     package = Path(__file__).parents[1]
     files = [file for room in rooms for file in sorted((package / room).rglob("*.py"))]

@@ -27,13 +27,13 @@ CATEGORY_COLORS: tuple[Rgba, ...] = (
     (0.84, 0.37, 0.0, 1.0),
     (0.94, 0.89, 0.26, 1.0),
 )
-"""For names without an order, the most frequent first. More hues cannot be told apart."""
+"""Colours for unordered names, the most frequent first. More hues are hard to distinguish."""
 
 
 def distinct_colors(count: int) -> list[Rgb]:
-    """Any number of colours (red, green, blue in [0, 1]), all different."""
+    """Any number of distinct colours (red, green, blue in [0, 1])."""
     # Hues differ by the golden angle, so that each new one falls into the largest gap. Lightness
-    # and saturation take turns, as few hues can be told apart.
+    # and saturation alternate, as few hues can be distinguished.
     tones = ((0.56, 0.60), (0.42, 0.62), (0.68, 0.55), (0.50, 0.42))
     return [
         colorsys.hls_to_rgb((0.56 + i * 0.381966) % 1.0, *tones[i % len(tones)])
@@ -53,25 +53,25 @@ _LINEAR_LIGHT = _decode_srgb_levels()
 
 
 def srgb_to_linear(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(...) linear light [0 to 1] of levels (...), as if their camera encoded them as sRGB.
+    """Linear light (...) [0 to 1] of levels (...), assuming sRGB encoding.
 
-    That cameras encode otherwise moves all edges alike towards black or white, which whoever fits
-    edges must allow for.
+    The true encoding of cameras differs, which shifts all edges alike towards black or white;
+    callers that fit edges must allow for that.
     """
     return np.asarray(_LINEAR_LIGHT.take(image))
 
 
 def linear_to_srgb(light: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-    """(...) levels of linear light (...) [0 to 1] in sRGB, the inverse of `srgb_to_linear`."""
+    """sRGB levels (...) of linear light (...) [0 to 1]; the inverse of `srgb_to_linear`."""
     bright = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
     level = np.where(light <= 0.0031308, 12.92 * light, bright)
     return np.asarray(np.rint(255.0 * np.clip(level, 0.0, 1.0)), dtype=np.uint8)
 
 
 def linear_levels(light: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """(H, W) levels that rise with the light, the brightest 255, for what reads the cells of
-    markers: in the levels of a photo a blurred edge is moved towards black, so that small black
-    cells get lost."""
+    """Levels (H, W) in proportion to the light, the brightest 255, for decoding markers: in a
+    photo's sRGB levels blurred edges are shifted towards black, so that small black cells get
+    lost."""
     return np.asarray(
         np.rint(light * (255.0 / max(float(light.max()), 1.0 / 255.0))), dtype=np.uint8
     )

@@ -28,7 +28,7 @@ from burg_drake.core.verdict import RecordedFields
 
 
 def _verdict_columns(kind: type[VerdictField]) -> dict[str, Column]:
-    """Columns of the fields of a verdict that are of a kind."""
+    """Columns of a verdict's fields of one kind."""
     of_kind = (one for one in RecordedFields.verdict if isinstance(one, kind))
     return {name: meaning for one in of_kind for name, meaning in one.meanings().items()}
 
@@ -149,7 +149,7 @@ COLUMN_FAMILIES: Mapping[str, Column] = {
     ),
     "n_OUTCOME": Column("1", "number of perturbed repeats with this outcome"),
 }
-"""Columns with a variable part in their name, written in capitals."""
+"""Columns with a variable part in their name, here in capitals."""
 
 _COLUMNS = {name: column for group in COLUMN_GROUPS.values() for name, column in group.items()}
 """All columns with fixed names."""
@@ -160,11 +160,11 @@ _COLUMN_PATTERNS = {
 }
 """Columns by the patterns of their names in `COLUMN_FAMILIES`."""
 INPUT_PREFIX = "given_"
-"""Prefix of the columns of results that came with the grasps."""
+"""Prefix of columns of the results that are copied from the grasps."""
 
 
 def describe_column(name: str) -> Column | None:
-    """What a column is; None of one that others have made up."""
+    """The declaration of a column; None for a column from other software."""
     if name in _COLUMNS:
         return _COLUMNS[name]
     for pattern, column in _COLUMN_PATTERNS.items():
@@ -177,37 +177,36 @@ def describe_column(name: str) -> Column | None:
 
 
 def column_metadata(name: str) -> dict[str, str]:
-    """Unit and description of a column, as Parquet keeps them; nothing of one that others made."""
+    """Unit and description of a column for Parquet; empty for a column from other software."""
     column = describe_column(name)
     return {} if column is None else {"unit": column.unit, "description": column.description}
 
 
 def display_unit(name: str) -> tuple[str, float]:
-    """The unit in which people read a column, empty if it has none, and the factor to it."""
+    """The unit in which a column is displayed, empty if it has none, and the factor to it."""
     column = describe_column(name)
     return ("", 1.0) if column is None else column.display_unit
 
 
 def column_title(name: str) -> str:
-    """What people call a column in a line or the head of a table."""
+    """Title of a column in a line or a table's head."""
     column = describe_column(name)
     return (column and column.title) or name.replace("_", " ")
 
 
 def column_axis_label(name: str) -> str:
-    """What people call a column at an axis."""
+    """Label of a column at an axis."""
     column = describe_column(name)
     return (column and column.axis) or column_title(name)
 
 
 def format_column_value(name: str, value: float, digits: int | None = None) -> str:
-    """A value of a column with its unit for people, such as `12.3 mm` or `2.0°`; `-` if there is
-    none.
+    """A value of a column in its display unit, such as `12.3 mm` or `2.0°`; `-` if missing.
 
     Args:
-        name: of the column.
-        value: in the unit of the column.
-        digits: decimals, if not those that the column declares.
+        name: name of the column.
+        value: value in the unit of the column.
+        digits: decimals; those of the column if None.
     """
     if math.isnan(value):
         return "-"
@@ -218,8 +217,7 @@ def format_column_value(name: str, value: float, digits: int | None = None) -> s
 
 
 def format_column_values(values: Mapping[str, float], names: Iterable[str]) -> str:
-    """Those of some columns that have a value, as a line for a terminal that may not know the sign
-    of degrees, such as `slip 1.2 mm, tilt 2.0 deg`."""
+    """The existing values of columns as a line in ASCII, such as `slip 1.2 mm, tilt 2.0 deg`."""
     return ", ".join(
         f"{column_title(name)} {format_column_value(name, values[name]).replace('°', ' deg')}"
         for name in names
@@ -228,7 +226,7 @@ def format_column_values(values: Mapping[str, float], names: Iterable[str]) -> s
 
 
 def metadata_path(path: Path) -> Path:
-    """The file beside a CSV file."""
+    """Path of the metadata file beside a CSV file."""
     return path.with_name(path.name + "-metadata.json")
 
 
@@ -237,13 +235,13 @@ def csv_metadata(
     columns: Mapping[str, tuple[str, Column | None]],
     notes: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """JSON values that describe a CSV file.
+    """JSON values of the metadata file of a CSV file.
 
     Args:
-        name: of the file.
-        columns: the standard's datatype and the meaning of each column, by its title. The standard
-            restricts the names of columns, so that those of the file are among the titles as they
-            are, and their signs encoded in the names.
+        name: name of the CSV file.
+        columns: the standard's datatype and the meaning of each column, by title. The standard
+            restricts column names; so the file's names are the titles, and the names are
+            percent-encoded.
         notes: JSON values about the whole table.
     """
     described = []

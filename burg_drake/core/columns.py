@@ -1,4 +1,4 @@
-"""Columns of tables, and the kinds of a verdict's fields, by which they are written and read."""
+"""Columns of tables, and kinds of verdict fields, which define how they are written and read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from burg_drake.core.errors import quote_value
 from burg_drake.core.outcomes import Least, Mode, Stage, mode_includes
 
 TEXT_UNIT: Final = ""
-"""Unit of a column that is not a number."""
+"""Unit of a column of texts."""
 DIMENSIONLESS: Final = "1"
 """Unit of ratios, counts and labels."""
 
@@ -39,7 +39,7 @@ class Column:
 
     @property
     def display_unit(self) -> tuple[str, float]:
-        """The unit in which people read it, empty if there is none, and the factor to it."""
+        """The unit for display, empty if there is none, and the factor to it."""
         usual = {"m": ("mm", 1e3), "rad": ("°", 180 / math.pi), "m2": ("mm²", 1e6)}
         same = (self.unit if self.unit in ("N", "s") else "", 1.0)
         return self.own_unit or usual.get(self.unit, same)
@@ -52,12 +52,12 @@ them."""
 
 @dataclass(frozen=True)
 class TableShape:
-    """What decides which columns a table has.
+    """Properties of a run that decide which columns its table has.
 
     Attributes:
-        mode: of the run.
+        mode: mode of the run.
         instances: names of the scene's free objects.
-        joints: number of the arm's joints; 0 where no arm is asked.
+        joints: number of the arm's joints; 0 without an arm.
         approach: whether the approach of the hand alone is simulated.
     """
 
@@ -67,19 +67,19 @@ class TableShape:
     approach: bool = False
 
     def has(self, least: Least) -> bool:
-        """Whether the table has what is found out from a mode on."""
+        """Whether the table has the columns of a mode."""
         return mode_includes(self.mode, least, approach=self.approach)
 
 
 @dataclass(frozen=True)
 class VerdictField:
-    """A field of a verdict, in one column of its own name: what it means and how it is written.
+    """A field of a verdict, in one column with the field's name: its meaning and how it is written.
 
     Attributes:
-        unit, meaning: of its columns, see `Column`.
-        name: of the field.
+        unit, meaning: unit and meaning of its columns, see `Column`.
+        name: name of the field.
         mode: the first mode whose tables have it.
-        part: of a row, in which its columns lie.
+        part: part of a row with its columns.
     """
 
     unit: str
@@ -90,32 +90,32 @@ class VerdictField:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """For the field of a dataclass."""
+        """Metadata for the field of a dataclass."""
         return {"kind": self}
 
     @property
     def is_text(self) -> bool:
-        """Whether its cells are texts; else they are numbers."""
+        """Whether its cells are texts instead of numbers."""
         return False
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
-        """Names of its columns, with the key under which its values have their cells."""
+        """Names of its columns, each with the key of its cells in the field's values."""
         return {self.name: None}
 
     def cell(self, value: Any, key: Any) -> Any:
-        """The cell of a value in one of its columns; None if it has none."""
+        """The cell of a value in one of its columns; None if empty."""
         return value.get(key)
 
     def from_row(self, row: Mapping[str, Any]) -> Any:
-        """The value that a row tells; an empty one if it tells nothing."""
+        """The value from a row; an empty value if the cells are empty."""
         raise NotImplementedError(f"{self.name} cannot be read from rows")
 
     def to_json(self, value: Any) -> Any:
-        """The value in a journal; a number that is not finite is null."""
+        """The value for a journal; numbers that are not finite become null."""
         return {key: _finite_or_none(number) for key, number in value.items()}
 
     def from_json(self, data: Any) -> Any:
-        """The value that a journal has.
+        """The value from a journal.
 
         Raises:
             ValueError, TypeError, AttributeError: it was not written by `to_json`.
@@ -123,25 +123,25 @@ class VerdictField:
         return {key: _number_or_nan(number) for key, number in data.items()}
 
     def merge(self, values: Sequence[Any]) -> Any:
-        """What several stages found together, in their order."""
+        """Merges the values of several stages, given in order."""
         return {key: float(number) for value in values for key, number in value.items()}
 
     def compared(self, value: Any) -> dict[str, float | str]:
-        """What a replay has to find again to the bit, by its name for people."""
+        """Values that a replay must reproduce bit for bit, by display name."""
         return {}
 
     def meanings(self) -> dict[str, Column]:
-        """Its columns; what differs in their names is in capitals."""
+        """Its columns by name, with variable parts in capitals."""
         return {self.name: Column(self.unit, self.meaning)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextField(VerdictField):
-    """A text in a column of the field's own name. Of several stages the last one counts.
+    """A text in a column with the field's name. The last stage's text counts.
 
     Attributes:
-        of: its type: any text, or the members of an enumeration.
-        replayed: whether a replay has to find the same text again.
+        of: type: any text, or the members of an enumeration.
+        replayed: whether a replay must reproduce the text.
     """
 
     of: type[str] = str
@@ -175,10 +175,10 @@ class TextField(VerdictField):
 
 @dataclass(frozen=True, kw_only=True)
 class NumberField(VerdictField):
-    """A number in a column of the field's own name; None where there is none.
+    """A number in a column with the field's name; None if missing.
 
-    It follows from what else was found, so that a replay need not compare it. Of several stages
-    the last one that has a number counts.
+    It follows from other fields, so a replay need not compare it. The number of the last stage that
+    has one counts.
     """
 
     part: VerdictPart = "decided"
@@ -202,9 +202,9 @@ class NumberField(VerdictField):
 
 @dataclass(frozen=True, kw_only=True)
 class MarginsField(VerdictField):
-    """Numbers by the names of margins, each in a column of its own.
+    """Numbers by the names of margins, each in its own column.
 
-    A later stage does not unsay what an earlier one has measured.
+    A later stage does not remove an earlier measurement.
     """
 
     of: type[Any]
@@ -231,7 +231,7 @@ class MarginsField(VerdictField):
 
 @dataclass(frozen=True, kw_only=True)
 class InstancesField(VerdictField):
-    """Numbers by instance of the scene; a column's name is a prefix and the instance's."""
+    """Numbers by instance of the scene; a column's name is a prefix and the instance's name."""
 
     prefix: str
 
@@ -251,9 +251,10 @@ class InstancesField(VerdictField):
 
 @dataclass(frozen=True, kw_only=True)
 class JointsField(VerdictField):
-    """A number for each joint of the arm; a column's name is a prefix and the number, from 1.
+    """A number for each joint of the arm; a column's name is a prefix and the joint's number, from
+    1.
 
-    Of several stages the first one counts that has some.
+    The first stage that has numbers counts.
     """
 
     prefix: str
@@ -280,10 +281,10 @@ class JointsField(VerdictField):
 
 @dataclass(frozen=True, kw_only=True)
 class StagesField(VerdictField):
-    """Times by stage, each in a column of its own.
+    """Times by stage, each in its own column.
 
     Attributes:
-        times: column of each stage, what it means, and the first mode whose tables have it.
+        times: column of each stage, its meaning, and the first mode whose tables have it.
     """
 
     times: Mapping[Stage, tuple[str, str, Mode]]
@@ -316,8 +317,8 @@ def margin_field(
     Args:
         unit, meaning, display: see `Column`.
         mode: the first mode in which it is measured.
-        stage: the last one that measures it; `EXECUTED` of what a trial measures.
-        smaller_is_better: whether a grasp is the better the smaller it is.
+        stage: the last stage that measures it; `EXECUTED` for a trial's margins.
+        smaller_is_better: whether smaller values are better.
     """
     metadata = {
         "column": Column(unit, meaning, **display),
@@ -329,7 +330,7 @@ def margin_field(
 
 
 def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
-    """The fields of a record that have a kind, in the order of their declaration."""
+    """The verdict fields of a record, in the order of their declaration."""
     return tuple(
         replace(one.metadata["kind"], name=one.name)
         for one in fields(record)

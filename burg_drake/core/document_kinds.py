@@ -1,4 +1,4 @@
-"""Kinds of YAML documents, and the comment by which editors find the schema of a file."""
+"""Kinds of YAML documents, and the comment that tells editors the schema of a file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def document_class(kind: str) -> type:
 
 
 def schema_line(document: object) -> str:
-    """The comment by which editors find the schema of a document; "" if it has none."""
+    """The comment that tells editors the schema of a document; "" if it has none."""
     place = f"{type(document).__module__}:{type(document).__qualname__}"
     for kind, where in DOCUMENT_KINDS.items():
         if where == place:

@@ -58,13 +58,13 @@ _SCALARS = {
     float: "a finite number",
     str: "a text",
 }
-"""What is expected of a value, by its type."""
+"""Description of valid values, by type."""
 
 
 class Reader:
     """Turns YAML nodes into typed values; every error names file, line and key.
 
-    `LINES` is False in classes whose text is not one that the user has written.
+    `LINES` is False in classes that read data without line numbers.
     """
 
     LINES: ClassVar[bool] = True
@@ -189,7 +189,7 @@ class Reader:
         except FieldError as error:
             raise self.fail(_node_at(node, error.place), where, str(error)) from error
         except InvalidInputError as error:
-            if not where:  # somewhere in the document
+            if not where:  # key unknown
                 raise DocumentError(f"{self.name}: {error}") from error
             raise self.fail(node, where, str(error)) from error
 
@@ -197,14 +197,14 @@ class Reader:
         if not isinstance(node, yaml.ScalarNode) or node.tag == "tag:yaml.org,2002:null":
             raise self.fail(node, where, f"expected {_SCALARS[kind]}")
         if kind is str:
-            if "\0" in node.value:  # which no path and no name has
+            if "\0" in node.value:  # invalid in paths and names
                 raise self.fail(node, where, f"{quote_value(node.value)} has a NUL character")
             return node.value
         if kind is bool and node.value.lower() in ("true", "false"):
             return node.value.lower() == "true"
         try:
             value = math.nan if kind is bool else kind(node.value)
-        except ValueError:  # also of whole numbers of 4,300 digits
+        except ValueError:  # also for whole numbers with 4,300 digits
             value = math.nan
         # Seeds may have 64 bits; 1e30 is above any useful number, in any unit.
         if abs(value) < (1 << 64 if kind is int else 1e30):
@@ -228,12 +228,12 @@ class Reader:
 
 @functools.cache
 def _field_types(kind: type) -> dict[str, Any]:
-    """Types of a dataclass's fields: to find them takes longer than to read one."""
+    """Types of a dataclass's fields; cached, as resolving them is slow."""
     return typing.get_type_hints(kind)
 
 
 def _node_at(node: yaml.Node, place: Sequence[str | int]) -> yaml.Node:
-    """The node of a value within that of its document; one around it if it is not written."""
+    """The node of a value in a document; the innermost written node around it if it is missing."""
     for step in place:
         if isinstance(node, yaml.MappingNode):
             found = {key.value: value for key, value in node.value}.get(step)
@@ -319,7 +319,7 @@ def parse_document(text: str, schema: type[T], name: str) -> T:
 
 
 def empty_document_message(schema: type) -> str:
-    """What to say of a text without content."""
+    """The message for a text without content."""
     keys = ", ".join(f.name for f in dataclasses.fields(schema))
     return f"the document is empty; expected keys {keys}"
 
@@ -333,8 +333,8 @@ def read_document(node: yaml.Node, schema: type[T], name: str) -> T:
 
 
 def read_plain_data(data: Mapping[str, Any], schema: type[T], name: str) -> T:
-    """As `load_document`, from dicts, lists and scalars, such as `plain_data` makes them, or those
-    of a JSON file; `name` stands for the place that they are from in messages, which have no line.
+    """As `load_document`, from dicts, lists and scalars, for example from `plain_data` or a JSON
+    file. `name` stands for the file in messages, which have no line numbers.
     """
     reader, node = _PlainReader(name), _plain_node(data)
     if isinstance(node, yaml.MappingNode):
@@ -343,7 +343,7 @@ def read_plain_data(data: Mapping[str, Any], schema: type[T], name: str) -> T:
 
 
 class _PlainReader(Reader):
-    """Reads dicts, lists and scalars, which become nodes when their type is known."""
+    """Reads dicts, lists and scalars, and converts them to nodes once their type is known."""
 
     LINES = False
 
@@ -356,7 +356,7 @@ class _PlainReader(Reader):
 
 
 def _plain_node(value: Any) -> yaml.Node:
-    """Plain data as a node of YAML; dicts and lists in it stay as they are."""
+    """Converts plain data to a YAML node; nested dicts and lists are kept."""
     if isinstance(value, Mapping):
         entries = [(_plain_node(str(key)), _node_of_scalar(item)) for key, item in value.items()]
         return yaml.MappingNode(_TAGS[dict], entries)
@@ -380,7 +380,7 @@ _TAGS: dict[type, str] = {
 
 
 def save_document(document: Any, path: str | Path, header: str = "") -> None:
-    """Writes a document dataclass as YAML, whole or not at all.
+    """Writes a document dataclass as YAML, atomically.
 
     Args:
         document, header: see `document_text`.
@@ -390,9 +390,9 @@ def save_document(document: Any, path: str | Path, header: str = "") -> None:
 
 
 def document_text(document: Any, header: str = "") -> str:
-    """The text of a file: the line by which editors find the schema, a header, the document.
+    """The text of a file: the line that tells editors the schema, a header, the document.
 
-    Fields that have their default are left out; see `plain_data`.
+    Fields at their default are left out; see `plain_data`.
 
     Args:
         document: instance of a document dataclass.
@@ -403,7 +403,7 @@ def document_text(document: Any, header: str = "") -> str:
 
 
 def dump_document(document: Any) -> str:
-    """A document as YAML without comments, of which hashes are made."""
+    """A document as YAML without comments, as used for hashes."""
     return yaml.dump(
         plain_data(document), Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True
     )
@@ -461,7 +461,7 @@ _JSON_TYPES: dict[Any, Any] = {
     bool: "boolean",
     int: "integer",
     float: "number",
-    str: ["string", "number", "boolean"],  # `operator: 7` is a text for the reader as well
+    str: ["string", "number", "boolean"],  # the reader also takes `operator: 7` as a text
     Any: None,
 }
 """JSON Schema types of scalar Python types."""
@@ -472,8 +472,8 @@ _ATTRIBUTE_ENTRY = re.compile(r"^(\w[\w, ]*): (.*(?:\n .*)*)", re.MULTILINE)
 def json_schema(kind: str) -> dict[str, Any]:
     """The JSON Schema (draft 7) of a kind of document.
 
-    It has the type, default, range and meaning of every key. What involves several keys, such as
-    "one of two", is left to the reader of the document.
+    It has the type, default, range and meaning of every key. Rules for several keys, such as "one
+    of two", are checked only by the reader of the document.
 
     Args:
         kind: such as `scene`; `DOCUMENT_KINDS` has all.
@@ -481,7 +481,7 @@ def json_schema(kind: str) -> dict[str, Any]:
     Raises:
         UnknownNameError: there is no such kind.
     """
-    dialect = "http://json-schema.org/draft-07/schema#"  # the newest that editors support
+    dialect = "http://json-schema.org/draft-07/schema#"  # the newest version that editors support
     document = document_class(kind)
     parts: dict[str, Any] = {}
     body = _dataclass_schema(document, parts)
@@ -492,7 +492,7 @@ def json_schema(kind: str) -> dict[str, Any]:
 
 
 def schema_text(kind: str) -> str:
-    """The text of the file of a schema; see `json_schema`."""
+    """The text of a schema file; see `json_schema`."""
     return json.dumps(json_schema(kind), indent=2, ensure_ascii=False) + "\n"
 
 
@@ -500,10 +500,10 @@ def write_schemas(folder: str | Path) -> list[Path]:
     """Writes the schemas of all kinds of documents.
 
     Args:
-        folder: for the files `scene.json`, `station.json`, ...; it is made if need be.
+        folder: folder for the files `scene.json`, `station.json`, ...; created if missing.
 
     Returns:
-        The files.
+        Paths of the files.
 
     Raises:
         InvalidInputError: the folder cannot be written to.
@@ -540,7 +540,7 @@ def _dataclass_schema(kind: type, parts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _type_schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """The schema of a type; mappings of dataclasses are added to `parts` and referred to."""
+    """The schema of a type; schemas of dataclasses in mappings are added to `parts`."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
         (inner,) = (a for a in arguments if a is not type(None))
@@ -568,7 +568,7 @@ def _type_schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _nullable_schema(schema: dict[str, Any]) -> dict[str, Any]:
-    """The same, or null."""
+    """A schema that also allows null."""
     if "enum" in schema:
         return {"enum": [*schema["enum"], None]}
     if "$ref" in schema:
@@ -578,18 +578,18 @@ def _nullable_schema(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_range(schema: dict[str, Any], low: float, high: float) -> None:
-    """Adds a range to the schema of a number, or to that of the numbers of a list."""
+    """Adds a range to the schema of a number or a list of numbers."""
     schema = schema.get("items", schema)
     schema |= {name: x for name, x in (("minimum", low), ("maximum", high)) if math.isfinite(x)}
 
 
 def _docstring_summary(kind: type) -> str:
-    """What a dataclass is: the first paragraph of its docstring."""
+    """The first paragraph of a dataclass's docstring."""
     return " ".join((inspect.getdoc(kind) or "").partition("\n\n")[0].split())
 
 
 def _field_descriptions(kind: type) -> dict[str, str]:
-    """What fields of a dataclass mean, by its docstring and those of its bases."""
+    """Descriptions of a dataclass's fields, from its docstring and those of its bases."""
     found = {"version": "Version of the file format."}
     for base in reversed(kind.__mro__):
         text = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")[2]

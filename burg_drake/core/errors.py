@@ -11,34 +11,34 @@ from collections.abc import Iterable, Sequence
 from typing import Self
 
 MAX_VALUE_LENGTH = 60
-"""Characters of a value that a message repeats."""
+"""Longest text of a value in a message, in characters."""
 
 
 class BurgError(Exception):
     """Base of all errors that burg_drake raises on purpose; the message is one clear line.
 
     Attributes:
-        arguments: names of the arguments that it takes another value of, where the caller may know
-            them by other names: the command line adds its options.
+        arguments: names of the arguments whose values have to change; the command line adds the
+            names of its options.
     """
 
     arguments: tuple[str, ...] = ()
 
     def about(self, *arguments: str) -> Self:
-        """The same error, which another value of these arguments mends."""
+        """Sets the arguments whose values have to change; returns the error."""
         self.arguments = arguments
         return self
 
 
 class InvalidInputError(BurgError, ValueError):
-    """A value from outside (argument, document, mesh) that cannot be used."""
+    """An invalid value from outside (argument, document, mesh)."""
 
 
 class FieldError(InvalidInputError):
-    """A value of a dataclass that cannot be used.
+    """An invalid value of a dataclass.
 
     Attributes:
-        place: where it is, from the dataclass inwards: names of fields and indices of lists.
+        place: its position, from the dataclass inwards: names of fields and indices of lists.
     """
 
     def __init__(self, message: str, *place: str | int) -> None:
@@ -54,14 +54,14 @@ class MeshError(InvalidInputError):
     """A mesh that cannot be made into a simulated object.
 
     Attributes:
-        units: units in which its size would be a usual one, best first, if its unit is the cause.
+        units: units in which its size would be plausible, best first, if a wrong unit is the cause.
     """
 
     units: tuple[str, ...] = ()
 
 
 class UnknownNameError(BurgError, KeyError):
-    """A name that nothing goes by; the message lists what exists."""
+    """An unknown name; the message lists the known ones."""
 
     def __str__(self) -> str:  # KeyError would print the repr of the message
         return str(self.args[0]) if self.args else ""
@@ -72,15 +72,15 @@ class MissingDependencyError(BurgError, ImportError):
 
 
 class SimulationError(BurgError, RuntimeError):
-    """Drake could not step or evaluate a diagram that should have been sound."""
+    """Drake could not step or evaluate a diagram that seemed valid."""
 
 
 class WorkerDied(SimulationError):
-    """A worker process ended while it was at a task, or built what the task needs.
+    """A worker process ended during a task, or while it built the task's session.
 
     Attributes:
-        from_outside: whether it was ended from outside, through no fault of its task: by the
-            system as memory ran out, by a batch system, by a user.
+        from_outside: whether it was ended from outside: by the system for lack of memory, by a
+            batch system, or by a user.
     """
 
     def __init__(self, message: str, from_outside: bool = False) -> None:
@@ -89,11 +89,11 @@ class WorkerDied(SimulationError):
 
 
 class TaskCancelled(BurgError):
-    """Nobody waits for the result of a task any more."""
+    """A task was cancelled, as its result is no longer needed."""
 
 
 class ClusterError(BurgError, RuntimeError):
-    """A cluster that cannot be reached, is lost, or has workers that must not be used."""
+    """A cluster is unreachable or lost, or has workers that must not be used."""
 
 
 def one_line(error: BaseException) -> str:
@@ -103,15 +103,15 @@ def one_line(error: BaseException) -> str:
 
 
 def quote_value(value: object) -> str:
-    """A value from outside as a message repeats it: in quotes if it is a text, never long.
+    """A short form of a value from outside for messages, in quotes if it is a text.
 
-    Of a long text the beginning and the end are shown, of a structure the first few items.
+    Long texts are reduced to beginning and end, structures to the first few items.
     """
     return shorten_text(_VALUE_REPR.repr(value), 2 * MAX_VALUE_LENGTH)
 
 
 def shorten_text(text: str, length: int = MAX_VALUE_LENGTH) -> str:
-    """A text from outside as a message repeats it without quotes: the beginning of a long one."""
+    """A short form of a text from outside for messages, without quotes: its beginning."""
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
@@ -121,12 +121,12 @@ _VALUE_REPR.maxstring = _VALUE_REPR.maxother = _VALUE_REPR.maxlong = MAX_VALUE_L
 
 
 def suggest_names(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
-    """Ends an error message about an unknown `name`: the nearest valid one and all that there are.
+    """End of an error message about an unknown `name`: the nearest valid name and all valid ones.
 
     Args:
-        name: as given.
-        known: the valid ones.
-        ordered: they are in an order that tells, the likely ones first, and keep it.
+        name: the given name.
+        known: the valid names.
+        ordered: keep their order, with the likely ones first, instead of sorting them.
 
     Returns:
         For example `did you mean 'mug'? Known: bowl, mug`, or `known: bowl, mug`.
@@ -137,7 +137,8 @@ def suggest_names(name: str, known: Iterable[str], *, ordered: bool = False) -> 
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Such as `did you mean 'mug'?`; empty if nothing is near, or several names begin like that."""
+    """A hint such as `did you mean 'mug'?`; empty if no name is near, or several names begin
+    alike."""
     names = sorted(known)
     longer = [other for other in names if len(name) > 2 and other.startswith(name)]
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
@@ -146,7 +147,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def list_names(names: Sequence[str]) -> str:
-    """Names for a message; of many the first few, and how many more there are."""
+    """Names for a message: the first few, and the number of further ones."""
     if len(names) <= 24:
         return ", ".join(names) or "(none)"
     return f"{', '.join(names[:9])} and {len(names) - 9} others"

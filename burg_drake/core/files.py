@@ -1,7 +1,7 @@
 """Reading files within bounds, writing them atomically, and locking them.
 
-Reading a file always ends, uses memory in proportion to its `Limits`, and neither waits for
-another process nor drains a device. Only `read_pipe` waits for what another process writes.
+Reading a file always ends, uses memory in proportion to its `Limits`, and neither waits for another
+process nor drains a device. Only `read_pipe` waits for another process to write.
 
 The system releases a lock when the file is closed or its process ends.
 """
@@ -52,7 +52,7 @@ READ_ERRORS = (
 
 @contextmanager
 def suppress_numpy_warnings() -> Iterator[None]:
-    """Numpy warns of headers that it has to repair, and of numbers that overflow."""
+    """Suppresses numpy's warnings about repaired headers and number overflow."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -60,14 +60,14 @@ def suppress_numpy_warnings() -> Iterator[None]:
 
 @contextmanager
 def report_read_errors(path: str | Path, kind: str) -> Iterator[None]:
-    """Makes one line that names the file of every error that reading it ends with.
+    """Converts every error in reading a file to a message of one line that names the file.
 
     Args:
         path: the file.
         kind: what it should be, such as `a .npy file of numbers`.
 
     Raises:
-        InvalidInputError: in place of what is raised within; one that names the file stays.
+        InvalidInputError: replaces errors raised within; one that already names the file is kept.
     """
     try:
         with suppress_numpy_warnings():
@@ -85,7 +85,7 @@ def report_read_errors(path: str | Path, kind: str) -> Iterator[None]:
 
 
 def short_message(error: Exception) -> str:
-    """What an error says, in one line that is not too long."""
+    """The message of an error as one line of limited length."""
     max_length = 200  # Characters; numpy repeats whole headers.
     text = str(error).partition("\n")[0] or type(error).__name__
     return text if len(text) <= max_length else f"{text[:max_length]}..."
@@ -96,15 +96,15 @@ UNFINISHED_FILE = re.compile(r"\..+\.[0-9a-f]{16}")
 
 
 def open_regular(path: str | Path) -> io.BufferedReader:
-    """Opens a file for reading bytes; a folder, device or pipe is refused, as it may never end.
+    """Opens a file for reading bytes; rejects folders, devices and pipes, which may never end.
 
     Raises:
-        InvalidInputError: it is not there, cannot be read, or is not a file.
+        InvalidInputError: it is missing, cannot be read, or is not a file.
     """
     try:
         mode = os.stat(path).st_mode
         if stat.S_ISREG(mode):
-            # Not blocking, should it have become a pipe meanwhile.
+            # Non-blocking, in case it has become a pipe meanwhile.
             return open(path, "rb", opener=lambda p, flags: os.open(p, flags | os.O_NONBLOCK))
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not a valid path"  # with NUL
@@ -120,16 +120,16 @@ FileContent = str | bytes | Callable[[io.BufferedWriter], object]
 
 
 def atomic_write(path: str | Path, content: FileContent) -> None:
-    """Writes `content` beside `path` and renames it into place; parent folders are made.
+    """Writes `content` beside `path` and renames it into place; creates parent folders.
 
-    A file that is replaced keeps its permissions, and a link to it stays one.
+    A replaced file keeps its permissions, and links to it are kept.
 
     Args:
         path: file to write or replace.
-        content: what is to be in it.
+        content: content of the file.
 
     Raises:
-        InvalidInputError: the place cannot be written to.
+        InvalidInputError: the path cannot be written to.
     """
     atomic_write_all({Path(path): content})
 
@@ -139,11 +139,11 @@ def atomic_write_all(contents: Mapping[Path, FileContent]) -> None:
     `atomic_write`.
 
     Args:
-        contents: what is to be in each file.
+        contents: content of each file.
 
     Raises:
-        InvalidInputError: one of the places cannot be written to; then none is replaced, unless it
-            is the renaming that fails.
+        InvalidInputError: one of the paths cannot be written to; then no file is replaced, unless
+            renaming fails.
     """
     written: dict[Path, Path] = {}
     path = Path()
@@ -174,23 +174,23 @@ def atomic_write_all(contents: Mapping[Path, FileContent]) -> None:
 
 
 def copy_permissions(path: Path, file: int) -> None:
-    """Gives an open file the permissions of the one that it is to replace, if there is one."""
+    """Copies the permissions of the replaced file, if there is one, to an open file."""
     with contextlib.suppress(FileNotFoundError):
         os.fchmod(file, stat.S_IMODE(path.stat().st_mode))
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Removes what `atomic_write` leaves in a folder when its process is killed."""
+    """Removes files that `atomic_write` left in a folder when its process was killed."""
     for path in folder.iterdir():
         if UNFINISHED_FILE.fullmatch(path.name) and path.is_file():
             path.unlink(missing_ok=True)
 
 
 def ensure_writable_folder(path: str | Path) -> Path:
-    """Makes `path` a folder that can be written to, before any work is spent on its contents.
+    """Creates the folder `path` if missing, and checks in advance that it is writable.
 
     Raises:
-        InvalidInputError: `path` is a file, or nothing can be written there.
+        InvalidInputError: `path` is a file, or the folder is not writable.
     """
     path = Path(path)
     try:
@@ -217,11 +217,10 @@ def report_write_errors(path: Path) -> Iterator[None]:
 
 
 def require_writable(path: str | Path) -> None:
-    """Finds out whether a file can be written, before any work is spent on it; makes none.
+    """Checks in advance that a file can be written, without creating it.
 
     Raises:
-        InvalidInputError: `path` is a folder or a device, or nothing can be written where it is to
-            be.
+        InvalidInputError: `path` is a folder or a device, or its folder is not writable.
     """
     path = Path(path)
     with report_write_errors(path):
@@ -231,7 +230,7 @@ def require_writable(path: str | Path) -> None:
 
 
 def _require_regular_file(path: Path) -> None:
-    """Refuses what is there and is not a file: a folder, or a device that a file would replace."""
+    """Rejects an existing folder or device at the path of a file."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")
     if path.exists() and not path.is_file():
@@ -243,12 +242,12 @@ MIB = 1 << 20  # Bytes in a mebibyte.
 
 @dataclass(frozen=True)
 class Limits:
-    """What a document may have at most.
+    """Upper limits for a document.
 
     Attributes:
         size: bytes of its text.
-        values: scalars, lists and mappings, those behind an alias once for each time it is used.
-        depth: of lists and mappings in one another.
+        values: number of scalars, lists and mappings; those behind an alias count at every use.
+        depth: nesting depth of lists and mappings.
     """
 
     size: int
@@ -257,9 +256,9 @@ class Limits:
 
 
 class FileLimits:
-    """What files of a kind may have at most, so that reading them always ends."""
+    """Upper limits for kinds of files, so that reading them always ends."""
 
-    # Files of people and of this project. Each value takes 0.4 kB of memory.
+    # Files written by people and by this project. Each value takes 0.4 kB of memory.
     document = Limits(size=16 * MIB, values=1_000_000)
     # Grasps and plans. 100,000 grasps take 21 to 37 MB and 2,200,000 values.
     grasp_file = Limits(size=512 * MIB, values=10_000_000)
@@ -269,10 +268,10 @@ class FileLimits:
 
 
 def read_text(path: str | Path, limits: Limits = FileLimits.document) -> str:
-    """The text of a document.
+    """Reads the text of a document.
 
     Raises:
-        DocumentError: it cannot be read, is too large, or no text.
+        DocumentError: it cannot be read, is too large, or is not text.
     """
     try:
         return read_bytes(path, limits.size).decode("utf-8")
@@ -283,11 +282,11 @@ def read_text(path: str | Path, limits: Limits = FileLimits.document) -> str:
 
 
 def read_bytes(path: str | Path, size: int) -> bytes:
-    """The content of a regular file; pipes and devices, which may never end, are refused.
+    """Reads a regular file; rejects pipes and devices, which may never end.
 
     Args:
         path: the file.
-        size: bytes that it may have.
+        size: largest size [bytes].
 
     Raises:
         InvalidInputError: it cannot be read, or is too large.
@@ -305,14 +304,14 @@ def read_bytes(path: str | Path, size: int) -> bytes:
 
 
 def read_pipe(pipe: int | str, size: int = FileLimits.grasp_file.size) -> bytes:
-    """All that comes through a pipe, until whoever writes to it ends.
+    """Reads a pipe until its writer closes it.
 
     Args:
-        pipe: its path, or the number of a file descriptor, which stays open.
-        size: bytes that it may have.
+        pipe: its path, or a file descriptor, which stays open.
+        size: largest size [bytes].
 
     Raises:
-        InvalidInputError: it cannot be read, or more comes.
+        InvalidInputError: it cannot be read, or has more data.
     """
     name = "the standard input" if pipe == 0 else str(pipe)
     try:
@@ -328,11 +327,11 @@ def read_pipe(pipe: int | str, size: int = FileLimits.grasp_file.size) -> bytes:
 
 
 def read_rows(path: str | Path, limits: Limits = FileLimits.table) -> list[tuple[int, list[str]]]:
-    """The cells of a CSV file, row by row, each with the line that it ends on; no empty rows.
+    """Reads the rows of a CSV file without empty ones: last line number and cells of each row.
 
     Raises:
-        DocumentError: it cannot be read, is beyond the limits, or no CSV: a quote is never closed,
-            for example; the message names file and line.
+        DocumentError: it cannot be read, is beyond the limits, or is not CSV, for example as a
+            quote is not closed; the message names file and line.
     """
     text = read_text(path, limits).removeprefix("\ufeff")
     if text.count(",") > limits.values:
@@ -345,11 +344,11 @@ def read_rows(path: str | Path, limits: Limits = FileLimits.table) -> list[tuple
 
 
 def try_lock(file: int, *, shared: bool = False) -> bool:
-    """Locks an open file, if no other process has it.
+    """Locks an open file; returns False if another process has locked it.
 
     Args:
-        file: descriptor.
-        shared: others may share it; else it is for this process alone.
+        file: file descriptor.
+        shared: shared lock instead of an exclusive one.
 
     Raises:
         OSError: its file system has no locks.
@@ -363,11 +362,11 @@ def try_lock(file: int, *, shared: bool = False) -> bool:
 
 
 def missing_locks_error(path: Path, error: OSError) -> InvalidInputError:
-    """The error about a file or folder on a file system that has no locks.
+    """The error for a file or folder on a file system without locks.
 
     Args:
         path: the file or folder.
-        error: of `try_lock`.
+        error: error from `try_lock`.
     """
     return InvalidInputError(
         f"{path} is on a file system without file locks ({error.strerror}), where two"
@@ -377,10 +376,10 @@ def missing_locks_error(path: Path, error: OSError) -> InvalidInputError:
 
 
 class FolderLock:
-    """A folder that one process at a time writes, locked itself: no file is left in it."""
+    """Lock on a folder, so that one process at a time writes to it; leaves no lock file."""
 
     def __init__(self, folder: Path) -> None:
-        """Locks a folder that is there.
+        """Locks an existing folder.
 
         Raises:
             InvalidInputError: another process is writing it, it cannot be opened, or its file
@@ -403,7 +402,7 @@ class FolderLock:
         ).about("folder")
 
     def release(self) -> None:
-        """Lets others write; a second time does nothing."""
+        """Releases the lock; a second call does nothing."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -71,7 +71,7 @@ def rotation_from_rpy(rpy: ArrayLike) -> Array:
 
 def rpy_from_rotation(R_AB: ArrayLike) -> Array:
     """(..., 3, 3) -> (..., 3) roll, pitch, yaw [rad], pitch in [-pi/2, pi/2]."""
-    with warnings.catch_warnings():  # at gimbal lock yaw 0 is a valid choice, nothing to warn of
+    with warnings.catch_warnings():  # at gimbal lock yaw 0 is valid, so suppress the warning
         warnings.simplefilter("ignore", UserWarning)
         return _convert_rotations(R_AB, lambda R: R.as_euler("xyz"), 3)
 
@@ -94,7 +94,7 @@ def quaternion_from_rotation(R_AB: ArrayLike) -> Array:
 def rotation_angle(R_AB: ArrayLike) -> Array:
     """(..., 3, 3) -> (...,) angle of the rotation [rad], in [0, pi].
 
-    From sine and cosine both (trace and skew part), which is exact for small angles, too.
+    Uses sine and cosine (skew part and trace), and so is accurate for small angles, too.
     """
     R = np.asarray(R_AB, dtype=float)
     skew = R - np.swapaxes(R, -1, -2)
@@ -111,11 +111,11 @@ def rot_z(angle: float) -> Array:
 
 
 def check_pose(X_AB: ArrayLike, name: str) -> Array:
-    """Validates poses that come from outside.
+    """Validates poses from outside.
 
     Args:
-        X_AB: (..., 4, 4).
-        name: how the message calls it, such as `X_SO of 'mug'`.
+        X_AB: (..., 4, 4) poses.
+        name: name for the message, such as `X_SO of 'mug'`.
 
     Returns:
         The poses as float array.
@@ -159,13 +159,13 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
 
 
 def swap_fingers(X_AG: ArrayLike) -> Array:
-    """The same grasps (..., 4, 4) with the fingers' places exchanged."""
+    """The same grasps (..., 4, 4) with the fingers swapped."""
     return np.asarray(X_AG, dtype=float) @ make_pose(np.diag([-1.0, -1.0, 1.0]))
 
 
 def canonical_fingers(X_AG: ArrayLike) -> Array:
-    """Grasps (..., 4, 4) with fingers named alike: the closing axis has a positive component of
-    largest magnitude (the first one, of equals), so that a grasp and its `swap_fingers` are one."""
+    """Grasps (..., 4, 4) with fingers swapped where needed so that the largest component of the
+    closing axis (the first of equals) is positive: equal for a grasp and its `swap_fingers`."""
     X = np.asarray(X_AG, dtype=float)
     x = X[..., :3, 0]
     largest = np.abs(x).argmax(axis=-1)[..., None]
@@ -222,7 +222,8 @@ def _convert_rotations(R_AB: ArrayLike, convert, size: int) -> Array:  # type: i
 def perpendicular_axes(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors (..., 3) that make a right-handed frame with the unit vectors `axis`.
 
-    Without branch or pole (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
+    Without branches and singularities (Duff et al., "Building an orthonormal basis, revisited",
+    JCGT 2017).
     """
     x, y, z = np.moveaxis(axis, -1, 0)
     sign = np.copysign(1.0, z)

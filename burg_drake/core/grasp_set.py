@@ -24,8 +24,8 @@ from burg_drake.core.structured_text import parse_json
 
 
 def distinct_texts(texts: NDArray[np.str_]) -> set[str]:
-    """The different ones of some texts (N,)."""
-    step = 1 << 14  # Texts that are looked at together, as objects of Python.
+    """The distinct texts of an array (N,)."""
+    step = 1 << 14  # Texts that are converted to Python objects at a time.
     parts = (texts[begin : begin + step].tolist() for begin in range(0, len(texts), step))
     return set().union(*parts)
 
@@ -36,9 +36,9 @@ def grasp_identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> ND
         name: hashlib.blake2b(f"{name}\0".encode(), digest_size=6)
         for name in distinct_texts(object)
     }
-    # of 100,000 grasps two share one with probability 2e-5
+    # collision probability 2e-5 for 100,000 grasps
     ids = np.empty(len(X_OG), dtype="<U12")
-    step = 1 << 14  # Grasps whose numbers are copied together.
+    step = 1 << 14  # Grasps whose numbers are copied at a time.
     for begin in range(0, len(X_OG), step):
         part = slice(begin, begin + step)
         numbers = np.column_stack([X_OG[part].reshape(-1, 16), width[part]]).astype("<f8")
@@ -55,15 +55,15 @@ FIXED_COLUMNS = ("width", "id", "object", "score")
 
 
 class GraspSetFormat:
-    """What the header of a file of grasps says."""
+    """Values in the header of a grasp file."""
 
     name = "burg_drake.grasps"
     version = 2
-    readable_versions = (1, 2)  # Version 1 had no further columns.
+    readable_versions = (1, 2)  # Version 1 had no additional columns.
 
 
 COLUMN_PREFIX = "column:"
-"""Prefix of the names of further columns in `.npz`."""
+"""Prefix of the names of additional columns in `.npz`."""
 
 SetColumns = dict[str, NDArray[Any]]
 
@@ -83,11 +83,11 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
 def _read_columns(
     array: Callable[[str], StoredArray], further: dict[str, str]
 ) -> tuple[SetColumns, SetColumns]:
-    """The columns that every set has, and further ones.
+    """Reads the columns that every set has, and additional ones.
 
     Args:
-        array: what a file says of an array by its name.
-        further: names of arrays by names of columns.
+        array: returns the array of a name in the file.
+        further: names of the arrays of additional columns, by column.
     """
     for name in {*FIXED_COLUMNS, ""} & set(further):
         raise ValueError(f"it has a further column {name!r}, which must not be called that")
@@ -149,8 +149,8 @@ def _hdf5_bytes(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) 
 
 
 def _write_dataset(group: Any, name: str, values: NDArray[Any]) -> None:
-    """Text becomes UTF-8 of fixed length, whose size a reader knows before it reads it; everything
-    is compressed without loss."""
+    """Writes a column, compressed without loss; text as UTF-8 of fixed length, so that readers know
+    the size in advance."""
     import h5py
 
     packed = {"compression": "gzip", "shuffle": True} if values.size else {}
@@ -188,12 +188,12 @@ class GraspSet:
     Attributes:
         X_OG: (N, 4, 4) grasp poses in the object frame.
         width: (N,) distance between the contacts along the closing direction [m]; NaN if unknown.
-        id: (N,) identifiers that follow from object, pose and width.
+        id: (N,) identifiers, computed from object, pose and width.
         object: (N,) names of the library objects.
         score: (N,) quality, higher is better; NaN if unknown.
         provenance: how the set was made (sampler, parameters, seeds, hashes); JSON values.
-        columns: further values by name, each (N,) numbers, truth values or text. `instance` is
-            the placed object of a scene that each grasp belongs to.
+        columns: additional values by name, each (N,) numbers, booleans or text. `instance` is the
+            placed object of a scene that each grasp belongs to.
     """
 
     X_OG: Array
@@ -225,7 +225,7 @@ class GraspSet:
         provenance: Mapping[str, Any] | None = None,
         columns: Mapping[str, ArrayLike] | None = None,
     ) -> GraspSet:
-        """Checks the poses, fills what is not given and computes the identifiers.
+        """Checks the poses, fills missing values and computes the identifiers.
 
         Args:
             X_OG: (N, 4, 4) or (4, 4) grasp poses in the object frame.
@@ -233,7 +233,7 @@ class GraspSet:
             width: (N,) or scalar [m]; NaN if None.
             score: (N,) or scalar; NaN if None.
             provenance: JSON-compatible mapping.
-            columns: further values by name, each (N,) or scalar.
+            columns: additional values by name, each (N,) or scalar.
 
         Raises:
             InvalidInputError: a pose is not a finite rigid transform, shapes or types do not fit,
@@ -315,9 +315,9 @@ class GraspSet:
         return replace(self, score=score, columns=columns)
 
     def canonical(self) -> GraspSet:
-        """The same physical grasps with fingers named alike: see `canonical_fingers`.
+        """The same physical grasps with a unique order of the fingers, see `canonical_fingers`.
 
-        Identifiers change where the fingers are swapped.
+        Identifiers change if the fingers are swapped.
         """
         return GraspSet.create(
             canonical_fingers(self.X_OG),
@@ -345,9 +345,9 @@ class GraspSet:
 
     @staticmethod
     def concatenate(sets: Iterable[GraspSet]) -> GraspSet:
-        """One set of all; the provenances are listed under `parts`.
+        """Joins sets of grasps; their provenances are listed under `parts`.
 
-        Where a set lacks a column that another one has, its values are NaN, or empty text.
+        Values of columns that a set lacks are NaN, or empty text.
 
         Raises:
             InvalidInputError: there is no set to join, or a column is text in one set and numbers
@@ -374,10 +374,10 @@ class GraspSet:
         """Writes a file that `load` restores bit for bit.
 
         Args:
-            path: ends in `.npz` or `.h5`.
+            path: path that ends in `.npz` or `.h5`.
 
         Raises:
-            InvalidInputError: another suffix, or the place cannot be written to.
+            InvalidInputError: another suffix, or the path cannot be written to.
         """
         suffix = Path(path).suffix.lower()
         if suffix not in (".npz", ".h5", ".hdf5"):
@@ -416,13 +416,13 @@ class GraspSet:
 
 
 def require_valid_grasps(grasps: GraspSet) -> None:
-    """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
+    """Rejects a set, for example from a file, that `create` would not have made.
 
-    Grasps that are there several times, with the same identifier, object, pose and width, are fine.
+    Duplicates with the same identifier, object, pose and width are allowed.
 
     Raises:
-        InvalidInputError: a pose is not a finite rigid transform, a width is beyond all hands,
-            or grasps that differ have the same identifier; the message names the first ones.
+        InvalidInputError: a pose is not a finite rigid transform, a width is too large, or
+            different grasps have the same identifier; the message names the first ones.
     """
     check_pose(grasps.X_OG, "X_OG")
     _require_widths(grasps.width)
@@ -447,14 +447,14 @@ def _require_widths(width: Array) -> None:
 
 
 def _copy_column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
-    """A copy of (n,) values, or of a scalar n times."""
+    """A copy of values (n,), or a scalar repeated n times."""
     if values.shape not in ((), (n,)):
         raise InvalidInputError(f"{name} has shape {values.shape}; expected ({n},) or one value")
     return np.array(np.broadcast_to(values, (n,)))
 
 
 def _concatenate_column(name: str, sets: list[GraspSet]) -> NDArray[Any]:
-    """A column of sets that may lack it."""
+    """Joins a column of sets, some of which may lack it."""
     kinds = {s.columns[name].dtype.kind == "U" for s in sets if name in s.columns and len(s)}
     if len(kinds) > 1:
         raise InvalidInputError(

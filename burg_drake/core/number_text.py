@@ -1,4 +1,4 @@
-"""Numbers as text for people: three digits, thousands."""
+"""Numbers as text for display: three digits, thousands separators."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ def format_number(value: float | None, decimals: int | None = None) -> str:
     """A number, in at most eight characters unless decimals are asked for.
 
     Args:
-        value: the number; None and NaN stand for one that is not known.
-        decimals: so many, below 100,000; three significant digits if None, or above.
+        value: the number; None and NaN mean unknown.
+        decimals: number of decimals below 100,000; three significant digits if None, or above.
     """
     if value is None or math.isnan(value):
         return MISSING_NUMBER
@@ -33,26 +33,26 @@ def format_number(value: float | None, decimals: int | None = None) -> str:
 
 
 def format_count(value: int | None) -> str:
-    """A whole number; from a billion on three digits of it."""
+    """A whole number; from a billion on, three digits of it."""
     if value is None:
         return MISSING_NUMBER
     return f"{value:,}" if abs(value) < 1_000_000_000 else format_number(float(value))
 
 
 def count_with_noun(count: int, noun: str) -> str:
-    """Such as `1 object` and `2 objects`."""
+    """A count with its noun, such as `1 object` and `2 objects`."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def format_percent(share: float) -> str:
-    """A share of 0 to 1."""
+    """A share (0 to 1) as a percentage."""
     if math.isnan(share):
         return MISSING_NUMBER
     return f"{100 * share:.0f} %" if share in (0.0, 1.0) else f"{100 * share:.1f} %"
 
 
 def format_duration(seconds: float) -> str:
-    """A duration, with three digits."""
+    """A duration [s] with three digits and a unit."""
     if math.isnan(seconds):
         return MISSING_NUMBER
     for unit, size in (("s", 1.0), ("ms", 1e-3)):

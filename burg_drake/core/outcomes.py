@@ -6,23 +6,23 @@ from enum import StrEnum
 from typing import Literal, get_args
 
 Mode = Literal["hand", "reach", "arm"]
-"""`hand`: the hand alone executes the grasp in simulation. `reach`: the same, of grasps that the
-arm can execute. `arm`: of those, too, but the whole arm executes them."""
+"""`hand`: the hand alone executes the grasp in simulation. `reach`: the same, but only grasps that
+the arm can execute. `arm`: the whole arm executes these grasps."""
 MODES: tuple[Mode, ...] = get_args(Mode)
-"""Evaluation modes; each asks more than the one before."""
+"""Evaluation modes; each requires more than the one before."""
 
 
 Least = Mode | Literal["approach"]
-"""The least mode that finds something out; `approach`: the whole arm, or the hand alone where its
+"""The first mode that determines a value; `approach`: the whole arm, or the hand alone if its
 approach is simulated."""
 
 
 def mode_includes(mode: Mode, least: Least, *, approach: bool = False) -> bool:
-    """Whether a mode asks at least as much as another one.
+    """Whether a mode includes another one.
 
     Args:
-        mode: that is asked about.
-        least: the other one.
+        mode: the mode.
+        least: the mode that it may include.
         approach: whether the approach of the hand alone is simulated.
     """
     if least == "approach":
@@ -40,8 +40,8 @@ class Stage(StrEnum):
 
 
 Among = Literal["all", "clear", "reachable", "executed"]
-"""Which judged grasps count, by how far they came: all, those at which the hand is clear, those of
-them that the arm can be at, or those that were tried in simulation."""
+"""Subsets of judged grasps: all, those at which the hand is clear, those of them that the arm can
+reach, or those executed in simulation."""
 DECIDED_STAGES: dict[Among, tuple[Stage, ...]] = {
     "all": tuple(Stage),
     "clear": (Stage.REACHABLE, Stage.PLANNED, Stage.EXECUTED),
@@ -52,17 +52,16 @@ DECIDED_STAGES: dict[Among, tuple[Stage, ...]] = {
 
 
 class Outcome(StrEnum):
-    """Why a grasp ended. `LIFTED` alone is success.
+    """Why a grasp ended. Only `LIFTED` is success.
 
     Attributes:
-        meaning: what it says of the grasp, in a few words.
-    """
+        meaning: short description."""
 
     _value_: str
     meaning: str
 
     def __new__(cls, value: str, meaning: str = "") -> Outcome:
-        """A member by its value, which is stored, and its meaning."""
+        """Creates a member from its value, which is stored, and its meaning."""
         outcome = str.__new__(cls, value)
         outcome._value_, outcome.meaning = value, meaning
         return outcome
@@ -131,8 +130,7 @@ class Outcome(StrEnum):
 
     @property
     def held(self) -> bool:
-        """The target was lifted and is held, however it lies in the hand, and whatever happened to
-        the others."""
+        """Whether the target was lifted and is held, even if it turned, or others moved."""
         return self in (Outcome.LIFTED, Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED)
 
     @property
@@ -163,16 +161,15 @@ class Outcome(StrEnum):
 
 
 UNTRIED_OUTCOMES = ("", Outcome.REACHABLE.value)
-"""Texts in a column of outcomes that say nothing about a trial."""
+"""Outcomes in a column that do not come from a trial."""
 
 
 class RealOutcome(StrEnum):
     """How a trial on the robot ended.
 
-    The words are the simulator's, as far as a person or a robot can see what they mean, and those
-    for what only reality has.
-
-    Those that an operator tells apart at a glance come first: messages begin with them.
+    The values are those of simulated outcomes that a person or a robot can observe, and those that
+    exist only in reality. Outcomes that an operator distinguishes at a glance come first: messages
+    begin with them.
     """
 
     LIFTED = "lifted"
@@ -183,11 +180,11 @@ class RealOutcome(StrEnum):
     CLOSED_EMPTY = "closed_empty"
     HAND_COLLISION_APPROACH = "hand_collision_approach"
     PROTECTIVE_STOP = "protective_stop"
-    """The robot stopped itself on its way: an execution that failed."""
+    """The robot stopped itself: the execution failed."""
     NOT_ATTEMPTED = "not_attempted"
-    """Nobody tried; tells nothing of the grasp."""
+    """The grasp was not tried; no information about it."""
     PERCEPTION_FAILED = "perception_failed"
-    """The scene was not seen well enough to try; tells nothing of the grasp."""
+    """The scene was not perceived well enough to try; no information about the grasp."""
     ONE_FINGER = "one_finger"
     NO_CONTACT = "no_contact"
     BLOCKED = "blocked"
@@ -207,7 +204,7 @@ class RealOutcome(StrEnum):
 
     @property
     def of_arm(self) -> bool:
-        """Whether only an arm ends a trial so: a run of the hand alone cannot predict it."""
+        """Whether the outcome needs an arm, so that a run of the hand alone cannot predict it."""
         return self.value in (
             *("no_ik", "joint_limit", "arm_collision", "approach_line", "retreat_line"),
             *("lift_line", "no_path", "protective_stop"),
@@ -215,18 +212,17 @@ class RealOutcome(StrEnum):
 
     @property
     def attempted(self) -> bool:
-        """Whether it tells anything of the grasp."""
+        """Whether the outcome gives information about the grasp."""
         return self not in (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
 
     @property
     def held(self) -> bool:
-        """The target was lifted and is held, however it lies in the hand, and whatever happened to
-        the others."""
+        """Whether the target was lifted and is held, even if it turned, or others moved."""
         return self.value in (one.value for one in Outcome if one.held)
 
 
 def outcome_label(outcome: str) -> str:
-    """An outcome, simulated or real, as buttons, pages and tables call it."""
+    """Label of a simulated or real outcome on buttons, pages and in tables."""
     labels = {
         "lifted_disturbed": "lifted, others moved",
         "lifted_turned": "lifted, turned",

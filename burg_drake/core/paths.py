@@ -36,14 +36,14 @@ MAX_NAME_BYTES = 100
 
 
 def require_name(name: str, *place: str | int) -> None:
-    """Refuses what would lead to another folder, or hide a file.
+    """Rejects names that would lead to another folder, or hide a file.
 
     Args:
-        name: to check.
-        place: of the name in its document, see `FieldError`.
+        name: the name.
+        place: place of the name in its document, see `FieldError`.
 
     Raises:
-        FieldError: it is not a name.
+        FieldError: the name is invalid.
     """
     if not re.fullmatch(r"(?!\.)[\w.-]+", name) or len(name.encode()) > MAX_NAME_BYTES:
         raise FieldError(
@@ -54,19 +54,19 @@ def require_name(name: str, *place: str | int) -> None:
 
 
 def require_names(names: Iterable[str], key: str) -> None:
-    """The same of all keys of a mapping that a document has under `key`."""
+    """As `require_name`, for all keys of the mapping under `key` in a document."""
     for name in names:
         require_name(name, key, name)
 
 
 def make_name(text: str) -> str:
-    """A name made of any text: `my scene (2)` becomes `my_scene_2`, and nothing `unnamed`."""
+    """Converts any text to a name: `my scene (2)` to `my_scene_2`, and empty text to `unnamed`."""
     name = re.sub(r"[^\w.-]+", "_", text).lstrip(".").strip("_")
     return name.encode()[:MAX_NAME_BYTES].decode(errors="ignore") or "unnamed"
 
 
 def unused_name(wanted: str, taken: Collection[str]) -> str:
-    """`wanted`, or with the first number behind it that makes it unused: mug, mug_2, mug_3."""
+    """`wanted`, with the first number that makes it unique if it is taken: mug, mug_2, mug_3."""
     name, number = wanted, 1
     while name in taken:
         number += 1
@@ -80,12 +80,12 @@ PACKAGE_REFERENCE = re.compile(r"(?:package|model)://([^/]*)/*(.*)", re.DOTALL)
 
 @dataclass(frozen=True, eq=False)
 class Packages:
-    """Where packages are looked for.
+    """Search for ROS packages.
 
     Attributes:
-        stated: folders by the names of packages, as a document states them.
-        document: that document, for messages; None where there is none.
-        key: of it that states them.
+        stated: package folders by name, from a document.
+        document: that document, for messages; None if there is none.
+        key: the document's key with the folders.
     """
 
     stated: Mapping[str, Path] = field(default_factory=dict)
@@ -93,14 +93,14 @@ class Packages:
     key: str = "packages"
 
     def find(self, name: str, near: Path | None = None) -> Path:
-        """The folder of a package.
+        """Finds the folder of a package.
 
         Args:
-            name: of the package.
+            name: name of the package.
             near: folder of the file that names it; the working directory if None.
 
         Raises:
-            UnknownNameError: it is nowhere; the message tells what was searched.
+            UnknownNameError: it is not found; the message lists the searched places.
         """
         if name in self.stated:
             return self.stated[name]
@@ -130,14 +130,14 @@ class Packages:
 
 
 NO_PACKAGES = Packages()
-"""For files that no document states packages for."""
+"""Packages for files without a document that gives package folders."""
 
 
 def package_file(reference: str, near: Path | None, packages: Packages) -> Path:
-    """The file or folder of `package://NAME/...`, which exists.
+    """The existing file or folder of `package://NAME/...`.
 
     Raises:
-        UnknownNameError: there is no such package, or nothing of that name in it.
+        UnknownNameError: there is no such package, or no such file in it.
     """
     parts = PACKAGE_REFERENCE.fullmatch(reference)
     if parts is None or not parts[1]:
@@ -153,8 +153,8 @@ def package_file(reference: str, near: Path | None, packages: Packages) -> Path:
 
 
 def drake_models_folder() -> Path | None:
-    """Where the installed Drake keeps its `drake_models` once it has downloaded them, whether it
-    has or not; None without Drake. As in its `package_map.cc` and `find_cache.cc`."""
+    """Folder of the installed Drake for its downloaded `drake_models`, which may not exist yet;
+    None without Drake. As in its `package_map.cc` and `find_cache.cc`."""
     share = _drake_share_folder()
     if share is None:
         return None
@@ -173,7 +173,7 @@ def drake_models_folder() -> Path | None:
 
 
 def _package_folders(name: str, near: Path) -> Iterator[Path]:
-    """Folders of a package, the one to take first."""
+    """Candidate folders of a package, the best first."""
     for folder in (near, *near.parents):
         for place in (folder, folder / name):
             if _manifest_name(place) == name:
@@ -190,9 +190,9 @@ def _package_folders(name: str, near: Path) -> Iterator[Path]:
 
 
 def _search_tree(name: str, folder: Path, seen: set[str]) -> Iterator[Path]:
-    """Packages of a name in a folder and in those in it; there are none in packages and in hidden
+    """Folders of packages with a name in a folder tree; skips the inside of packages, and hidden
     folders."""
-    marks = ("AMENT_IGNORE", "CATKIN_IGNORE", "COLCON_IGNORE")  # by which ROS and Drake skip it
+    marks = ("AMENT_IGNORE", "CATKIN_IGNORE", "COLCON_IGNORE")  # skipped by ROS and Drake
     real = os.path.realpath(folder)
     if real in seen or any(os.path.exists(folder / mark) for mark in marks):
         return
@@ -211,7 +211,7 @@ def _search_tree(name: str, folder: Path, seen: set[str]) -> Iterator[Path]:
 
 
 def _manifest_name(folder: Path) -> str:
-    """The name of the package whose manifest is in a folder; empty if none is."""
+    """The package name in a folder's manifest; empty without a manifest."""
     manifest = folder / "package.xml"
     if not os.path.isfile(manifest):
         return ""
@@ -244,7 +244,7 @@ PACKAGE_URI = "package://burg_drake/"  # References to installed data begin with
 
 @cache
 def data_root() -> Path:
-    """Folder that holds `models/`, `scenes/` and `stations/`.
+    """Folder with `models/`, `scenes/` and `stations/`.
 
     Raises:
         InvalidInputError: the installation is incomplete.
@@ -270,17 +270,17 @@ def resolve_reference(
         reference: `package://burg_drake/...`; `package://NAME/...` of another package; or, with
             `kind`, the bare name of something that the package installs; or a path, relative to
             `base` (or to the working directory).
-        kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or
-            `models` (bare names stand for a folder).
-        base: folder of the document that holds the reference.
-        packages: what a document says of other packages.
+        kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or `models`
+            (bare names stand for a folder).
+        base: folder of the document with the reference.
+        packages: package folders of the document.
 
     Returns:
         An existing path.
 
     Raises:
-        UnknownNameError: nothing is there; the message lists the built-in names of this kind, or
-            where the package was looked for.
+        UnknownNameError: the path does not exist; the message lists the built-in names of this
+            kind, or the searched places.
         InvalidInputError: it is a pipe.
     """
     words = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
@@ -298,18 +298,18 @@ def resolve_reference(
         if os.path.exists(builtin):
             return builtin
     located = path if base is None else base / path
-    if os.path.exists(located):  # also tells of names that are too long, and of links in a circle
-        if located.is_fifo():  # what is named so is read more than once, and in its folder
+    if os.path.exists(located):  # also fails for names that are too long, and for circular links
+        if located.is_fifo():  # documents are read more than once, and need a folder
             raise InvalidInputError(f"cannot read {text}: it is a pipe; save it to a file first")
         return located.resolve()
     where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
     known = f"; {suggest_names(path.stem, builtin_names(kind))}" if kind else ""
-    what = f"{words[kind]} " if kind and base is None else ""  # documents name the entry
+    what = f"{words[kind]} " if kind and base is None else ""  # documents name the key
     raise UnknownNameError(f"{what}{text} does not exist{where}{known}")
 
 
 def expand_home(text: str) -> Path:
-    """A path whose leading `~` or `~user` stands for a home folder.
+    """A path with a leading `~` or `~user` replaced by the home folder.
 
     Raises:
         UnknownNameError: there is no such user.
@@ -324,7 +324,7 @@ def expand_home(text: str) -> Path:
 
 
 def builtin_names(kind: str) -> list[str]:
-    """Bare names that `resolve_reference` knows for a kind."""
+    """Bare names that `resolve_reference` accepts for a kind."""
     folder = data_root() / kind
     if kind == "models":
         return sorted(p.name for p in folder.iterdir() if (p / "library.yaml").exists())
@@ -332,10 +332,10 @@ def builtin_names(kind: str) -> list[str]:
 
 
 def portable_reference(path: Path, folder: Path) -> str:
-    """How a document in `folder` refers to a file or folder: package:// for what the package
-    ships, else the relative path."""
+    """Reference to a file or folder for a document in `folder`: package:// for files of the
+    package, else the relative path."""
     path = path.resolve()
-    for name in ("models", "scenes", "stations"):  # what the package installs
+    for name in ("models", "scenes", "stations"):  # installed with the package
         shipped = data_root() / name
         if path.is_relative_to(shipped):
             return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
@@ -343,10 +343,10 @@ def portable_reference(path: Path, folder: Path) -> str:
 
 
 def shareable_reference(path: Path, folder: Path) -> str:
-    """The same, for a document that may go elsewhere and does not depend on what it refers to.
+    """As `portable_reference`, for a document that may be moved and does not need the file.
 
-    Of a path that shares no folder with `folder`, but for those above people's homes, only the end
-    is told: the name, with that of its folder if that is nobody's home.
+    If a path shares no folder with `folder`, except those above home folders, only its end is
+    given: the name, and the name of its folder unless that is a home folder.
     """
     reference, path, home = portable_reference(path, folder), path.resolve(), Path.home()
     shared = Path(os.path.commonpath([path, folder.resolve()]))
@@ -357,7 +357,7 @@ def shareable_reference(path: Path, folder: Path) -> str:
 
 
 def with_shareable_references(values: Any, folder: Path) -> Any:
-    """JSON values of a provenance, whose absolute paths are those of `shareable_reference`."""
+    """JSON values of a provenance, with absolute paths replaced by `shareable_reference`."""
 
     def change(text: str) -> str:
         return shareable_reference(Path(text), folder) if os.path.isabs(text) else text
@@ -366,10 +366,10 @@ def with_shareable_references(values: Any, folder: Path) -> Any:
 
 
 def with_resolved_references(values: Any, folder: Path) -> Any:
-    """The same values with absolute paths in place of references to what is there; others stay.
+    """JSON values with references to existing files replaced by absolute paths.
 
     Args:
-        values: of a document in `folder`.
+        values: values of a document in `folder`.
         folder: the folder.
     """
 
@@ -383,12 +383,12 @@ def with_resolved_references(values: Any, folder: Path) -> Any:
 
 
 def is_resolved(reference: str, *kinds: str) -> bool:
-    """Whether `with_resolved_references` has found something, or it is built in; what it has not
-    is relative to a folder that the file has left, not to the working directory.
+    """Whether a reference from `with_resolved_references` is an existing file, or built in. Others
+    are relative to the file's former folder, not to the working directory.
 
     Args:
         reference: from a provenance.
-        kinds: of what may be built in, see `builtin_names`.
+        kinds: kinds of built-in names, see `builtin_names`.
     """
     if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):
         return True
@@ -409,8 +409,7 @@ def _map_paths(values: Any, change: Any) -> Any:
 
 
 def referenced_files(model: Path, packages: Packages) -> list[Path]:
-    """The files that a model names, and those that the models that it includes name, as far as they
-    are there.
+    """The existing files that a model and its included models name.
 
     Args:
         model: an SDF or URDF file.
@@ -421,13 +420,14 @@ def referenced_files(model: Path, packages: Packages) -> list[Path]:
 
 
 def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
-    """Folders by name of the packages that a model and those that it includes name.
+    """Folders of the packages that a model and its included models name, by package name.
 
     Raises:
-        UnknownNameError: one of them is nowhere; the message names the file and what was searched.
+        UnknownNameError: a package is not found; the message names the file and the searched
+            places.
     """
     if not may_reference_packages(model):
-        return {}  # as most, of which some name many files
+        return {}  # most models; some name many files
     found: dict[str, Path] = {}
     named = [f for f in referenced_files(model, packages) if f.suffix in (".sdf", ".urdf")]
     for file in (model, *named):
@@ -443,19 +443,19 @@ def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
 
 
 def may_reference_packages(model: Path) -> bool:
-    """Whether a model may name files of packages, or other models."""
+    """Whether a model may refer to files of packages, or to other models."""
     text = read_bytes(model, FileLimits.document.size)
     return any(mark in text for mark in (b"package://", b"model://", b"<include"))
 
 
 def _walk_references(model: Path, packages: Packages, seen: set[Path]) -> Iterator[Path]:
-    """The files that are named, each followed by those that it names itself."""
+    """Yields the named files, each followed by the files that it names."""
     for reference in _read_references(model):
         try:
             path = resolve_reference(reference, base=model.parent, packages=packages)
         except UnknownNameError:
             continue
-        # An included model may be named by its folder, in which a model.config names its files.
+        # An included model may be given by its folder, with a model.config that names its files.
         inside = sorted(file for file in path.glob("*") if file.suffix in (".config", ".sdf"))
         for file in inside if path.is_dir() else [path]:
             yield file
@@ -465,7 +465,7 @@ def _walk_references(model: Path, packages: Packages, seen: set[Path]) -> Iterat
 
 
 def _read_references(model: Path) -> list[str]:
-    """What stands for files in a model, each once."""
+    """The distinct file references in a model."""
     pattern = r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']"""
     found = re.findall(pattern, _read_without_comments(model))
     return list(dict.fromkeys(uri or name for uri, name in found))

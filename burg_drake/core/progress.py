@@ -18,7 +18,7 @@ STARTING_PHASE = "starting"
 """Phase in which workers are set up; takes seconds at best."""
 
 Clock = Callable[[], float]
-"""Gives the time [s], from any origin."""
+"""Returns the time [s], from any origin."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,15 @@ class Progress:
     """State of a job.
 
     Attributes:
-        phase: what is being done, such as `sampling` or `judging`.
-        done, total: results, of how many; the total is 0 as long as it is not known.
-        before: how many of `done` were there before the clock was started.
-        elapsed: time since then [s].
+        phase: current phase, such as `sampling` or `judging`.
+        done, total: finished and total number of results; the total is 0 if unknown.
+        before: number of results before the clock was started.
+        elapsed: time since the clock was started [s].
         outcomes: number of grasps by outcome.
-        counted_outcome: the outcome that is worth telling.
-        unit: what is counted.
-        left: expected time left [s], where more is known of it than `done` and `total` say.
-        note: what else is worth a word.
+        counted_outcome: the outcome to display.
+        unit: unit of the results.
+        left: expected time left [s], if known better than from `done` and `total`.
+        note: additional note.
     """
 
     phase: str
@@ -50,12 +50,12 @@ class Progress:
 
     @property
     def rate(self) -> float:
-        """Results a second; 0 as long as it is not known."""
+        """Results per second; 0 if unknown."""
         return (self.done - self.before) / self.elapsed if self.elapsed > 0.0 else 0.0
 
     @property
     def remaining(self) -> float | None:
-        """Expected time left [s]; None as long as nothing is known."""
+        """Expected time left [s]; None if unknown."""
         if self.left is not None:
             return self.left
         known = self.total > 0 and self.rate > 0.0
@@ -63,11 +63,11 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
-"""Called with the progress each time it changes."""
+"""Called with the progress at each change."""
 
 
 class ProgressMeter:
-    """Counts results and makes events of them."""
+    """Counts results and emits progress events."""
 
     def __init__(
         self,
@@ -81,13 +81,12 @@ class ProgressMeter:
         """Shows a first event.
 
         Args:
-            show: gets the events.
-            event: before any result of this job; `done` is what was known before.
-            phase: from the first result on, which starts the clock, as setting up takes its own
-                time; what that result cost is not known then, and does not count. If None, the
-                clock starts now.
-            work: of all results to come, in any unit, if they do not cost alike.
-            clock: the time.
+            show: called with the events.
+            event: first event; its `done` counts earlier results.
+            phase: phase from the first result on. That result starts the clock, as setting up takes
+                its own time, and does not count for the rate. If None, the clock starts now.
+            work: total work of all results, in any unit, if they differ in cost.
+            clock: returns the time.
         """
         self._show, self._clock = show, clock
         self._phase = event.phase if phase is None else phase
@@ -99,12 +98,12 @@ class ProgressMeter:
     def step(
         self, count: float = 1, *, work: float = 0.0, outcome: Outcome | None = None, note: str = ""
     ) -> None:
-        """Takes results.
+        """Counts results.
 
         Args:
-            count: how many.
-            work: what they cost, in the unit of all `work`.
-            outcome: of a grasp.
+            count: number of results.
+            work: their work, in the unit of the total `work`.
+            outcome: outcome of a grasp.
             note: see `Progress`.
         """
         if self._started is None:
@@ -121,11 +120,11 @@ class ProgressMeter:
         self._add_results(count, outcome, note)
 
     def skip(self, count: float = 1, *, note: str = "") -> None:
-        """Takes results that cost nothing: the pace is that of the others, from now on."""
+        """Counts results without cost, and measures the rate of the others from now on."""
         self._restart_clock(count, None, note)
 
     def expect(self, total: float) -> None:
-        """Says how many results there are in all, where that has become known better."""
+        """Updates the total number of results."""
         self._event = replace(self._event, total=total)
 
     def _restart_clock(self, count: float, outcome: Outcome | None, note: str) -> None:
@@ -145,7 +144,7 @@ class Reporter(AbstractContextManager["Reporter"]):
     """Shows progress on standard error, or passes it to a function."""
 
     def __init__(self, progress: bool | Listener, *, clock: Clock = time.monotonic) -> None:
-        """True shows it, False keeps quiet, a function gets every event."""
+        """`progress`: True shows it, False is silent, a function gets every event."""
         self._close: Callable[[], None] = lambda: None
         if callable(progress):
             self._show: Listener = progress
@@ -158,7 +157,7 @@ class Reporter(AbstractContextManager["Reporter"]):
             self._show = _LogLines(clock).show
 
     def show(self, event: Progress) -> None:
-        """Takes an event."""
+        """Shows an event."""
         self._show(event)
 
     def __exit__(self, *_: object) -> None:
@@ -200,8 +199,8 @@ class _ProgressBar:
 
 
 class _LogLines:
-    """A line at each change of phase, as soon as the time left is known, every half minute from
-    then on, and at the end; about what ends within seconds none but that it is starting."""
+    """A line at each change of phase, once the time left is known, every half minute from then on,
+    and at the end; jobs of a few seconds only have the line at the start."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -210,7 +209,7 @@ class _LogLines:
         self._forecast = self._any_shown = False
 
     def show(self, event: Progress) -> None:
-        min_elapsed = 5.0  # seconds after which the remaining time is shown
+        min_elapsed = 5.0  # Seconds after which the remaining time is shown.
         now = self._clock()
         known = event.remaining is not None and (
             event.left is not None or event.elapsed >= min_elapsed
@@ -252,7 +251,7 @@ def _rate_text(event: Progress) -> str:
 
 
 def _outcome_text(event: Progress) -> str:
-    """What was found so far, in short: a terminal has no room for all outcomes."""
+    """Short summary of the outcomes so far, as a terminal has no room for all of them."""
     if not event.outcomes:
         return event.note
     failed = event.outcomes[Outcome.SIMULATION_FAILED]

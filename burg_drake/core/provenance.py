@@ -16,8 +16,7 @@ from burg_drake.core.files import open_regular
 
 
 def content_hash(*parts: Any) -> str:
-    """SHA-256 over a sequence of parts, each with its type and length, so that parts cannot run
-    into each other.
+    """SHA-256 of a sequence of parts, each with its type and length, so that parts are separated.
 
     Args:
         parts: `str`, `bytes`, `int`, `float`, `bool`, `None`, `numpy.ndarray`, `Path` (the file's
@@ -75,13 +74,13 @@ JUDGING_PACKAGES = {name: name for name in ("drake", "numpy", "scipy", "trimesh"
 def software_versions(
     packages: Mapping[str, str] = JUDGING_PACKAGES, *, with_platform: bool = True
 ) -> dict[str, str]:
-    """Versions of what decides about results, and of what may.
+    """Versions of the software that affects results.
 
     Args:
-        packages: names under which they are installed, by names in files.
-        with_platform: tell the operating system, too.
+        packages: installed package names, by names in files.
+        with_platform: include the operating system.
     """
-    own = sys.modules["burg_drake"]  # not imported: type checkers would see a circle of all faces
+    own = sys.modules["burg_drake"]  # not imported: type checkers would see a circular import
     found = {"burg_drake": str(own.__version__)}
     found |= {name: package_version(package) for name, package in packages.items()}
     found["python"] = platform.python_version()
@@ -89,9 +88,8 @@ def software_versions(
 
 
 def package_version(package: str, missing: str = "unknown") -> str:
-    """The installed version of a package; `missing` if it has no metadata.
-
-    A Drake that was built from source, for example, has none.
+    """The installed version of a package; `missing` if it has no metadata, as a Drake that was
+    built from source.
     """
     try:
         return version(package)
@@ -100,7 +98,7 @@ def package_version(package: str, missing: str = "unknown") -> str:
 
 
 def provenance_parts(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The provenances of the sets that a set was joined of, which `parts` lists or has by name."""
+    """The provenances of the sets that were joined, which `parts` has as a list or by name."""
     parts = provenance.get("parts")
     if isinstance(parts, Mapping):
         parts = list(parts.values())

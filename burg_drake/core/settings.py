@@ -21,12 +21,12 @@ Quaternion = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class DisplayUnit:
-    """A unit that people give, where a field has SI.
+    """A unit for input of a field that is stored in SI units.
 
     Attributes:
-        name: of the unit; ends the option's name.
-        to_si: brings a value to SI.
-        from_si: and back.
+        name: name of the unit; suffix of the option's name.
+        to_si: converts a value to SI.
+        from_si: converts a value from SI.
     """
 
     name: str
@@ -39,10 +39,10 @@ MAX_DOCUMENT_SEED = (1 << 64) - 1
 
 
 class Units:
-    """Units that people give, where fields have metres, radians and shares."""
+    """Units for input of metres, radians and shares."""
 
     millimetres = DisplayUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
-    # As in files of motions and gaps: differs from the product in the last digit.
+    # A quotient, as in files of motions and gaps: differs from the product in the last digit.
     millimetres_by_division = DisplayUnit("mm", lambda x: x / 1000.0, lambda x: 1000.0 * x)
     degrees = DisplayUnit("deg", math.radians, math.degrees)
     percent = DisplayUnit("percent", lambda x: x / 100.0, lambda x: 100.0 * x)
@@ -50,20 +50,20 @@ class Units:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """What a field says about itself.
+    """Declaration of a settings field.
 
     Attributes:
-        help: what it means, for people, without a full stop; another field in braces, such as
-            `{lift_height}`, is told by its option. Of a field that is true by default: what it
-            means that it is false, which its option makes it.
-        unit: that people give it in; None if that is the field's own.
-        name: of the option, without dashes; the field's and the unit's name if empty.
+        help: meaning, without a full stop; another field in braces, such as `{lift_height}`, is
+            replaced by its option. For a field that is true by default, the meaning of false, which
+            its option sets.
+        unit: unit for input; None for the field's own unit.
+        name: name of the option, without dashes; the field's and the unit's name if empty.
         flags: short names of the option, such as `-n`.
-        metavar: what stands for the value in a help text; chosen by type and unit if empty.
-        choices: the values there are; any if empty.
-        low, above, high: bounds of the value as people give it: from, more than, at most.
-        infinite: whether `inf` may be given.
-        noun: what a value is called in a message.
+        metavar: placeholder of the value in a help text; chosen by type and unit if empty.
+        choices: allowed values; any if empty.
+        low, above, high: bounds in the unit for input: from, more than, at most.
+        infinite: whether `inf` is allowed.
+        noun: noun for a value in messages.
     """
 
     help: str
@@ -79,23 +79,23 @@ class Setting:
     noun: str = "number"
 
     def option(self, field: str) -> str:
-        """The long option of a field that has this to say, such as `--lift-mm`."""
+        """The long option of a field with this declaration, such as `--lift-mm`."""
         unit = "" if self.unit is None else f"_{self.unit.name}"
         return f"--{(self.name or field + unit).replace('_', '-')}"
 
 
 def setting(default: Any = MISSING, help: str = "", **more: Any) -> Any:
-    """A field of a settings dataclass, as `dataclasses.field`.
+    """Declares a field of a settings dataclass, as `dataclasses.field`.
 
     Args:
-        default: its value unless another one is given.
-        help: see `Setting`, which has all the rest.
+        default: default value.
+        help: see `Setting`, as for the others.
     """
     return field(default=default, metadata={"setting": Setting(help=help, **more)})
 
 
 def declared_fields(settings: type) -> dict[str, tuple[Field[Any], Setting]]:
-    """The fields of a settings dataclass that say something about themselves, by name."""
+    """The fields of a settings dataclass with their declarations, by name."""
     return {f.name: (f, f.metadata["setting"]) for f in fields(settings) if "setting" in f.metadata}
 
 
@@ -105,21 +105,21 @@ def option_name(settings: type, name: str) -> str:
 
 
 Ranges = Mapping[str, tuple[float, float]]
-"""Smallest and largest value by name of the field."""
+"""Smallest and largest value, by name of the field."""
 
 
 class WithRanges(Protocol):
-    """A dataclass that says which values its fields may have; schemas say it, too."""
+    """A dataclass with ranges for its fields, which are also in its schema."""
 
     RANGES: ClassVar[Ranges]
 
 
 def require_ranges(settings: WithRanges, what: str = "") -> None:
-    """Refuses values outside of their range. None passes; in a tuple, each value has to be inside.
+    """Rejects values outside their range. None is valid; in a tuple, each value is checked.
 
     Args:
         settings: dataclass with the fields.
-        what: the settings are of, for messages; nothing where the field's name says enough.
+        what: subject of the settings, for messages; empty if the field's name suffices.
 
     Raises:
         FieldError: a value is outside, or not a number.
@@ -137,7 +137,7 @@ def require_ranges(settings: WithRanges, what: str = "") -> None:
 
 
 def require_ascending(settings: WithRanges) -> None:
-    """Refuses pairs of values that fall.
+    """Rejects pairs of values in descending order.
 
     Args:
         settings: dataclass with the fields.
@@ -152,11 +152,11 @@ def require_ascending(settings: WithRanges) -> None:
 
 
 def require_finite(document: object) -> None:
-    """Refuses numbers that are NaN or infinite, of a document that a program has made: `min`, `max`
-    and comparisons let some of them pass. Those of a file are checked when it is read.
+    """Rejects NaN and infinite numbers in a document made by a program, as `min`, `max` and
+    comparisons accept some of them. Numbers in files are checked by the reader.
 
     Raises:
-        FieldError: names the first one by its key.
+        FieldError: names the key of the first one.
     """
     for place, number in _numbers_with_places(document, ()):
         if not math.isfinite(number):
@@ -167,7 +167,7 @@ def require_finite(document: object) -> None:
 def _numbers_with_places(
     value: object, place: tuple[str | int, ...]
 ) -> Iterable[tuple[tuple[str | int, ...], float]]:
-    """All numbers of a document with their places in it."""
+    """All numbers of a document, with their places."""
     parts: Iterable[tuple[str | int, object]] = ()
     if isinstance(value, float):
         yield place, value

@@ -1,7 +1,7 @@
 """YAML and JSON text, checked against limits before anything is built from it.
 
-YAML becomes events, nodes that know their line, or plain dicts, lists and texts; the last takes a
-tenth of the time that nodes take. A key that appears twice in a mapping is an error.
+YAML is parsed to events, nodes with line numbers, or plain dicts, lists and texts; the last takes a
+tenth of the time of nodes. A key that appears twice in a mapping is an error.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ YAML_LOADER = yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoa
 """LibYAML's loader where PyYAML has it."""
 
 YamlEvent = Any
-"""Of PyYAML, whose kinds of event have different attributes."""
+"""Event of PyYAML, whose kinds have different attributes."""
 
 STANDARD_TAGS = frozenset(
     f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "bool", "null", "map", "seq")
@@ -39,23 +39,23 @@ def checked_yaml_events(
     Args:
         text: YAML.
         name: stands for the file in messages.
-        limits: of depth and values.
-        tags: that are known.
+        limits: limits of depth and values.
+        tags: known tags.
 
     Raises:
-        DocumentError: not YAML, too deep, too many values, a tag that is not known, or an alias
-            without an anchor before it; the message names file and line.
+        DocumentError: not YAML, too deep, too many values, an unknown tag, or an alias without a
+            preceding anchor; the message names file and line.
     """
     values = 0
-    anchors: dict[str, tuple[int, int]] = {}  # values behind it, and how deep they are
-    opened: list[tuple[str | None, int]] = []  # anchor, and values before
-    reached: list[int] = []  # depth within each that is open
+    anchors: dict[str, tuple[int, int]] = {}  # number and depth of its values
+    opened: list[tuple[str | None, int]] = []  # anchor, and number of values before
+    reached: list[int] = []  # depth within each open collection
     for event in _parse_events(text, name, limits):
         kind = type(event)
         if kind is yaml.ScalarEvent:
             values += 1
             if event.tag is None and event.anchor is None and values <= limits.values:
-                yield event  # almost all: what follows costs time
+                yield event  # almost all events; the rest is slow
                 continue
             if event.anchor is not None:
                 anchors[event.anchor] = (1, 0)
@@ -98,7 +98,7 @@ def _parse_events(text: str, name: str, limits: Limits) -> Iterator[YamlEvent]:
     except yaml.YAMLError as error:
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
         what = f"not valid YAML: {problem}"
-        if problem == "exceeded maximum nesting depth":  # LibYAML's, of more than 1,000 levels
+        if problem == "exceeded maximum nesting depth":  # LibYAML's limit: 1,000 levels
             what = _depth_message(limits)
         raise DocumentError(f"{name}{_problem_line(error)}: {what}") from error
 
@@ -141,7 +141,7 @@ def parse_yaml_node(text: str, name: str, empty: str = "the document is empty") 
             raise _event_error(name, event, "not valid YAML: a second document begins")
     try:
         node = yaml.compose(text, Loader=YAML_LOADER)
-    except yaml.YAMLError as error:  # that only composing finds: the same anchor twice
+    except yaml.YAMLError as error:  # found only by composing: the same anchor twice
         what = f"not valid YAML: {str(error).splitlines()[0]}"
         raise DocumentError(f"{name}{_problem_line(error)}: {what}") from error
     if node is None:
@@ -150,7 +150,7 @@ def parse_yaml_node(text: str, name: str, empty: str = "the document is empty") 
 
 
 Tree = Any
-"""A text, a list of trees, or a dict of trees by text."""
+"""A text, a list of trees, or a dict of trees with text keys."""
 
 
 def load_plain_yaml(path: str | Path) -> Tree:
@@ -188,7 +188,7 @@ def parse_plain_yaml(
 def _build_tree(
     event: YamlEvent, events: Iterator[YamlEvent], anchors: dict[str, Tree], name: str
 ) -> Tree:
-    """The value that begins with `event`; takes the events that belong to it."""
+    """Builds the value that begins with `event`; consumes its events."""
     kind = type(event)
     if kind is yaml.ScalarEvent:
         result: Tree = event.value
@@ -217,8 +217,8 @@ MAX_INTEGER_DIGITS = 100
 """Random generator states have 39 digits, floats 309; Python refuses 4,300."""
 
 _JSON_STRING = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
-"""Never backtracks, so an unterminated text takes no longer than any other."""
-_DEPTH_CHANGE = np.zeros(256, dtype=np.int8)  # Change of the nesting depth by each byte.
+"""Never backtracks, so an unterminated string takes no longer than others."""
+_DEPTH_CHANGE = np.zeros(256, dtype=np.int8)  # Change of the nesting depth at each byte.
 _DEPTH_CHANGE[list(b"[{")] = 1
 _DEPTH_CHANGE[list(b"]}")] = -1
 
@@ -228,7 +228,7 @@ def load_json(path: str | Path, limits: Limits = FileLimits.document) -> Any:
 
     Raises:
         DocumentError: it cannot be read, is not JSON, is beyond the limits, or a mapping has a key
-            twice; the message names the file, and the line where that is known.
+            twice; the message names the file, and the line if known.
     """
     return parse_json(read_text(path, limits), str(path), limits)
 
@@ -260,7 +260,7 @@ def parse_json(text: str, name: str, limits: Limits = FileLimits.document) -> An
 
 
 def _check_size_and_depth(text: str, name: str, limits: Limits) -> None:
-    """Counts values and levels before anything is built."""
+    """Checks the number of values and the nesting depth before parsing."""
     opened = text.count("[") + text.count("{")
     if opened + text.count(",") > limits.values:
         raise DocumentError(f"{name}: more than {limits.values:,} values; is it the right file?")

@@ -18,60 +18,60 @@ Kind = Literal["number", "name", "text"]
 
 @dataclass(frozen=True)
 class _Row:
-    """Cells of a row; one without any is a gap."""
+    """Cells of a row; a row without cells is an empty line."""
 
     cells: tuple[str, ...]
     bold: bool = False
 
 
 class TextTable:
-    """A table that is filled row by row, and printed by `show` or as `rich` prints it."""
+    """A table that is filled row by row, and printed by `show` or by `rich`."""
 
     def __init__(self, title: str = "", *, caption: str = "") -> None:
-        """An empty table without columns; title and caption wrap at blanks."""
+        """Creates a table without columns; title and caption wrap at blanks."""
         self.title, self.caption = title, caption
         self._heads: list[str] = []
         self._kinds: list[Kind] = []
         self._rows: list[_Row] = []
 
     def names(self, *heads: str) -> TextTable:
-        """Adds columns of names, which lose their middle where they are too long."""
+        """Adds columns of names, which are shortened in the middle if too long."""
         return self._add("name", heads)
 
     def texts(self, *heads: str) -> TextTable:
-        """Adds columns of texts, which wrap; also of ids, which people copy."""
+        """Adds columns of texts, which wrap; also for ids, which have to stay complete."""
         return self._add("text", heads)
 
     def numbers(self, *heads: str) -> TextTable:
-        """Adds columns of numbers, with their units in the heads; they are never cut."""
+        """Adds columns of numbers, with units in the heads; numbers are never cut."""
         return self._add("number", heads)
 
     def row(self, *cells: str, bold: bool = False) -> None:
         """Adds a row.
 
         Raises:
-            ValueError: it has not a cell for each column.
+            ValueError: the number of cells differs from that of the columns.
         """
         if len(cells) != len(self._heads):
             raise ValueError(f"a row of {len(cells)} cells; there are {len(self._heads)} columns")
         self._rows.append(_Row(tuple(map(_replace_unprintable, cells)), bold))
 
     def gap(self) -> None:
-        """Adds an empty line, as before a sum."""
+        """Adds an empty line, for example before a sum."""
         self._rows.append(_Row(()))
 
     def figures(self) -> Counter[str]:
-        """All cells of the columns of numbers, and how often each occurs."""
+        """Counts of the cells in columns of numbers."""
         columns = [c for c, kind in enumerate(self._kinds) if kind == "number"]
         return Counter(cell for c in columns for cell in self._cells(c))
 
     @property
     def width(self) -> int:
-        """Characters that a line needs if nothing is shortened or wrapped."""
+        """Width in characters without shortening or wrapping."""
         return sum(self._natural_widths(range(len(self._heads)))) + 2 * (len(self._heads) - 1)
 
     def lines(self, width: int) -> list[tuple[str, bool]]:
-        """The lines, none wider than `width` unless a number alone is, and whether each is bold."""
+        """The lines, at most `width` wide unless a number is wider, and whether each is bold."""
         lines = [(line, False) for line in _wrap_text(self.title, width)]
         for block in self._split_into_blocks(width):
             if lines:
@@ -109,7 +109,7 @@ class TextTable:
         return [row.cells[column] for row in self._rows if row.cells]
 
     def _natural_widths(self, columns: Iterable[int], *, broken: bool = False) -> list[int]:
-        """Width of columns if nothing is cut; heads may break at blanks."""
+        """Width of columns without cuts; heads may break at blanks."""
         heads = ["\n".join(self._heads[c].split()) if broken else self._heads[c] for c in columns]
         return [
             max(len(line) for text in (head, *self._cells(c)) for line in text.split("\n"))
@@ -126,7 +126,7 @@ class TextTable:
         ]
 
     def _split_into_blocks(self, width: int) -> list[list[int]]:
-        """Columns that fit side by side; the first one is in every block."""
+        """Blocks of columns that fit side by side; the first column is in every block."""
         everything = list(range(len(self._heads)))
         blocks = [everything[:1]]
         for column in everything[1:]:
@@ -137,8 +137,8 @@ class TextTable:
         return blocks
 
     def _widths(self, columns: Sequence[int], width: int) -> tuple[list[int], int]:
-        """Width of each column, and how many blanks are between them: the first that fits of
-        everything whole, broken heads, narrow gaps, and the widest names and texts shortened."""
+        """Width of each column, and the number of blanks between them: the first layout that fits
+        of uncut columns, broken heads, narrow gaps, and shortened names and texts."""
         wide: list[int] = []
         for broken, gap in ((False, 2), (True, 2), (True, 1)):
             wide = self._natural_widths(columns, broken=broken)
@@ -159,7 +159,7 @@ class TextTable:
         right = [self._kinds[c] == "number" for c in columns]
 
         def joined(cells: Sequence[Sequence[str]], *, below: bool) -> list[str]:
-            if below:  # heads stand on the line
+            if below:  # heads are aligned at the bottom
                 height = max(map(len, cells))
                 cells = [[""] * (height - len(cell)) + list(cell) for cell in cells]
             return [
@@ -188,7 +188,7 @@ class TextTable:
             return {cell: [cell] for cell in cells}
         if self._kinds[column] == "name":
             short = {cell: _shorten_middle(cell, width) for cell in cells}
-            if len(set(short.values())) == len(short):  # else they could not be told apart
+            if len(set(short.values())) == len(short):  # else they could not be distinguished
                 return {cell: [text] for cell, text in short.items()}
         return {cell: _wrap_text(cell, width) or [""] for cell in cells}
 
@@ -205,7 +205,7 @@ def _shorten_middle(text: str, width: int) -> str:
 
 
 def _wrap_text(text: str, width: int) -> list[str]:
-    """Lines of a text; a number stays with its unit."""
+    """Wraps a text; a number stays with its unit."""
     together = re.sub(r"(?<=\d) (?=%|[A-Za-z]{1,3}\b)", "\xa0", text)
     return [
         line.replace("\xa0", " ")
@@ -216,7 +216,7 @@ def _wrap_text(text: str, width: int) -> list[str]:
 
 
 def _wrap_heading(text: str, width: int) -> list[str]:
-    """Lines of a head, broken at blanks where it is too wide."""
+    """Wraps a head at blanks."""
     whole = text.split("\n")
     if max(map(len, whole)) <= width:
         return whole

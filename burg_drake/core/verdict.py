@@ -1,4 +1,4 @@
-"""The verdict of a grasp: its fields and margins, declared once, and the columns that follow."""
+"""The verdict of a grasp: its fields, margins and columns."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from burg_drake.core.outcomes import Mode, Outcome, Stage
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """Continuous slack behind an outcome, SI units; NaN where it was not measured.
+    """Continuous measures of how clear an outcome is, in SI units; NaN if not measured.
 
-    Margins are equal if they have the same numbers and leave the same ones unmeasured.
+    Margins are equal if they have the same numbers, with NaN equal to NaN.
     """
 
     overlap: float = margin_field(
@@ -154,36 +154,36 @@ class Margins:
         return tuple(None if math.isnan(value) else value for value in values)
 
     def of_trial(self) -> dict[str, float]:
-        """Those that a trial measures, by name; NaN where it ended before."""
+        """Margins that a trial measures, by name; NaN if it ended earlier."""
         of_trial = (f.name for f in fields(self) if f.metadata["stage"] is Stage.EXECUTED)
         return {name: getattr(self, name) for name in of_trial}
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrialFindings:
-    """What a trial finds beside its outcome.
+    """Results of a trial besides its outcome.
 
     Attributes:
-        blocker: the body in the way at the start or met on the way, if any; what a link of the arm
-            met is written as "panda_link5 vs shelf".
-        reason: for people, where the outcome alone does not say enough: the message of what failed.
-        margins: continuous slack.
-        confidence: probability that trials which differ by what nobody knows exactly find the same,
-            held or not held to the end; see `simulation.confidence`. None where no trial decided,
-            and with engines that it is not calibrated for.
-        displacements: by instance, how far the farthest point of every other free object was moved
-            at most from where it stood at the start [m]; 0 of what nothing touched or stood close
-            to. Empty if no trial started or it failed.
-        turned: the same of its rotation [rad].
-        toppled: names of the instances among them whose axis that was upright is tilted by more
-            than 45 degrees at the end, and that lie or stand otherwise than before, separated by
-            commas; not what rolled.
-        pushed: the same when the hand began to close, and of the target, too: what the approach
-            moved [m]. Empty where the trial began at the grasp.
-        touched: the first touch that was not planned, as "panda_link5 vs can": of the robot with
-            anything before the hand began to close; from then on of a link of the arm with
-            anything, and of the hand with anything but target and table. Empty if there was none,
-            or where the trial began at the grasp.
+        blocker: the obstacle at the start or during the motion, if any; for a link of the arm with
+            the link, as "panda_link5 vs shelf".
+        reason: message of the failure, if the outcome alone is not clear.
+        margins: margins of the outcome.
+        confidence: probability that trials with varied uncertain parameters agree whether the
+            target is held to the end; see `simulation.confidence`. None if no trial decided, or the
+            engine is not calibrated.
+        displacements: largest displacement of any point of every other free object from its start
+            [m], by instance; 0 if nothing touched the object or its neighbours. Empty if no trial
+            started or it failed.
+        turned: largest rotation of these objects [rad], by instance.
+        toppled: names of these objects whose initially upright axis is tilted by more than 45
+            degrees at the end, and that rest in another way than before, separated by commas;
+            without objects that rolled.
+        pushed: displacements by the approach, until the hand began to close, including the target
+            [m]. Empty if the trial began at the grasp.
+        touched: the first unplanned contact, as "panda_link5 vs can": any contact of the robot
+            before the hand began to close; afterwards any contact of the arm's links, and contacts
+            of the hand except with target and table. Empty if there was none, or if the trial began
+            at the grasp.
     """
 
     blocker: str = field(
@@ -247,17 +247,17 @@ class TrialFindings:
     )
 
     def of_trial(self) -> dict[str, Any]:
-        """The fields that are declared here, by name."""
+        """The fields of `TrialFindings`, by name."""
         return {one.name: getattr(self, one.name) for one in fields(TrialFindings)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Findings(TrialFindings):
-    """What the stages of a judge find beside the outcome, each alone or all together.
+    """Results of a judge's stages besides the outcome, of one stage or all.
 
     Attributes:
-        margins: those that were measured, by the names of `Margins`.
-        q_grasp, q_pregrasp: positions of the arm's joints [rad]; empty if none were found.
+        margins: measured margins, by the names of `Margins`.
+        q_grasp, q_pregrasp: positions of the arm's joints [rad]; empty if not found.
     """
 
     margins: Mapping[str, float] = field(
@@ -296,17 +296,17 @@ CONTESTED_CONFIDENCE = 0.9
 
 @dataclass(frozen=True)
 class Verdict(Findings):
-    """What became of a grasp.
+    """The verdict of a grasp.
 
     Attributes:
-        outcome: the one outcome.
+        outcome: the outcome.
         stage: the stage that decided; for `simulation_failed` the stage that failed.
         judged_again: preset of the engine that judged a contested grasp again, and gave this
-            verdict; empty where it is the run's own.
-        outcome_before: the outcome that the run's own engine gave, where another has judged again.
+            verdict; empty for the run's own engine.
+        outcome_before: outcome from the run's own engine, if another engine judged again.
         cpu: CPU time by stage [s].
-        interrupted: whether it failed because its worker process was ended from outside, so that
-            another try may give an answer.
+        interrupted: whether it failed because its worker process was ended from outside, so that a
+            retry may succeed.
     """
 
     outcome: Outcome = field(metadata=TextField("", "how the grasp ended", of=Outcome).metadata)
@@ -338,8 +338,7 @@ class Verdict(Findings):
 
     @property
     def contested(self) -> bool:
-        """Whether other trials of the same grasp may well end differently, and none has settled
-        it."""
+        """Whether the confidence is low, and no other engine has judged the grasp again."""
         return (
             self.confidence is not None
             and self.confidence < CONTESTED_CONFIDENCE
@@ -347,16 +346,16 @@ class Verdict(Findings):
         )
 
     def is_open(self, *, retry_failed: bool = False) -> bool:
-        """Whether a later call asks again.
+        """Whether the grasp has to be judged again.
 
         Args:
-            retry_failed: not only where it was interrupted, but wherever the simulation failed.
+            retry_failed: judge again all failed simulations, not only interrupted ones.
         """
         return self.interrupted or (retry_failed and self.outcome is Outcome.SIMULATION_FAILED)
 
 
 class RecordedFields:
-    """Fields of a verdict that are written, by who finds them."""
+    """Written fields of a verdict, by their source."""
 
     trial = verdict_fields(TrialFindings)  # Findings of a trial.
     stages = verdict_fields(Findings)  # Findings of the stages of a judge.
@@ -367,14 +366,14 @@ class RecordedFields:
 
 
 class MarginNames:
-    """Names of the margins, by what they have in common."""
+    """Names of the margins, by group."""
 
     all = tuple(one.name for one in fields(Margins))  # In the order of tables.
-    # Names of the margins of which a smaller one is better.
+    # Names of the margins for which smaller is better.
     smaller_is_better = frozenset(
         one.name for one in fields(Margins) if one.metadata["smaller_is_better"]
     )
-    # Length of the lift that was asked for, or for which there is room.
+    # Length of the requested lift, or of the free part of it.
     lift_height = "lift_height"
     # Measured by the arm's screen.
     arm_screen = tuple(
@@ -395,20 +394,20 @@ MOVED_PREFIX, TURNED_PREFIX, PUSHED_PREFIX = (
 
 
 def fields_of_part(shape: TableShape, part: VerdictPart) -> list[VerdictField]:
-    """The fields that a part of a row has in tables of a shape."""
+    """The fields in a part of a row, for tables of a shape."""
     return [one for one in RecordedFields.verdict if one.part == part and shape.has(one.mode)]
 
 
 def display_order(
     first: Sequence[str], names: Sequence[str], *, without: Sequence[str]
 ) -> list[str]:
-    """Names in an order for people: the first ones, then the others, so that a new one is shown
-    without being named; those aside that are shown elsewhere, or to nobody."""
+    """Names in display order: those in `first`, then all others, so that new names are included;
+    without those in `without`."""
     return [*first, *(name for name in names if name not in {*first, *without})]
 
 
 def merge_findings(stages: Sequence[Findings]) -> dict[str, Any]:
-    """What several stages found together, by field; see `VerdictField.merge`."""
+    """Merges the findings of several stages by field; see `VerdictField.merge`."""
     return {
         one.name: one.merge([getattr(s, one.name) for s in stages]) for one in RecordedFields.stages
     }

@@ -1,4 +1,4 @@
-"""Access to the pages that this machine serves: host checks, tokens and session cookies."""
+"""Access control of the local web pages: host checks, tokens and session cookies."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SECURITY_HEADERS: Mapping[str, str] = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-"""Headers of every answer; each page adds its own Content-Security-Policy."""
+"""Headers of every response; each page adds its own Content-Security-Policy."""
 
 
 class RequestError(Exception):
-    """A request that is refused.
+    """A rejected request.
 
     Attributes:
         code: HTTP status.
@@ -39,11 +39,11 @@ class RequestError(Exception):
 def is_local_host(name: str, served: str) -> bool:
     """Whether a `Host` header names this machine.
 
-    A rebound DNS name is a name, so that any plain address will do.
+    DNS rebinding uses names, so any plain address is accepted.
 
     Args:
         name: the header.
-        served: the address that is listened on.
+        served: the address of the server.
     """
     match = re.fullmatch(r"(?P<name>[^\s@/?#\[\]:]+|\[[0-9a-fA-F:.]+\])(:[0-9]{1,5})?", name)
     if match is None:
@@ -60,15 +60,15 @@ def is_local_host(name: str, served: str) -> bool:
 
 
 def require_local_host(header: Callable[[str], str | None], *, served: str, is_page: bool) -> None:
-    """Refuses what another site may have sent.
+    """Rejects requests from other sites.
 
     Args:
-        header: looks up one of the request's headers.
-        served: the address that is listened on.
-        is_page: the page itself is asked for, which links of other sites may lead to.
+        header: returns a header of the request.
+        served: the address of the server.
+        is_page: the request is for the page itself, to which other sites may link.
 
     Raises:
-        RequestError: another host is meant, or another site asks.
+        RequestError: the host is another one, or the request comes from another site.
     """
     host, origin = header("Host") or "", header("Origin")
     if not is_local_host(host, served):
@@ -86,23 +86,23 @@ def require_local_host(header: Callable[[str], str | None], *, served: str, is_p
 
 
 def page_url(host: str, port: int) -> str:
-    """Address of the page for browsers, with the machine's name if it is served everywhere."""
+    """URL of the page, with the machine's name if the server listens on all addresses."""
     name = socket.gethostname() if host in ("0.0.0.0", "::", "") else host
     name = f"[{name}]" if ":" in name else name
     return f"http://{name}:{port}/"
 
 
 def open_listener(host: str, port: int | None, *, first_port: int, title: str) -> socket.socket:
-    """A socket that listens.
+    """Opens a listening socket.
 
     Args:
         host: address to listen on.
-        port: to listen on; any if 0, the first free one of 50 if None.
-        first_port: of these 50.
-        title: of what is served, for messages.
+        port: port to listen on; any if 0, the first free one of 50 if None.
+        first_port: first of these 50 ports.
+        title: title of the server, for messages.
 
     Raises:
-        InvalidInputError: the port is taken, or the address is not this machine's.
+        InvalidInputError: the port is in use, or the address is not this machine's.
     """
     ports = range(first_port, first_port + 50) if port is None else range(port, port + 1)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -131,7 +131,7 @@ TOKEN_BYTES = 24  # Random bytes of a token or session secret.
 
 
 class BrowserToken:
-    """Admits browsers; every method may be called from any thread.
+    """Admits browsers by a one-time token and a cookie; thread-safe.
 
     Args:
         cookie: name of the cookie.
@@ -146,12 +146,12 @@ class BrowserToken:
 
     @property
     def token(self) -> str:
-        """What the next browser has to bring."""
+        """The token for the next browser."""
         with self._lock:
             return self._token
 
     def use(self, given: str) -> bool:
-        """Whether a browser brings the token, which is used up then."""
+        """Whether a given token is valid; a valid token is used up."""
         with self._lock:
             if not _constant_time_equal(given, self._token):
                 return False
@@ -160,11 +160,11 @@ class BrowserToken:
 
     @property
     def set_cookie(self) -> str:
-        """Header by which an admitted browser gets the cookie."""
+        """Header that sets the cookie of an admitted browser."""
         return f"{self._cookie}={self._secret}; Path=/; HttpOnly; SameSite=Strict"
 
     def admits(self, cookies: str) -> bool:
-        """Whether a browser with such a `Cookie` header was admitted."""
+        """Whether a `Cookie` header belongs to an admitted browser."""
         given = (cookie.strip().partition("=") for cookie in cookies.split(";"))
         return any(
             name == self._cookie and _constant_time_equal(value, self._secret)
@@ -173,5 +173,5 @@ class BrowserToken:
 
 
 def _constant_time_equal(given: str, expected: str) -> bool:
-    """Compares in a time that tells nothing; what servers could not decode is no part of tokens."""
+    """Compares texts in constant time; characters that servers could not decode never match."""
     return hmac.compare_digest(given.encode(errors="replace"), expected.encode())

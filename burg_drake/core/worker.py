@@ -1,8 +1,7 @@
-"""What a pool and its worker processes exchange, and the main loop of a worker.
+"""Messages between a pool and its worker processes, and the main loop of a worker.
 
-A worker builds what a session needs once, and then calls the functions of tasks. A process that
-exceeds a time limit is ended by the system. Worker processes import this module only, so it stays
-light.
+A worker builds a session once, and then calls the functions of tasks. A process that exceeds a time
+limit is ended by the system. Worker processes import this module only, so it stays light.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ TIME_LIMIT_SIGNALS = (signal.SIGPROF, signal.SIGALRM)
 
 @dataclass(frozen=True)
 class TimeLimit:
-    """What a task, or the building of a session, may take; imports before it do not count.
+    """Time limit of a task, or of building a session; without imports.
 
     Attributes:
-        cpu: CPU time [s]; on a busy machine work takes longer, but not more CPU time.
-        wall: wall time [s]; ends what waits for ever.
+        cpu: CPU time [s], which does not depend on the load of the machine.
+        wall: wall time [s], which also ends work that waits forever.
     """
 
     cpu: float
@@ -42,8 +41,8 @@ class TimeLimit:
 def time_limit(limit: TimeLimit | None) -> Iterator[None]:
     """Ends this process by one of `TIME_LIMIT_SIGNALS` if it does not leave the block in time.
 
-    The system does so, also where native code does not let the interpreter run, and where nobody
-    else is left to do it. Without a limit nothing is done.
+    The system ends it, even while native code blocks the interpreter, or after the parent has
+    ended. Without a limit nothing is done.
     """
     if limit is None:
         yield
@@ -58,7 +57,7 @@ def time_limit(limit: TimeLimit | None) -> Iterator[None]:
 
 
 def restore_time_limit_signals() -> None:
-    """Undoes what a parent may have set: its children inherit which signals are ignored."""
+    """Restores the default handling of the signals, which a parent may have ignored."""
     for number in TIME_LIMIT_SIGNALS:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, TIME_LIMIT_SIGNALS)
@@ -69,18 +68,19 @@ Result = TypeVar("Result")
 
 @dataclass(eq=False)
 class Session:
-    """What a worker builds once and hands to every task of the session.
+    """An object that a worker builds once and passes to every task of the session.
 
     Attributes:
-        key: names what is built; a worker that has it does not build it again, also for another
+        key: name of the object; a worker that has it does not build it again, even for another
             session with this key.
-        build: builds it; pickled by reference, hence an instance of an importable class or an
-            importable function.
-        limit: what building may take; any time if None.
-        attempts: so many workers in a row that die while they build it end the session.
-        error: why it cannot be built; its tasks fail then.
-        failed_builds: workers in a row that died while they built it.
-        pickled: `build`.
+        build: builds the object; pickled by reference, hence an instance of an importable class or
+            an importable function.
+        limit: time limit of building; none if None.
+        attempts: number of consecutive workers that may die while they build it before the session
+            fails.
+        error: why it cannot be built; its tasks then fail.
+        failed_builds: number of consecutive workers that died while they built it.
+        pickled: the pickled `build`.
     """
 
     key: str
@@ -100,13 +100,13 @@ class Task(Generic[Result]):
     """A call of a function in a worker.
 
     Attributes:
-        function: importable; with a session, what that has built is its first argument.
-        args: its arguments.
-        kwargs: likewise.
-        session: what has to be built before, if anything.
-        limit: what it may take; any time if None.
+        function: importable function; with a session, its first argument is the session's object.
+        args: positional arguments.
+        kwargs: keyword arguments.
+        session: session of the task, if any.
+        limit: time limit; none if None.
         on_progress: called with each message of `report_progress`, in a thread of the pool.
-        retries: how often it is tried again when its worker dies; as the pool says if None.
+        retries: number of retries if its worker dies; the pool's if None.
     """
 
     function: Callable[..., Result]
@@ -119,46 +119,46 @@ class Task(Generic[Result]):
 
     @property
     def session_key(self) -> str | None:
-        """Key of its session, if it has one."""
+        """Key of its session; None without one."""
         return None if self.session is None else self.session.key
 
 
 class WorkerFuture(Future[Result]):
-    """What will become of a task.
+    """The future result of a task.
 
-    Raises what the task raises, `WorkerDied` if it ends its workers, and `TaskCancelled` if nobody
-    waited for it any more while it ran.
+    Raises the task's error, `WorkerDied` if the task ends its workers, and `TaskCancelled` if it
+    was cancelled while it ran.
     """
 
     def __init__(self, end: Callable[[WorkerFuture[Any], bool], None]) -> None:
         """Made by a pool.
 
         Args:
-            end: ends it: as it reports progress, or with its process.
+            end: ends the task at its next progress report, or with its process.
         """
         super().__init__()
         self._end = end
 
     def interrupt(self) -> None:
-        """Nobody waits for it any more: it ends when it next reports progress. Nothing if done."""
+        """Cancels the task at its next progress report, unless it is done."""
         if not self.cancel():
             self._end(self, False)
 
     def terminate(self) -> None:
-        """Ends it at once, with the process that runs it. Nothing if done."""
+        """Ends the task at once, with its process, unless it is done."""
         if not self.cancel():
             self._end(self, True)
 
 
 @dataclass(frozen=True)
 class OpenSession:
-    """To a worker: build what a session needs.
+    """To a worker: build a session's object.
 
     Attributes:
-        key: names it from then on.
-        build: builds it, pickled.
-        drop: keys of what is not needed any more.
-        limit: what it may take.
+        key: key of the session.
+        build: pickled function that builds it.
+        drop: keys of sessions that are no longer needed.
+        limit: time limit.
     """
 
     key: str
@@ -172,10 +172,10 @@ class TaskCall:
     """A task for a worker.
 
     Attributes:
-        number: of the task.
+        number: number of the task.
         work: function, arguments and keyword arguments, pickled.
-        session: key of what is the first argument, if any.
-        limit: what it may take.
+        session: key of the session whose object is the first argument, if any.
+        limit: time limit.
     """
 
     number: int
@@ -186,11 +186,11 @@ class TaskCall:
 
 @dataclass(frozen=True)
 class TaskCalls:
-    """To a worker: tasks to do one after the other.
+    """To a worker: tasks to run one after the other.
 
     Attributes:
         calls: the tasks.
-        opening: what to build before, if anything; if it cannot be built, they are not done.
+        opening: session to build before, if any; if that fails, the tasks are not run.
     """
 
     calls: tuple[TaskCall, ...]
@@ -199,14 +199,14 @@ class TaskCalls:
 
 @dataclass(frozen=True)
 class InterruptTask:
-    """To a worker: nobody waits for a task any more."""
+    """To a worker: a task is cancelled."""
 
     number: int
 
 
 @dataclass(frozen=True)
 class SessionOpened:
-    """From a worker: a session is built, or cannot be, which no other worker could either.
+    """From a worker: a session is built, or cannot be built by any worker.
 
     Attributes:
         error: why it cannot be built.
@@ -219,7 +219,7 @@ class SessionOpened:
 
 @dataclass(frozen=True)
 class ProgressMessage:
-    """From a worker: what its task reports."""
+    """From a worker: a progress message of its task."""
 
     number: int
     message: Any
@@ -230,9 +230,9 @@ class TaskDone:
     """From a worker: a task has a result, or has raised an error.
 
     Attributes:
-        number: of the task.
-        result: what it returned.
-        error: what it raised.
+        number: number of the task.
+        result: its return value.
+        error: its error.
         where: the error's traceback.
     """
 
@@ -247,7 +247,7 @@ class WorkerEnding:
     """From a worker: it is about to end.
 
     Attributes:
-        reason: why.
+        reason: the reason.
     """
 
     reason: str
@@ -261,7 +261,7 @@ def main(handle: int, own_group: bool = False) -> None:
 
     Args:
         handle: file descriptor of this end of the pipe.
-        own_group: whether it leads a group of processes, so that what it starts ends with it.
+        own_group: whether it leads a process group, so that its child processes end with it.
     """
     global _loop
     if own_group:
@@ -274,7 +274,7 @@ def main(handle: int, own_group: bool = False) -> None:
     try:
         _loop.run()
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        pass  # the parent is gone, and nobody is left to tell
+        pass  # the parent is gone
     except (SystemExit, KeyboardInterrupt) as error:  # DRAKE_DEMAND ends this way
         connection.send(WorkerEnding(one_line(error)))
     # Destructors of large diagrams take time and nothing is left to be written.
@@ -282,13 +282,13 @@ def main(handle: int, own_group: bool = False) -> None:
 
 
 def report_progress(message: Any) -> None:
-    """Called by a task: tells those who wait for it how far it is; nothing outside of a worker.
+    """Reports progress of the current task; does nothing outside a worker.
 
     Args:
-        message: for `Task.on_progress`; can be pickled.
+        message: picklable argument for `Task.on_progress`.
 
     Raises:
-        TaskCancelled: nobody waits for the task any more.
+        TaskCancelled: the task was cancelled.
     """
     if _loop is not None:
         _loop.report(message)
@@ -303,10 +303,10 @@ class _WorkerLoop:
     def run(self) -> None:
         while (message := self._connection.recv()) is not None:
             if isinstance(message, InterruptTask):
-                continue  # it came too late
-            if message.opening is None or self._open(message.opening):
+                continue  # too late: the task has ended
+            if message.opening is None or self._build_session(message.opening):
                 for call in message.calls:
-                    self._do(call)
+                    self._run_task(call)
 
     def report(self, message: Any) -> None:
         while self._connection.poll():
@@ -315,7 +315,7 @@ class _WorkerLoop:
                 raise TaskCancelled("this task was cancelled")
         self._connection.send(ProgressMessage(self._number, message))
 
-    def _open(self, opening: OpenSession) -> bool:
+    def _build_session(self, opening: OpenSession) -> bool:
         for key in opening.drop:
             self._sessions.pop(key, None)
         try:
@@ -328,7 +328,7 @@ class _WorkerLoop:
         self._send(SessionOpened())
         return True
 
-    def _do(self, call: TaskCall) -> None:
+    def _run_task(self, call: TaskCall) -> None:
         self._number = call.number
         try:
             function, args, kwargs = pickle.loads(call.work)
@@ -343,7 +343,7 @@ class _WorkerLoop:
             self._send(TaskDone(call.number, result))
         except (EOFError, OSError):
             raise
-        except Exception as error:  # what cannot be pickled is not sent at all
+        except Exception as error:  # a result that cannot be pickled is not sent at all
             self._send(TaskDone(call.number, None, *_picklable_error(error)))
 
     def _send(self, message: WorkerMessage) -> None:
@@ -354,10 +354,10 @@ _loop: _WorkerLoop | None = None
 
 
 def _picklable_error(error: Exception) -> tuple[Exception, str]:
-    """An error that can be sent, and where it was raised."""
+    """A picklable form of an error, and its traceback."""
     where = "".join(traceback.format_exception(error))
     try:
         sent: Exception = pickle.loads(pickle.dumps(error))
-    except Exception:  # its class cannot be found, or wants other arguments
+    except Exception:  # its class cannot be found, or needs other arguments
         sent = SimulationError(one_line(error))
     return sent, where

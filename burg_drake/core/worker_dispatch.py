@@ -39,15 +39,15 @@ from burg_drake.core.worker_processes import exit_cause, start_worker, was_ended
 
 @dataclass(eq=False)
 class PendingTask:
-    """A task that has no result yet.
+    """A task without a result yet.
 
     Attributes:
-        number: names it.
-        task: what to do.
-        future: what will become of it.
-        tries: workers that it may still end.
-        started: whether its future says that it runs.
-        cancelled: whether nobody waits for it any more, although it was started.
+        number: number of the task.
+        task: the task.
+        future: its future.
+        tries: number of workers that it may still end.
+        started: whether its future is marked as running.
+        cancelled: whether it was cancelled after it was started.
         work: function and arguments, pickled when it is first sent.
     """
 
@@ -60,11 +60,10 @@ class PendingTask:
     work: bytes | None = None
 
     def call(self) -> TaskCall:
-        """What a worker is sent.
+        """The message to a worker.
 
         Raises:
-            Exception: it cannot be pickled.
-        """
+            Exception: the task cannot be pickled."""
         task = self.task
         if self.work is None:
             self.work = pickle.dumps((task.function, task.args, dict(task.kwargs)))
@@ -72,27 +71,28 @@ class PendingTask:
 
 
 Batch = deque[PendingTask]
-"""Tasks of one session that go to a worker together."""
+"""Tasks of one session that are sent to a worker together."""
 MAX_SESSIONS = 2
-"""Sessions that a worker keeps; more would take memory."""
+"""Sessions that a worker keeps; more would take too much memory."""
 
 
 @dataclass(eq=False)
 class Worker:
-    """A place for a process, which is started when there is work, and again when it has died.
+    """A worker of a pool; its process is started when there is work, and restarted after it has
+    died.
 
     Attributes:
-        number: of the worker in its pool.
-        own_group: whether the process leads a group of processes, so that what it starts ends
-            with it.
-        process, connection: the process and our end of the pipe, if there is one.
-        sessions: keys of those that it has built; used last comes last.
-        opening: what it builds.
-        tasks: what it is at, and has waiting.
-        retry_task: a task that ended the process before this one, to be tried again alone.
-        own_batches: work for this worker alone.
-        reason: why the process is about to end, in its words.
-        is_fresh: whether the process was given nothing yet.
+        number: number of the worker in its pool.
+        own_group: whether the process leads a process group, so that its child processes end with
+            it.
+        process, connection: the process and our end of the pipe, if it is started.
+        sessions: keys of the built sessions; most recently used last.
+        opening: session that it is building.
+        tasks: its running task and its waiting tasks.
+        retry_task: a task that ended the previous process, to be retried alone.
+        own_batches: work for this worker only.
+        reason: reason that the process gave for ending.
+        is_fresh: whether the process has not received any work yet.
     """
 
     number: int
@@ -109,11 +109,11 @@ class Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether it has something to do."""
+        """Whether the worker has work."""
         return bool(self.tasks)
 
     def started(self) -> list[PendingTask]:
-        """Tasks that were given to this worker, in the order in which it does them."""
+        """Tasks of this worker, in order of execution."""
         suspect = [] if self.retry_task is None else [self.retry_task]
         return [*self.tasks, *suspect, *itertools.chain.from_iterable(self.own_batches)]
 
@@ -121,16 +121,15 @@ class Worker:
         """Starts the process if there is none.
 
         Raises:
-            OSError: it cannot be started.
-        """
+            OSError: the process cannot be started."""
         if self.process is None:
             self.process, self.connection = start_worker("burg_drake.core.worker", self.own_group)
 
     def give(self, batch: Batch, calls: tuple[TaskCall, ...]) -> bool:
-        """Sends it tasks; it has to be started and idle.
+        """Sends tasks to the started and idle process.
 
         Returns:
-            False if the process has died while it was idle: the tasks are not to blame.
+            False if the process has died while it was idle, so not because of the tasks.
         """
         assert self.connection is not None
         session, opening = batch[0].task.session, None
@@ -143,7 +142,7 @@ class Worker:
         try:
             self.connection.send(TaskCalls(calls, opening))
         except OSError:
-            return self.is_fresh  # if it is, its pipe's end tells the pool
+            return self.is_fresh  # if it has died, the end of its pipe tells the pool
         finally:
             self.is_fresh = False
         return True
@@ -155,22 +154,22 @@ class Worker:
         return OpenSession(session.key, session.pickled, drop, session.limit)
 
     def send(self, message: object) -> None:
-        """Tells it something."""
+        """Sends a message to the process."""
         assert self.connection is not None
-        with contextlib.suppress(OSError):  # it has died; its pipe's end tells the pool
+        with contextlib.suppress(OSError):  # it has died; the end of its pipe tells the pool
             self.connection.send(message)
 
     def kill(self) -> None:
-        """Ends the process and what it has started."""
+        """Ends the process and, if it leads a group, its child processes."""
         if self.process is None or self.process.poll() is not None:
             return
         if self.own_group:
-            with contextlib.suppress(ProcessLookupError):  # it leads none yet
+            with contextlib.suppress(ProcessLookupError):  # it does not lead a group yet
                 os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
 
     def exit_error(self) -> tuple[WorkerDied, bool]:
-        """Why the process has ended, and whether it took too long; waits for its end."""
+        """The cause of the process's end, and whether a time limit ended it; waits for the end."""
         assert self.process is not None
         overdue = -self.process.wait() in TIME_LIMIT_SIGNALS
         cause = exit_cause(self.process, self.reason)
@@ -182,7 +181,7 @@ class Worker:
         return WorkerDied(cause, was_ended_from_outside(self.process)), overdue
 
     def clear_process(self) -> Batch:
-        """Lets go of the process, which has ended; returns what it was at."""
+        """Clears the state of the ended process; returns its unfinished tasks."""
         assert self.process is not None and self.connection is not None
         self.process.wait()
         self.connection.close()
@@ -203,16 +202,16 @@ _log = logging.getLogger("burg_drake")
 
 
 class WorkerTraceback(Exception):
-    """The cause of an error that comes from a worker: where it was raised there."""
+    """Cause of an error from a worker: its traceback there."""
 
 
 class Dispatcher:
-    """Open work and the workers that do it.
+    """Pending work and the workers that do it.
 
-    What begins with an underscore belongs to its thread.
+    Names with an underscore are used only in its thread.
 
     Attributes:
-        workers: places for processes.
+        workers: the workers.
     """
 
     def __init__(self, workers: list[Worker]) -> None:
@@ -226,7 +225,7 @@ class Dispatcher:
         self._thread.start()
 
     def put(self, batch: Batch, worker: int | None) -> None:
-        """Adds work, for one worker alone or for any."""
+        """Adds work, for one worker or, if None, for any."""
         with self._lock:
             if self._ended:
                 raise RuntimeError("cannot schedule new futures: the pool has ended")
@@ -237,13 +236,13 @@ class Dispatcher:
         self._wake()
 
     def end_task(self, future: object, force: bool) -> None:
-        """Ends a task that runs; see `WorkerFuture.interrupt` and `terminate`."""
+        """Ends a running task; see `WorkerFuture.interrupt` and `terminate`."""
         with self._lock:
             self._requests.append(lambda: self._end_task(future, force))
         self._wake()
 
     def cancel_waiting(self) -> None:
-        """Gives up what no worker has."""
+        """Cancels work that no worker has."""
         with self._lock:
             batches = [
                 *self._shared,
@@ -265,7 +264,7 @@ class Dispatcher:
         self._wake()
 
     def join(self, timeout: float | None = None) -> None:
-        """Waits until all is ended; nothing in the dispatcher's own thread."""
+        """Waits until the dispatcher has ended; does nothing in its own thread."""
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout)
 
@@ -285,7 +284,7 @@ class Dispatcher:
                     break
                 self._listen()
         finally:
-            self._end()
+            self._shut_down()
 
     def _listen(self) -> None:
         by_connection = {w.connection: w for w in self.workers if w.connection is not None}
@@ -305,24 +304,24 @@ class Dispatcher:
             return bool(self._shared) or any(worker.started() for worker in self.workers)
 
     def _assign_tasks(self) -> None:
-        """Gives idle workers something to do: first what is theirs, then the oldest work."""
-        for take in (self._take_own, self._take_any):
+        """Gives work to idle workers: first their own, then the oldest."""
+        for take in (self._next_own_batch, self._next_shared_batch):
             for worker in sorted(self.workers, key=lambda worker: worker.process is None):
                 while not worker.busy and (batch := take(worker)):
-                    self._give(worker, batch)
+                    self._send_batch(worker, batch)
 
-    def _take_own(self, worker: Worker) -> Batch | None:
+    def _next_own_batch(self, worker: Worker) -> Batch | None:
         if worker.retry_task is not None:
             suspect, worker.retry_task = worker.retry_task, None
             return deque([suspect])
         with self._lock:
             return worker.own_batches.popleft() if worker.own_batches else None
 
-    def _take_any(self, worker: Worker) -> Batch | None:
+    def _next_shared_batch(self, worker: Worker) -> Batch | None:
         with self._lock:
             return self._shared.popleft() if self._shared else None
 
-    def _give(self, worker: Worker, batch: Batch) -> None:
+    def _send_batch(self, worker: Worker, batch: Batch) -> None:
         calls = [(task, call) for task in batch if (call := _begin_task(task)) is not None]
         if not calls:
             return
@@ -342,11 +341,11 @@ class Dispatcher:
         try:
             data = worker.connection.recv_bytes()
         except (EOFError, OSError):
-            self._died(worker)
+            self._handle_worker_death(worker)
             return
         try:
             message: WorkerMessage = pickle.loads(data)
-        except Exception as error:  # a result whose class is not what it was
+        except Exception as error:  # a result whose class has changed
             if worker.tasks:
                 worker.tasks.popleft().future.set_exception(error)
             return
@@ -354,7 +353,7 @@ class Dispatcher:
         if isinstance(message, WorkerEnding):
             worker.reason = message.reason
         elif isinstance(message, SessionOpened):
-            self._opened(worker, message)
+            self._handle_opened_session(worker, message)
         elif task is None or task.number != message.number:
             pass
         elif isinstance(message, ProgressMessage):
@@ -362,7 +361,7 @@ class Dispatcher:
         else:
             _set_task_result(worker.tasks.popleft(), message)
 
-    def _opened(self, worker: Worker, message: SessionOpened) -> None:
+    def _handle_opened_session(self, worker: Worker, message: SessionOpened) -> None:
         session, worker.opening = worker.opening, None
         assert session is not None
         if message.error is None:
@@ -374,9 +373,9 @@ class Dispatcher:
         for task in tasks:
             task.future.set_exception(session.error)
 
-    def _died(self, worker: Worker) -> None:
-        """The task that a worker was at when it died is suspect, the rest of its work is kept."""
-        if self._killed:  # it is cleaned up at the end
+    def _handle_worker_death(self, worker: Worker) -> None:
+        """Handles a worker's end: its running task is retried alone, its other work is kept."""
+        if self._killed:  # cleaned up at the end
             return
         (error, overdue), session = worker.exit_error(), worker.opening
         tasks = worker.clear_process()
@@ -405,14 +404,14 @@ class Dispatcher:
                     continue
                 task.cancelled = True
                 if not (worker.tasks and task is worker.tasks[0]):
-                    continue  # it is not begun
+                    continue  # not started
                 if force:
                     worker.kill()
                 else:
                     worker.send(InterruptTask(task.number))
 
-    def _end(self) -> None:
-        """Lets idle workers end by themselves, ends the others, and all work that is left."""
+    def _shut_down(self) -> None:
+        """Lets idle workers exit, ends the others, and cancels the remaining work."""
         left: list[PendingTask] = []
         for worker in self.workers:
             if worker.process is not None and not (worker.busy or self._killed):
@@ -439,7 +438,8 @@ class Dispatcher:
 
 
 def _begin_task(task: PendingTask) -> Any:
-    """What a worker is sent of a task; None if that is not to be done, as its future says then."""
+    """The message to a worker for a task; None if the task is cancelled or cannot be sent, which
+    its future then says."""
     if not task.started and not task.future.set_running_or_notify_cancel():
         return None
     task.started = True

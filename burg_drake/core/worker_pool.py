@@ -10,13 +10,13 @@ returns results in order, and the `with` block ends the processes::
         for number, image in enumerate(pool.map(render, range(100))):
             image.save(f"{number:03d}.png")
 
-Workers are fresh interpreters connected by a pipe. They are never forked, which Drake does not
-survive, and do not import the program's main module, so that scripts and notebooks need no guard.
-Functions must therefore be defined in a module that can be imported.
+Workers are fresh interpreters connected by a pipe. They are never forked, as Drake would crash, and
+do not import the program's main module, so that scripts and notebooks need no guard. Functions must
+therefore be defined in a module that can be imported.
 
-**Sessions.** What is expensive to build (a scene with its renderer, a judge) is built once in each
-worker and passed to every task of the session as first argument. A worker keeps the last two
-sessions::
+**Sessions.** An object that is expensive to build (a scene with its renderer, a judge) is built
+once in each worker and passed to every task of the session as first argument. A worker keeps the
+last two sessions::
 
     scene = Session("kitchen", partial(SceneRenderer, "kitchen.yaml"))
     futures = [pool.submit_task(Task(render_view, (X_WC,), session=scene)) for X_WC in poses]
@@ -24,11 +24,11 @@ sessions::
 **Progress.** A task may call `report_progress(message)`; `Task.on_progress` is called with each
 message, in a thread of the pool. Outside a worker it does nothing.
 
-**Crashes, hangs, memory.** A worker that dies (a crash inside Drake, a `TimeLimit`, the system when
-memory runs out) takes no other task with it. Its task is retried alone in a fresh process; if that
-dies too, the future raises `WorkerDied`, which gives the cause and whether it came from outside. A
-task that exceeded its time limit is not retried. A session whose building ends its worker fails
-after `Session.attempts`.
+**Crashes, hangs, memory.** A worker that dies (a crash inside Drake, a `TimeLimit`, lack of memory)
+does not affect other tasks. Its task is retried alone in a fresh process; if that dies too, the
+future raises `WorkerDied`, which gives the cause and whether it came from outside. A task that
+exceeded its time limit is not retried. A session whose building ends its worker fails after
+`Session.attempts`.
 
 **Ending.** Leaving the `with` block waits for running tasks. Leaving it by an exception such as
 Ctrl-C ends the workers at once (`kill_workers`). Workers ignore keyboard interrupts and end when
@@ -57,7 +57,7 @@ T = TypeVar("T")
 
 
 class WorkerPool(Executor):
-    """Worker processes that do tasks, in any order; each is started when there is work for it."""
+    """Worker processes that run tasks, in any order; each is started when there is work for it."""
 
     def __init__(
         self,
@@ -66,13 +66,13 @@ class WorkerPool(Executor):
         retries: int = 1,
         own_group: bool = False,
     ) -> None:
-        """Starts nothing yet.
+        """Creates a pool without starting processes.
 
         Args:
-            workers: number of processes at most; as many as there are processors if None.
-            retries: how often a task is tried again whose worker dies.
-            own_group: whether each worker leads a group of processes, so that what it starts ends
-                with it; then what a terminal sends to the program's group does not reach it.
+            workers: largest number of processes; the number of processors if None.
+            retries: number of retries of a task whose worker dies.
+            own_group: whether each worker leads a process group, so that its child processes end
+                with it; signals from a terminal then do not reach it.
 
         Raises:
             InvalidInputError: workers is below 1.
@@ -86,7 +86,7 @@ class WorkerPool(Executor):
         self._closed = False
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> WorkerFuture[T]:
-        """Has a function called in a worker; see `concurrent.futures.Executor.submit`.
+        """Calls a function in a worker; see `concurrent.futures.Executor.submit`.
 
         Raises:
             RuntimeError: the pool was shut down.
@@ -94,7 +94,7 @@ class WorkerPool(Executor):
         return self.submit_task(Task(fn, args, kwargs))
 
     def submit_task(self, task: Task[T]) -> WorkerFuture[T]:
-        """Has a task done, with all that `Task` can say about it.
+        """Runs a task in a worker.
 
         Raises:
             RuntimeError: the pool was shut down.
@@ -104,10 +104,10 @@ class WorkerPool(Executor):
     def submit_tasks(
         self, tasks: Sequence[Task[T]], worker: int | None = None
     ) -> list[WorkerFuture[T]]:
-        """Has tasks done by one worker, one after the other: they travel together.
+        """Sends tasks together to one worker, which runs them one after the other.
 
         Args:
-            tasks: of the same session.
+            tasks: tasks of the same session.
             worker: number of the worker in the pool; any if None.
 
         Raises:
@@ -128,21 +128,21 @@ class WorkerPool(Executor):
         return [task.future for task in pending]
 
     def sessions(self, worker: int) -> tuple[str, ...]:
-        """Keys of the sessions that a worker has built; used last comes last."""
+        """Keys of the sessions that a worker has built; most recently used last."""
         return tuple(self._places[worker].sessions.copy())
 
     @property
     def processes(self) -> list[int]:
-        """Identifiers of the processes that there are."""
+        """Identifiers of the running processes."""
         found = [place.process for place in self._places]
         return [process.pid for process in found if process is not None]
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Takes no more tasks, and ends the workers when all are done.
+        """Accepts no more tasks, and ends the workers when all tasks are done.
 
         Args:
-            wait: until then.
-            cancel_futures: whether tasks that no worker has are given up.
+            wait: wait until the workers have ended.
+            cancel_futures: cancel tasks that no worker has.
         """
         with self._lock:
             self._closed = True
@@ -159,7 +159,7 @@ class WorkerPool(Executor):
         """Ends the workers at once; tasks that are not done raise `TaskCancelled`.
 
         Args:
-            timeout: how long to wait until they have ended [s].
+            timeout: longest time to wait for their end [s].
         """
         with self._lock:
             self._closed = True
@@ -185,7 +185,7 @@ Result = TypeVar("Result")
 
 
 class Prefetcher(Generic[Work, Result]):
-    """Results of work in its order, a few of them ahead."""
+    """Computes results in the order of the work, a few of them in advance."""
 
     def __init__(
         self,
@@ -193,23 +193,23 @@ class Prefetcher(Generic[Work, Result]):
         work: Iterable[Work],
         task: Callable[[Work], Task[Result]],
     ) -> None:
-        """Begins nothing yet.
+        """Creates a prefetcher without starting work.
 
         Args:
-            pool: whose workers do it; it is ended by who has made it.
-            work: asked for as needed.
-            task: what is to be done about a piece of work.
+            pool: pool of the workers; its creator ends it.
+            work: pieces of work, consumed as needed.
+            task: returns the task for a piece of work.
         """
         self._pool, self._work, self._task = pool, iter(work), task
         self._ahead: deque[tuple[Work, WorkerFuture[Result]]] = deque()
 
     def ready(self) -> bool:
-        """Whether `take` returns at once."""
+        """Whether `take` returns without waiting."""
         self._fill()
         return not self._ahead or self._ahead[0][1].done()
 
     def take(self) -> tuple[Work, Result | BaseException] | None:
-        """The next work and its result, or the error; None when there is no more. Waits for it."""
+        """Waits for the next work and its result or error; None at the end."""
         self._fill()
         if not self._ahead:
             return None
@@ -230,15 +230,15 @@ def map_unordered(
     workers: int,
     check: Callable[[Work], object] | None = None,
 ) -> Generator[tuple[Work, Result | BaseException], None, None]:
-    """Results of a function as they come; one that fails does not end the others.
+    """Yields results of a function in order of completion; an error does not stop the others.
 
     Args:
-        function: importable where there are several workers.
-        work: its arguments, begun in this order.
-        workers: number of processes; with one, or one piece of work, this process does it. What
-            ends its worker is not tried again.
-        check: is called with each argument before the function is with any. What it raises is the
-            outcome of that argument.
+        function: the function; importable if there are several workers.
+        work: its arguments, started in this order.
+        workers: number of processes; with one, or one piece of work, this process does it. Work
+            that ends its worker is not retried.
+        check: called with all arguments before the first call of the function. Its error is the
+            result for that argument.
 
     Yields:
         The argument, and the result or the error. Closing the iterator ends the workers, with the
@@ -264,7 +264,7 @@ def map_unordered(
 def _completed_work(
     function: Callable[[Work], Result], work: Sequence[Work], pool: WorkerPool | None
 ) -> Iterator[tuple[int, Work, Result | BaseException]]:
-    """Place, argument and outcome of each piece of work as they come."""
+    """Yields index, argument and result of each piece of work in order of completion."""
     if pool is None:
         for place, item in enumerate(work):
             yield place, item, _run_item(function, item)

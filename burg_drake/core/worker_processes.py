@@ -25,12 +25,12 @@ from burg_drake.core.errors import InvalidInputError
 
 
 class AllocatorSettings:
-    """Where allocators are found, and the environment variables that choose and preload one."""
+    """Paths of allocators, and the environment variables that choose and preload one."""
 
     variable = "BURG_DRAKE_ALLOCATOR"  # Path of a library, or `none`.
     preload_variable = "LD_PRELOAD"
-    wheel_library = "cmeel.prefix/lib/libmimalloc.so"  # Of the package cmeel-mimalloc.
-    # Of distributions, best first (`benchmarks/allocators.py`).
+    wheel_library = "cmeel.prefix/lib/libmimalloc.so"  # From the package cmeel-mimalloc.
+    # From Linux distributions, best first (`benchmarks/allocators.py`).
     system_libraries = (
         "libtcmalloc_minimal.so.4",
         "libjemalloc.so.2",
@@ -57,13 +57,13 @@ _log = logging.getLogger("burg_drake")
 
 
 def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
-    """What is to be added to the environment in which a worker starts; nothing but on Linux.
+    """Environment variables to add for a worker, to preload an allocator; empty except on Linux.
 
-    The variable `BURG_DRAKE_ALLOCATOR` has the path of a library, or `none`. What the user preloads
-    comes first and stays, and if that brings an allocator, nothing is added.
+    The variable `BURG_DRAKE_ALLOCATOR` has the path of a library, or `none`. Libraries that the
+    user preloads come first, and if they include an allocator, nothing is added.
 
     Args:
-        environment: that of this process; in it libraries are tried, too.
+        environment: environment of this process, in which libraries are also tested.
     """
     given = environment.get(AllocatorSettings.variable, "").strip()
     if sys.platform != "linux" or given.lower() == "none" or _address_space_is_limited():
@@ -81,7 +81,7 @@ def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str
 
 
 def restore_preload(before: str | None) -> None:
-    """Called by a worker: what it starts is preloaded with what its parent was.
+    """Restores `LD_PRELOAD` in a worker, for its child processes.
 
     Args:
         before: the parent's `LD_PRELOAD`, if any.
@@ -95,11 +95,11 @@ def restore_preload(before: str | None) -> None:
 def installed_allocators(
     folders: Sequence[str] | None = None, system: Sequence[str] | None = None
 ) -> Iterator[Path]:
-    """Libraries that may do, the one to be tried first first.
+    """Candidate allocator libraries, best first.
 
     Args:
-        folders: where packages are looked for; where Python does if None.
-        system: where libraries of the system are; the usual places if None.
+        folders: folders of Python packages; those of Python if None.
+        system: folders of system libraries; the usual ones if None.
     """
     for folder in sys.path if folders is None else folders:
         path = Path(folder, AllocatorSettings.wheel_library)
@@ -112,25 +112,26 @@ def installed_allocators(
 
 
 def _system_folders() -> list[str]:
-    """Where libraries are: of this environment (conda), of Debian's kind, of the others."""
+    """Folders of libraries: of this environment (conda), of Debian and its derivatives, of
+    others."""
     debian = f"/usr/lib/{platform.machine()}-linux-gnu"
     return [f"{sys.prefix}/lib", "/usr/local/lib", debian, "/usr/lib64", "/usr/lib"]
 
 
 def _address_space_is_limited() -> bool:
-    """Whether this process may have so much address space only (`ulimit -v`), of which allocators
-    reserve far more than they use."""
+    """Whether the address space of this process is limited (`ulimit -v`); allocators reserve far
+    more than they use."""
     return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
 
 
 @functools.lru_cache(maxsize=16)
 def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str], ...]) -> bool:
-    """Whether a process that is started with it works, has its malloc, and complains of nothing.
+    """Whether a process that preloads a library works, uses its malloc, and reports no error.
 
     Args:
         path: the library.
-        changed: when [ns]; another one is tried again.
-        environment: of the process, with the library in `LD_PRELOAD`.
+        changed: modification time [ns]; a changed library is tested again.
+        environment: environment of the process, with the library in `LD_PRELOAD`.
     """
     try:
         tried = subprocess.run(
@@ -152,7 +153,7 @@ def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str
 
 @functools.cache
 def _warn_unusable(given: str) -> None:
-    """One line a process."""
+    """Logs once per process that a library cannot be used."""
     path = os.path.abspath(os.path.expanduser(given))
     why = "is not an allocator that can be preloaded on this system"
     if not os.path.exists(path):
@@ -176,7 +177,7 @@ def default_workers() -> int:
 
 
 def worker_count(workers: int | None) -> int:
-    """A number of workers that was asked for; as many as there are processors if None.
+    """The given number of workers; the number of processors if None.
 
     Raises:
         InvalidInputError: it is below 1.
@@ -190,16 +191,15 @@ def worker_count(workers: int | None) -> int:
 def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes], Connection]:
     """Starts a process with our import path.
 
-    An interrupt from the keyboard reaches the whole group of processes. Workers start with it
-    blocked: the parent alone decides what it means. They end when their parent does, also while
-    they are at work and do not look at their pipe: a parent that is killed cannot end them.
-
-    They have a faster allocator where there is one, see `worker_preload`; what they start does not.
+    A keyboard interrupt reaches the whole process group. Workers start with it blocked, so that
+    only the parent handles it. They end when their parent does, even while they work and do not
+    read their pipe, as a killed parent cannot end them. They use a faster allocator if there is
+    one, see `worker_preload`; their child processes do not.
 
     Args:
-        module: has a function `main(handle: int)`, called with the file descriptor of its end of
-            the pipe.
-        arguments: of that function, after the first.
+        module: module with a function `main(handle: int)`, called with the file descriptor of its
+            end of the pipe.
+        arguments: further arguments of that function.
 
     Returns:
         The process and our end of the pipe.
@@ -230,7 +230,7 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
 
 
 def end_with_parent(parent: int) -> None:
-    """Has this process end as soon as its parent, a process identifier, is another one."""
+    """Ends this process as soon as its parent is not the process `parent` any more."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -241,11 +241,11 @@ def end_with_parent(parent: int) -> None:
 
 
 def exit_cause(process: subprocess.Popen[bytes], reason: str = "") -> str:
-    """Why a worker process ended, in half a sentence; waits for its end.
+    """Cause of a worker process's end, as half a sentence; waits for its end.
 
     Args:
         process: the worker.
-        reason: what it has said itself about that.
+        reason: the worker's own explanation.
     """
     code = process.wait()
     if code < 0:
@@ -256,7 +256,7 @@ def exit_cause(process: subprocess.Popen[bytes], reason: str = "") -> str:
 
 
 def was_ended_from_outside(process: subprocess.Popen[bytes]) -> bool:
-    """Whether memory ran out, or a batch system or a user ended a worker; waits for its end.
+    """Whether lack of memory, a batch system or a user ended a worker; waits for its end.
 
     Other signals, such as SIGSEGV, would recur.
     """

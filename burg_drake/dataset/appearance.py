@@ -111,14 +111,15 @@ def _require_seed(seed: int | None, name: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class DirectedLight:
-    """A light far away.
+    """A directional light.
 
     Attributes:
-        direction: that it shines in.
-        frame: of the direction: the world, or that of the camera, with which the light goes.
-        irradiance: of a surface that faces it: with 1, a white one is white in the image.
-        color: red, green, blue, linear.
-        shadows: whether it casts them with Drake's renderer; with Blender those of the world do.
+        direction: direction in which the light shines.
+        frame: frame of the direction: the world, or the camera, with which the light moves.
+        irradiance: irradiance of a surface that faces the light; 1 makes a white surface white in
+            the image.
+        color: linear red, green, blue.
+        shadows: whether it casts shadows in Drake's renderer; in Blender lights in the world do.
     """
 
     RANGES: ClassVar[Ranges] = {"irradiance": (0.0, MAX_GAIN)}
@@ -144,8 +145,8 @@ class TableSurface:
     """The pattern on a table.
 
     Attributes:
-        pattern: its kind.
-        seed: of all that is random about it.
+        pattern: kind of pattern.
+        seed: seed of the pattern.
     """
 
     pattern: Pattern
@@ -157,14 +158,14 @@ class TableSurface:
 
 @dataclass(frozen=True, kw_only=True)
 class Photometry:
-    """How a camera makes a picture of the light that falls on it.
+    """Response of a camera to light.
 
     Attributes:
-        exposure: [stops].
-        white_balance: gains of red, green, blue, linear.
-        gamma: exponent that is left in the picture: light to the power of 1 / gamma.
-        blur: standard deviation [pixels].
-        electrons: that a white pixel collects; no noise if None.
+        exposure: exposure [stops].
+        white_balance: linear gains of red, green, blue.
+        gamma: residual gamma: light is raised to the power of 1 / gamma.
+        blur: standard deviation of the blur [pixels].
+        electrons: electrons of a white pixel, for shot noise; no noise if None.
     """
 
     RANGES: ClassVar[Ranges] = {
@@ -173,7 +174,7 @@ class Photometry:
         "blur": (0.0, 100.0),
         "electrons": (1.0, 1e12),
     }
-    """Allowed values of a camera, far beyond those that looks are sampled from."""
+    """Allowed values of a camera, far beyond the ranges of `AppearanceSettings`."""
 
     exposure: float = 0.0
     white_balance: Vector3 = WHITE_LIGHT
@@ -188,11 +189,11 @@ class Photometry:
 
 @dataclass(frozen=True, kw_only=True)
 class Distractor:
-    """A thing on the table that has no label.
+    """An unlabelled object on the table.
 
     Attributes:
         object: name in the library of distractors.
-        X_SO: its pose in the scene frame.
+        X_SO: pose in the scene frame.
     """
 
     object: str
@@ -201,19 +202,19 @@ class Distractor:
 
 @dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """How a scene looks. Without anything it looks as simulated cameras always see it.
+    """Appearance of a scene. The default is that of simulated cameras.
 
     Attributes:
-        lights: the usual ones if there are none.
-        room: seed of the room behind the table; an even grey if None.
-        room_light: irradiance of the table by the room's picture, as of lights; none if 0.
-        table: its pattern; its own colour if None.
-        board: whether the printed board is seen.
-        photometry: of the image.
-        object_gains: of red, green and blue of each instance, linear, in the order of labels;
-            nothing is changed if empty.
-        library: that distractors are from: a built-in name, or a folder.
-        distractors: on the table.
+        lights: lights; the default lights if empty.
+        room: seed of the room behind the table; a uniform grey if None.
+        room_light: irradiance of the table by the room's environment map; not lit by it if 0.
+        table: pattern of the table; its own colour if None.
+        board: whether the printed board is visible.
+        photometry: camera response.
+        object_gains: linear gains of red, green and blue of each instance, in the order of labels;
+            no change if empty.
+        library: library of the distractors: a built-in name, or a folder.
+        distractors: unlabelled objects on the table.
     """
 
     RANGES: ClassVar[Ranges] = {"room_light": (0.0, MAX_GAIN)}
@@ -242,19 +243,19 @@ class Appearance:
             _require_gains(gains, "object_gains")
 
     def plain(self) -> dict[str, Any]:
-        """As dicts, lists, numbers and texts, for JSON and YAML; `read_appearance` reads it."""
+        """The appearance as dicts, lists, numbers and strings, for `read_appearance`."""
         found: dict[str, Any] = plain_data(self)
         return found
 
 
 def read_appearance(data: Mapping[str, Any], name: str = "appearance") -> Appearance:
-    """An appearance from plain data.
+    """Reads an appearance from plain data.
 
     Args:
-        data: as `Appearance.plain` gives it.
-        name: stands for the place that it is from in messages.
+        data: as `Appearance.plain` returns it.
+        name: source of the data, for messages.
 
     Raises:
-        DocumentError: it does not fit; the message names the key.
+        DocumentError: the data are invalid; the message names the key.
     """
     return read_plain_data(data, Appearance, name)

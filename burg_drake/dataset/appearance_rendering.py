@@ -46,14 +46,14 @@ from burg_drake.station import DEFAULT_LIGHTS, StationDiagram, add_renderer
 
 
 def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
-    """Makes a diagram look like that: `place_appearance`, and a renderer with its light.
+    """Applies an appearance to a diagram: `place_appearance`, and a renderer with its lights.
 
     Args:
-        built, appearance: see there.
+        built, appearance: as for `place_appearance`.
 
     Returns:
-        The renderer's name, for `RenderCameraCore`. Its images need `fill_background`, then
-        `apply_photometry`.
+        The renderer's name, for `RenderCameraCore`. Apply `fill_background`, then
+        `apply_photometry`, to its images.
 
     Raises:
         MissingDependencyError, InvalidInputError: see `add_renderer`.
@@ -66,13 +66,13 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
 
 
 def place_appearance(built: StationDiagram, appearance: Appearance) -> None:
-    """Gives a diagram the surfaces of an appearance, which rays meet, too: covers the table with
-    its pattern, takes the printed board away, and puts distractors onto the table. Contact and
-    poses stay as they are; no system libraries are needed.
+    """Adds the surfaces of an appearance to a diagram, for renderers and ray casting: the pattern
+    of the table and the distractors; removes the printed board if it shall not be visible. Contact
+    and poses stay the same. Needs no system libraries.
 
     Args:
-        built: whose board has markers, and before a context of it is created.
-        appearance: how it shall look.
+        built: diagram whose board has markers, without a context so far.
+        appearance: the appearance.
 
     Raises:
         UnknownNameError: there is no such library of distractors, or no such object in it.
@@ -87,8 +87,8 @@ def place_appearance(built: StationDiagram, appearance: Appearance) -> None:
 
 
 def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:
-    """Parameters of Drake's renderer: its lights, whether they cast shadows, and the picture of the
-    room if that lights the scene. Lights add up linearly."""
+    """Parameters of Drake's renderer: its lights, whether they cast shadows, and the environment
+    map if the room lights the scene. Lights add up linearly."""
     shadows = any(light.shadows for light in appearance.lights)
     parameters = RenderEngineVtkParams(
         default_clear_color=np.array(NO_SURFACE_COLOR) / 255.0,
@@ -104,13 +104,14 @@ def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:
 
 
 def environment_file(appearance: Appearance) -> Path:
-    """The light of a room, as a file that Drake's `EquirectangularMap` takes: in the cache, or in
-    the folder of temporary files if there is no cache.
+    """Writes the radiance map of a room as a file for Drake's `EquirectangularMap`, in the cache,
+    or in the folder of temporary files without a cache.
 
-    It is a Radiance HDR file: Drake takes a PNG's values for linear ones, and 30 times as long.
+    The format is Radiance HDR, as Drake takes a PNG's values for linear ones and loads it 30 times
+    as long.
 
     Raises:
-        InvalidInputError: there is no room.
+        InvalidInputError: the appearance has no room.
     """
     if appearance.room is None:
         raise InvalidInputError("the appearance has no room, so it has no environment")
@@ -126,8 +127,8 @@ def environment_file(appearance: Appearance) -> Path:
 
 
 def _remove_old_environment_files(folder: Path) -> None:
-    """Removes files of rooms that nobody can be about to read any more."""
-    max_age = 86_400.0  # Seconds, after which no process still waits to read a file.
+    """Removes environment files that are too old to be still in use."""
+    max_age = 86_400.0  # Seconds, after which no process still has to read a file.
     for path in folder.glob("room-*.hdr"):
         with contextlib.suppress(OSError):  # another process has removed it
             if time.time() - path.stat().st_mtime > max_age:
@@ -135,13 +136,13 @@ def _remove_old_environment_files(folder: Path) -> None:
 
 
 def _drake_light(light: DirectedLight, shadows: bool) -> LightParameter:
-    """A light for Drake, whose physically based shading divides by pi what a white surface
-    reflects.
+    """Converts a light for Drake, whose physically based shading divides the light that a white
+    surface reflects by pi.
 
     Args:
-        light: far away.
-        shadows: whether any light of the scene casts shadows: all directional ones do then, but
-            points do not. Otherwise directional ones are quicker.
+        light: the light.
+        shadows: whether any light of the scene casts shadows. Then all directional lights of Drake
+            do, so that lights without shadows become point lights; directional ones are faster.
     """
     point_light_distance = 50.0  # Metres.
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
@@ -159,7 +160,7 @@ def _drake_light(light: DirectedLight, shadows: bool) -> LightParameter:
 
 
 def _cover_table(built: StationDiagram, appearance: Appearance) -> None:
-    """Puts a box with the texture in the place of the one that cameras see."""
+    """Replaces the visible box of the table with a textured one."""
     assert appearance.table is not None
     table = built.plant.get_body(built.table)
     inspector = built.scene_graph.model_inspector()
@@ -199,7 +200,7 @@ def _add_shadow_speck(built: StationDiagram) -> None:
 
 
 def _hide_from_cameras(built: StationDiagram, body: RigidBody) -> None:
-    """Takes what cameras see of a body away from them."""
+    """Hides a body from cameras."""
     source = built.plant.get_source_id()
     inspector = built.scene_graph.model_inspector()
     for geometry in built.plant.GetVisualGeometriesForBody(body):
@@ -208,7 +209,7 @@ def _hide_from_cameras(built: StationDiagram, body: RigidBody) -> None:
 
 
 def _unlabelled_geometry(X_FG: RigidTransform, shape: Shape, name: str) -> GeometryInstance:
-    """What cameras see, and no label tells of."""
+    """Visible geometry without a label of its own."""
     properties = PerceptionProperties()
     properties.AddProperty("label", "id", RenderLabel.kDontCare)
     instance = GeometryInstance(X_FG, shape, name)
@@ -217,13 +218,13 @@ def _unlabelled_geometry(X_FG: RigidTransform, shape: Shape, name: str) -> Geome
 
 
 def textured_box(size: Array, extent: float, png: bytes) -> Mesh:
-    """A box around the origin. Its faces are laid with squares, each of which shows the texture
-    once, as Drake's renderer does not repeat it.
+    """A textured box around the origin. Its faces are tiled with squares that show the texture
+    once each, as Drake's renderer does not repeat textures.
 
     Args:
         size: (3,) extents [m].
         extent: side of a square [m].
-        png: the texture; opposite edges of it fit.
+        png: a seamless texture.
     """
     # Wavefront material that shows only the texture.
     material = "newmtl surface\nKd 1 1 1\nmap_Kd surface.png\n"
@@ -256,7 +257,7 @@ def textured_box(size: Array, extent: float, png: bytes) -> Mesh:
 
 
 def _texture_tiles(size: Array, extent: float) -> list[tuple[Array, Array]]:
-    """Lower and upper corners (2,) of squares that cover a rectangle; the last ones are cut."""
+    """Lower and upper corners (2,) of squares that tile a rectangle; the last ones are clipped."""
     x, y = (np.append(np.arange(0.0, length - 1e-9, extent), length) for length in size)
     return [
         (np.array([x[i], y[j]]), np.array([x[i + 1], y[j + 1]]))

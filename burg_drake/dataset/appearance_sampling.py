@@ -38,13 +38,13 @@ UNIT_CUBE_CORNERS = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
 
 @dataclass(frozen=True, eq=False)
 class FreeTable:
-    """The table of a scene, seen from above in the scene frame.
+    """Free area of a scene's table, seen from above in the scene frame.
 
     Attributes:
-        X_ST: (4, 4) of the table's middle.
-        half: (2,) half of its extents [m].
-        rectangles: lower and upper corners (2, 2) of what is kept free of, [m].
-        circles: middles and radii (3,) of the same [m].
+        X_ST: (4, 4) pose of the table's middle.
+        half: (2,) half extents of the table [m].
+        rectangles: lower and upper corners (2, 2) of occupied rectangles [m].
+        circles: centres and radii (3,) of occupied circles [m].
     """
 
     X_ST: Array
@@ -53,7 +53,7 @@ class FreeTable:
     circles: list[Array]
 
     def place(self, radius: float, rng: np.random.Generator) -> Array | None:
-        """(2,) middle of a circle that is free, which is taken then; None if none is found."""
+        """Draws a free circle and marks it as occupied. Returns its centre (2,), or None."""
         room = self.half - radius
         if (room <= 0.0).any():
             return None
@@ -74,13 +74,13 @@ class FreeTable:
 def place_distractors(
     settings: AppearanceSettings, scene: Scene, station: Station, rng: np.random.Generator
 ) -> tuple[Distractor, ...]:
-    """Draws things and their places: on the table in a stable pose, their bounding circles clear of
-    those of the scene's objects, of obstacles, the arm's base and, unless allowed, the board. What
-    the scene itself has of the library is none.
+    """Draws distractors and their poses: on the table in a stable pose, their bounding circles
+    clear of the scene's objects, of obstacles, the arm's base and, unless allowed, the board.
+    Objects that are part of the scene are not used.
 
     Raises:
         UnknownNameError: there is no such library.
-        InvalidInputError: no object of it has a stable pose.
+        InvalidInputError: no object of the library has a stable pose.
     """
     low, high = settings.distractors
     count = int(rng.integers(low, high + 1))
@@ -112,7 +112,7 @@ def place_distractors(
 
 
 def distractor_boxes(look: Appearance) -> tuple[PlacedBox, ...]:
-    """Boxes around the things of a look, in the scene frame.
+    """Bounding boxes of an appearance's distractors, in the scene frame.
 
     Raises:
         UnknownNameError: there is no such library, or no such object in it.
@@ -128,12 +128,12 @@ def distractor_boxes(look: Appearance) -> tuple[PlacedBox, ...]:
 
 @lru_cache(maxsize=4)
 def distractor_library(reference: str) -> ObjectLibrary:
-    """The library of distractors; kept, as to read one takes longer than all else."""
+    """The library of distractors; cached, as loading takes longer than the rest of drawing."""
     return load_library(reference)
 
 
 def free_table(scene: Scene, station: Station, on_board: bool) -> FreeTable:
-    """The table as a scene leaves it."""
+    """The table area that a scene leaves free."""
     document = station.document
     X_SW = inverse(document.X_WS.matrix())
     boxes = [corners[:, :2] for corners in obstacle_corners(station)]
@@ -152,8 +152,8 @@ def free_table(scene: Scene, station: Station, on_board: bool) -> FreeTable:
 
 
 def bounding_circle(entry: ObjectEntry, X_SO: Array) -> tuple[Array, float]:
-    """Middle (2,) and radius of a circle that an object stays within, seen from above [m]: around
-    the corners of its bounding box."""
+    """Centre (2,) and radius of a circle around the corners of an object's bounding box, seen from
+    above [m]."""
     lower, upper = np.array(entry.lower), np.array(entry.upper)
     corners = transform_points(X_SO, lower + UNIT_CUBE_CORNERS * (upper - lower))[:, :2]
     middle = corners.mean(axis=0)
@@ -166,23 +166,23 @@ def draw_appearance(
     station: StationLike,
     rng: np.random.Generator,
 ) -> Appearance:
-    """Draws how a scene looks.
+    """Draws the appearance of a scene.
 
     Args:
         settings: ranges and choices.
-        scene: that stands on the station; distractors stay clear of its objects.
-        station: has the table.
-        rng: draws; the same one gives the same appearance.
+        scene: scene on the station; distractors stay clear of its objects.
+        station: station with the table.
+        rng: random numbers; the same state gives the same appearance.
 
     Raises:
         UnknownNameError: there is no such library of distractors.
-        InvalidInputError: no object of it can stand.
+        InvalidInputError: no object of that library has a stable pose.
     """
     scene, station = as_scene(scene), as_station(station)
     objects = len(scene.instances) + len(scene.background)
     room = int(rng.integers(1 << 32)) if rng.random() < settings.room else None
     by_room = room is not None and rng.random() < settings.room_light
-    # of the table by all lights, where a white surface is white at 1, and the room's share of it
+    # irradiance of the table by all lights (at 1 a white surface is white), and the room's share
     irradiance = float(rng.uniform(0.75, 1.0))
     share = float(rng.uniform(0.3, 0.7)) if by_room else 0.0
     return Appearance(
@@ -201,8 +201,8 @@ def draw_appearance(
 def _draw_lights(
     settings: AppearanceSettings, total: float, camera_light: bool, rng: np.random.Generator
 ) -> tuple[DirectedLight, ...]:
-    """Lights that give the table so much irradiance together, by the settings; with one that goes
-    with the camera if wanted."""
+    """Draws lights with the total irradiance `total` on the table, with one that moves with the
+    camera if `camera_light`."""
     if settings.lights is None:
         return ()
     low, high = settings.lights
@@ -245,10 +245,10 @@ def _draw_light_color(settings: AppearanceSettings, rng: np.random.Generator) ->
 
 
 def color_of_temperature(kelvin: float) -> Vector3:
-    """Linear red, green, blue of a black body, relative to one of 6500 K, with green at 1; half
-    of the difference, as cameras balance most of it.
+    """Linear red, green, blue of a black body relative to one of 6500 K, with green at 1. Takes the
+    square root of the ratio, as cameras balance most of the difference.
 
-    By Planck's law at the wavelengths of sRGB's primaries, which is as good as needed here.
+    By Planck's law at the wavelengths of sRGB's primaries, which is accurate enough here.
     """
     wavelength = np.array([612e-9, 549e-9, 464e-9])  # dominant ones of sRGB's primaries [m]
     hc_k = 1.438777e-2  # second radiation constant [m K], CODATA 2018

@@ -37,7 +37,7 @@ BLENDER_INSTALL_ADVICE = (
 
 
 def blender_command() -> list[str]:
-    """The command line of the process that renders.
+    """Command line of the rendering process.
 
     Raises:
         MissingDependencyError: there is no Blender, or `BURG_DRAKE_BLENDER` names none.
@@ -65,27 +65,26 @@ def blender_command() -> list[str]:
 
 
 class Blender:
-    """A process that renders scenes, one after the other; it ends when this one does.
+    """A rendering process, which ends with the process that started it.
 
-    It uses as many threads as `OMP_NUM_THREADS` says, or as there are processors; images are the
-    same with any number.
+    The number of threads is `OMP_NUM_THREADS`, or that of processors; it does not change images.
 
     Attributes:
-        version: of Blender.
+        version: version of Blender.
 
     Args:
-        command: that starts it.
+        command: command line of the process.
 
     Raises:
-        MissingDependencyError: it has no bpy.
-        SimulationError: it ended at once.
+        MissingDependencyError: the program has no bpy.
+        SimulationError: the process ended at once.
     """
 
     def __init__(self, command: list[str]) -> None:
         self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115, closed in `close`
         foreign: tuple[str, ...] = ()
         if os.environ.get(BLENDER_ENVIRONMENT_VARIABLE):
-            foreign = ("PYTHONPATH", "PYTHONHOME")  # which another Python must not inherit
+            foreign = ("PYTHONPATH", "PYTHONHOME")  # another Python must not inherit them
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -100,7 +99,7 @@ class Blender:
 
     @property
     def alive(self) -> bool:
-        """It runs."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def image(
@@ -111,21 +110,20 @@ class Blender:
         X_WC: Array,
         clip: tuple[float, float],
     ) -> Bytes:
-        """What a pinhole camera sees.
+        """Renders the image of a pinhole camera.
 
         Args:
-            scene: kept from one call to the next as long as it is the same object.
+            scene: the scene; sent to the process only if it is another object than before.
             poses: `X_WB` (4, 4) of the bodies.
             intrinsics: of the camera.
-            X_WC: (4, 4) its optical frame in the world.
-            clip: depths that what is seen is between [m].
+            X_WC: (4, 4) pose of the camera's optical frame in the world.
+            clip: near and far clipping depth [m].
 
         Returns:
-            (H, W, 4) sRGB, and the share of each pixel that anything is in, which colours are not
-            multiplied by.
+            (H, W, 4) sRGB and coverage of each pixel by surfaces, not premultiplied.
 
         Raises:
-            SimulationError: Blender failed, or ended; the message has its last lines.
+            SimulationError: Blender failed, or ended; the message has its last lines of output.
         """
         with self._lock, tempfile.TemporaryDirectory(prefix="burg_drake-") as name:
             folder = Path(name)
@@ -160,13 +158,13 @@ class Blender:
 
     def _send_request(self, when: str, **task: Any) -> None:
         assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # it has ended, which the answer tells
+        with contextlib.suppress(BrokenPipeError):  # reading the answer reports the end
             self._process.stdin.write(json.dumps(task).encode() + b"\n")
             self._process.stdin.flush()
         try:
             error = self._read_response(when).get("error")
         except BaseException:
-            self._process.kill()  # an answer that nobody waits for must not be taken for the next
+            self._process.kill()  # a late answer must not be taken for that of the next request
             raise
         if error is not None:
             raise SimulationError(f"Blender failed while {when}: {error}")
@@ -174,7 +172,7 @@ class Blender:
     def _read_response(self, when: str) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
-        while line.endswith(b"\n") and not line.startswith(b"{"):  # what Blender says of itself
+        while line.endswith(b"\n") and not line.startswith(b"{"):  # Blender's own messages
             line = self._process.stdout.readline()
         if not line.endswith(b"\n"):
             code = self._process.wait()
@@ -196,11 +194,11 @@ class Blender:
 
 
 def running_blender() -> Blender:
-    """The process that this one renders with, started when it is first needed, or has ended.
+    """The rendering process of this process, started if it is not running.
 
     Raises:
         MissingDependencyError: there is no Blender.
-        SimulationError: it ended at once.
+        SimulationError: the process ended at once.
     """
     command = tuple(blender_command())
     found = _start_blender(command)

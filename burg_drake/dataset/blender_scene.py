@@ -28,10 +28,10 @@ Color = tuple[float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """How a surface reflects light.
+    """Reflection of light by a surface.
 
     Attributes:
-        color: red, green, blue, linear, and opacity; multiplies the texture.
+        color: linear red, green, blue, and opacity; multiplied with the texture.
         metallic: 0 for a dielectric, 1 for a metal.
         roughness: 0 for a mirror, 1 for chalk.
         texture: PNG in sRGB; none if empty.
@@ -48,12 +48,12 @@ class PaintedSurface:
     """Triangles of one material.
 
     Attributes:
-        body: number of the body that they belong to.
+        body: number of the body.
         vertices: (V, 3) in the body's frame [m].
-        faces: (F, 3).
-        material: of all of them.
-        normals: (V, 3) of the vertices, in the body's frame, if they are known.
-        uv: (V, 2) place in the texture, from its lower left corner, if it has one.
+        faces: (F, 3) triangles.
+        material: material of all triangles.
+        normals: (V, 3) vertex normals in the body's frame, if the file has them.
+        uv: (V, 2) texture coordinates, from the lower left corner, if there is a texture.
     """
 
     body: str
@@ -67,13 +67,13 @@ class PaintedSurface:
 def painted_surfaces(
     plant: MultibodyPlant, scene_graph: SceneGraph, *, linear: bool
 ) -> tuple[PaintedSurface, ...]:
-    """All that renderers see: the triangles of `visible_surfaces`.
+    """The triangles of `visible_surfaces`, with their materials.
 
     Args:
-        plant: has the bodies.
-        scene_graph: has the shapes.
-        linear: whether colours of shapes and OBJ files are linear, as Drake's physically based
-            shading takes them, or sRGB, as its simple shading does.
+        plant: plant with the bodies.
+        scene_graph: scene graph with the shapes.
+        linear: whether colours of shapes and OBJ files are linear, as in Drake's physically based
+            shading, or sRGB, as in its simple shading.
     """
     inspector = scene_graph.model_inspector()
     seen = inspector.GetGeometryIds(GeometrySet(inspector.GetAllGeometryIds()), Role.kPerception)
@@ -94,12 +94,12 @@ def _diffuse_color(properties: GeometryProperties) -> Color:
 
 @dataclass(frozen=True)
 class _Painter:
-    """Makes surfaces of one shape.
+    """Makes the surfaces of one shape.
 
     Attributes:
-        body: that has the shape.
-        color: of the shape, if its file has none.
-        linear: whether such colours, and those of OBJ files, are.
+        body: number of the shape's body.
+        color: colour of the shape, for files without colours.
+        linear: whether this colour and those of OBJ files are linear.
     """
 
     body: str
@@ -117,7 +117,7 @@ class _Painter:
         for mesh, X_GM in _load_meshes(shape):
             vertices = transform_points(X_GM, np.asarray(mesh.vertices)) * scale
             normals = None
-            if "vertex_normals" in mesh._cache:  # that the file has, and are not computed
+            if "vertex_normals" in mesh._cache:  # normals of the file, not computed ones
                 normals = mesh.vertex_normals @ X_GM[:3, :3].T / scale @ X_BG[:3, :3].T
             yield PaintedSurface(
                 self.body,
@@ -129,7 +129,7 @@ class _Painter:
             )
 
     def _material(self, found: Any) -> Material:
-        """That of a mesh file; of one that has none, the colour of the shape."""
+        """Material from a mesh file; without one, from the colour of the shape."""
         if isinstance(found, trimesh.visual.material.PBRMaterial):
             return _gltf_material(found)
         if found is None or found.name is None:
@@ -145,7 +145,7 @@ class _Painter:
 
 
 def _gltf_material(found: Any) -> Material:
-    """The material of a glTF file, whose numbers are linear and default to 1."""
+    """Material from a glTF file, whose values are linear and default to 1."""
     color = (255,) * 4 if found.baseColorFactor is None else found.baseColorFactor
     r, g, b, a = (np.asarray(color, float) / 255.0).tolist()
     return Material(
@@ -157,7 +157,7 @@ def _gltf_material(found: Any) -> Material:
 
 
 def _load_meshes(shape: Mesh) -> Iterator[tuple[trimesh.Trimesh, Array]]:
-    """The meshes of a file, one a material, each with its pose and scale (4, 4) in the file."""
+    """Meshes of a file, one per material, each with its pose and scale (4, 4) in the file."""
     source = shape.source()
     if source.is_path():
         loaded = trimesh.load_scene(source.path(), process=False)
@@ -184,16 +184,16 @@ def _encode_texture(image: Image.Image | None) -> bytes:
 
 @dataclass(frozen=True, kw_only=True)
 class Lamp:
-    """A light far away.
+    """A directional light in Blender.
 
     Attributes:
-        direction: that it shines in.
-        frame: of the direction: the world, or that of the camera, as OpenCV has it.
-        irradiance: of a surface that faces it [W/m^2]: one that is white and gets pi is white in
-            the image.
-        color: red, green, blue, linear.
-        shadows: whether it casts them.
-        angle: that its disc takes, which makes the edges of shadows soft [rad].
+        direction: direction in which the lamp shines.
+        frame: frame of the direction: the world, or the camera's optical frame.
+        irradiance: irradiance of a surface that faces the lamp [W/m^2]; pi makes a white surface
+            white in the image.
+        color: linear red, green, blue.
+        shadows: whether it casts shadows.
+        angle: angular diameter of its disc, which softens the edges of shadows [rad].
     """
 
     direction: Vector3
@@ -206,15 +206,15 @@ class Lamp:
 
 @dataclass(frozen=True, eq=False)
 class BlenderScene:
-    """What there is to be rendered.
+    """A scene for Blender.
 
     Attributes:
-        surfaces: everything that can be seen; poses of their bodies come with each view.
-        lamps: that shine on it.
-        environment: light from all around, as the content of a Radiance file: the first row up, the
-            middle of a row along x of the world, a quarter of the image to the left of it along y.
-            There is none if empty.
-        samples: paths of light a pixel; with 1 their noise stays.
+        surfaces: visible surfaces; the poses of their bodies come with each view.
+        lamps: directional lights.
+        environment: environment map, as the content of a Radiance file: the first row points up,
+            the middle of a row along x of the world, a quarter of the image to the left of it along
+            y. No environment if empty.
+        samples: light paths per pixel; at 1 the image is not denoised.
     """
 
     surfaces: tuple[PaintedSurface, ...]
@@ -226,8 +226,8 @@ class BlenderScene:
         """Writes `scene.json`, `meshes.npz` and images.
 
         Args:
-            folder: that exists, and nothing else is in.
-            threads: that shall render; as many as there are processors if 0.
+            folder: existing empty folder.
+            threads: number of rendering threads; that of processors if 0.
         """
         textures = {one.material.texture for one in self.surfaces} - {b""}
         names = {png: f"texture_{k}.png" for k, png in enumerate(sorted(textures))}
@@ -267,15 +267,15 @@ class BlenderScene:
 
 
 def make_blender_scene(built: StationDiagram, appearance: Appearance | None = None) -> BlenderScene:
-    """A diagram as it is for Blender.
+    """Converts a diagram for Blender.
 
-    Lights that stand in the world cast shadows whether or not they are asked to: without them
-    things seem to float. One that goes with the camera stands for what walls scatter, and casts
-    them only if it is asked to.
+    Lights in the world always cast shadows: without them, objects seem to float. A light that moves
+    with the camera stands for light scattered by walls, and casts shadows only if its `shadows` is
+    set.
 
     Args:
-        built: with the markers of its board, and the things of the appearance.
-        appearance: has the lights; those of simulated cameras if it has none.
+        built: diagram with the markers of its board, and the distractors of the appearance.
+        appearance: appearance with the lights; those of simulated cameras if it has none.
     """
     lights = () if appearance is None else appearance.lights
     environment = b""
@@ -299,7 +299,7 @@ def _lamp_of_light(light: DirectedLight) -> Lamp:
     return Lamp(
         direction=light.direction,
         frame=light.frame,
-        irradiance=light.irradiance * np.pi,  # a white surface reflects the pi-th part
+        irradiance=light.irradiance * np.pi,  # a white surface reflects 1 / pi of it
         color=light.color,
         shadows=light.shadows or light.frame == "world",
         angle=float(np.deg2rad(4.0)),  # a lamp of 20 cm seen from 3 m

@@ -12,11 +12,11 @@ from typing import Any
 
 
 class LoadedScene:
-    """Blender's scene, and what moves in it.
+    """Blender's scene, with bodies and a camera that move.
 
     Args:
         bpy: the module.
-        folder: with the description.
+        folder: folder with the description.
     """
 
     def __init__(self, bpy: Any, folder: Path) -> None:
@@ -79,11 +79,11 @@ class LoadedScene:
         scene.view_settings.view_transform = "Standard"
         cycles.samples, cycles.seed = samples, 0
         cycles.use_adaptive_sampling = False
-        cycles.pixel_filter_type = "BOX"  # a pixel collects what falls on it
+        cycles.pixel_filter_type = "BOX"  # a pixel collects the light that falls on it
         cycles.filter_width = 1.0
         cycles.max_bounces = 4
         cycles.caustics_reflective = cycles.caustics_refractive = False
-        cycles.use_light_tree = False  # which pays with many lights
+        cycles.use_light_tree = False  # pays only with many lights
         cycles.use_denoising = samples > 1
         cycles.denoiser, cycles.denoising_prefilter = "OPENIMAGEDENOISE", "FAST"
         cycles.denoising_use_gpu = False
@@ -161,13 +161,13 @@ class LoadedScene:
 
 
 def matrix_columns(rows: list[list[float]]) -> list[tuple[float, ...]]:
-    """A matrix as Blender takes one from lists."""
+    """A matrix as the list of columns that Blender expects."""
     return list(zip(*rows, strict=True))
 
 
 def main() -> None:
-    """Answers lines until there are no more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one decides
+    """Answers requests from standard input until it is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles interrupts
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 

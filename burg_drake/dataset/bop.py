@@ -43,24 +43,24 @@ def write_bop(
 ) -> tuple[str, ...]:
     """Writes a data set in BOP's layout.
 
-    Object ids are positions in `samples.objects`, from 1; ids of images are the numbers of views.
-    Models keep the frame of the library's objects, whose origin is not the middle of their box.
+    Object ids are positions in `samples.objects`, from 1; image ids are the numbers of views.
+    Models keep the frame of the library's objects, whose origin is not the centre of their box.
 
     Args:
-        samples: with colour, depth and labels.
-        folder: new or empty.
-        split: name of the folder of scenes. Those that end in `_pbr` have colours as JPEG, where
-            the toolkit expects it, others as PNG. Those that begin with `test` get a list of
+        samples: data set with colour, depth and labels.
+        folder: new or empty folder.
+        split: name of the folder of scenes. Names ending in `_pbr` get colours as JPEG, where
+            the toolkit expects it, others as PNG. Names starting with `test` get a list of
             targets.
-        depth_unit: what 1 stands for in a depth image [m].
-        sensor_depth: depth of the simulated sensor, and not the exact one.
+        depth_unit: unit of depth images [m].
+        sensor_depth: whether to write the simulated sensor's depth instead of the exact one.
 
     Returns:
-        What BOP cannot carry, one sentence each.
+        Data that BOP cannot represent, one sentence each.
 
     Raises:
         InvalidInputError: a sample lacks an image, a lens has distortion, a depth is too large, or
-            the folder has something in it or cannot be written.
+            the folder is not empty or cannot be written.
         UnknownNameError: an object is not in the list or the library.
         MeshError: a mesh of the library is damaged.
     """
@@ -125,14 +125,14 @@ class _Scene:
             self._infos[view].append(_instance_info(label, int(visible.sum()), numbers))
 
     def finish(self) -> None:
-        """Writes what is known of all views."""
+        """Writes the annotations of all views."""
         _write_json(self._folder / "scene_camera.json", self._cameras)
         _write_json(self._folder / "scene_gt.json", self._poses)
         _write_json(self._folder / "scene_gt_info.json", self._infos)
 
     def targets(self, scene: int) -> list[dict[str, int]]:
-        """What a pose estimator is asked for: objects in each image, and how many of each."""
-        # Instances with less are no targets (BOP Challenge 2020, section 2.4).
+        """Targets for pose estimators: objects in each image, with their instance counts."""
+        # Less visible instances are no targets (BOP Challenge 2020, section 2.4).
         min_visibility = 0.1
         found = []
         for view, poses in self._poses.items():
@@ -184,7 +184,7 @@ def _instance_info(label: InstanceLabel, visible: int, depth: NDArray[np.uint16]
 
 
 def _bop_box(box: Box | None) -> list[int]:
-    """A box from its first pixel to its last."""
+    """A box in BOP's convention, from its first pixel to its last."""
     return [-1, -1, -1, -1] if box is None else [box[0], box[1], box[2] - 1, box[3] - 1]
 
 
@@ -230,11 +230,11 @@ def write_models(library: ObjectLibrary, objects: Sequence[str], folder: Path) -
     """Writes `models` and `models_eval`, each with its `models_info.json`.
 
     Args:
-        library: where the objects are.
+        library: library of the objects.
         objects: names, in the order of their ids from 1.
-        folder: of the data set.
+        folder: folder of the data set.
     """
-    evaluation_faces = 5000  # Faces of the models that pose errors are computed with.
+    evaluation_faces = 5000  # Of the models for computing pose errors.
     looks, evaluation = folder / "models", folder / "models_eval"
     looks.mkdir()
     evaluation.mkdir()
@@ -261,10 +261,10 @@ def model_info(vertices: Array) -> dict[str, float]:
 
 
 def diameter(vertices: Array) -> float:
-    """Largest distance of two vertices (V, 3): they are corners of the hull."""
+    """Largest distance between two vertices (V, 3), found among the corners of their hull."""
     batch_points = 1000  # Points whose distances to all others are in memory at a time.
     points = np.unique(vertices, axis=0)
-    with suppress(QhullError):  # of a flat model all of them
+    with suppress(QhullError):  # a flat model has no hull; all points are used
         points = points[convex_hull(points).vertices]
     parts = np.array_split(points, 1 + len(points) // batch_points)
     return float(max(cdist(part, points).max() for part in parts))

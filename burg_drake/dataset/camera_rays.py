@@ -1,4 +1,4 @@
-"""The rays through the centres of a camera's pixels, kept for its next image."""
+"""Rays through the centres of a camera's pixels, cached for its next image."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from burg_drake.core import Array, InvalidInputError, Single
 from burg_drake.dataset.sample import box_of_mask
 
 PixelBox = tuple[int, int, int, int]
-"""A rectangle: left, top, right, bottom, the last two not within; it may leave the image."""
+"""Rectangle of pixels: left, top, right, bottom, the last two exclusive. May exceed the image."""
 
 
 class CameraRays(FieldOfView):
-    """A camera's field of view, and its rays in the forms that images are made with."""
+    """A camera's field of view, with its rays in the forms that rendering needs."""
 
     @cached_property
     def single(self) -> Single:
@@ -30,16 +30,15 @@ class CameraRays(FieldOfView):
 
     @cached_property
     def slopes(self) -> tuple[Single, Single]:
-        """x / z and y / z of the rays: (1, W) and (H, 1) of a camera without distortion, else
-        (H, W) each."""
+        """x / z and y / z of the rays: (1, W) and (H, 1) without distortion, else (H, W) each."""
         x, y = self.directions[..., 0], self.directions[..., 1]
         if self.intrinsics.is_pinhole:
             x, y = x[:1], y[:, :1]
         return x.astype(np.float32), y.astype(np.float32)
 
     def unit_in(self, pixels: PixelBox) -> Single:
-        """(N, 3) unit vectors through the pixels of a rectangle, row by row; it may leave the image
-        of a camera without distortion."""
+        """(N, 3) unit vectors through the pixels of a rectangle, row by row. Without distortion, it
+        may exceed the image."""
         left, top, right, bottom = pixels
         if not self.intrinsics.is_pinhole:
             return self.unit[top:bottom, left:right].astype(np.float32).reshape(-1, 3)
@@ -53,8 +52,7 @@ class CameraRays(FieldOfView):
         return unit.reshape(-1, 3)
 
     def pixel_box(self, lower: Array, upper: Array) -> PixelBox | None:
-        """The pixels of the image that look between bounds (2,) of x / z and y / z; None if there
-        are none."""
+        """Rectangle of the image's pixels within bounds (2,) of x / z and y / z; None if empty."""
         x, y = self.slopes
         inside = (x >= lower[0]) & (x <= upper[0]) & (y >= lower[1]) & (y <= upper[1])
         box = box_of_mask(inside)
@@ -62,11 +60,11 @@ class CameraRays(FieldOfView):
 
     @cached_property
     def covering_pinhole(self) -> tuple[Intrinsics, Single]:
-        """A pinhole camera that sees all that this one with distortion sees, and (H, W, 2) where
-        the pixels of this one are in its image.
+        """A pinhole camera that covers the field of view of this camera with distortion, and the
+        positions (H, W, 2) of this camera's pixels in its image.
 
         Raises:
-            InvalidInputError: it sees nearly to its sides.
+            InvalidInputError: the field of view is too wide.
         """
         max_tangent = 4.0  # Tangent of the largest angle to the optical axis: 76 degrees.
         flat, focal = self.directions[..., :2], self.intrinsics.focal
@@ -90,5 +88,5 @@ class CameraRays(FieldOfView):
 
 @lru_cache(maxsize=8)
 def camera_rays(intrinsics: Intrinsics) -> CameraRays:
-    """The rays of a camera; those of lenses with distortion cost much to find."""
+    """The rays of a camera; cached, as those of a lens with distortion are slow to compute."""
     return CameraRays(intrinsics)

@@ -55,7 +55,7 @@ Fault = tuple[str, str]
 
 
 def label_faults(sample: Sample) -> Iterator[Fault]:
-    """Labels against what is said of the instances."""
+    """Contradictions between the label image and the records of the instances."""
     labels = sample.images.labels
     if labels is None:
         return
@@ -86,7 +86,7 @@ def label_faults(sample: Sample) -> Iterator[Fault]:
 
 
 def silhouette_faults(sample: Sample) -> Iterator[Fault]:
-    """Numbers of the instances against one another and their masks."""
+    """Contradictions between the values and the mask of each instance."""
     for i, one in enumerate(sample.instances, start=1):
         if one.number != i:
             yield RECORD_KIND, f"{one.name!r} has number {one.number}; expected {i}"
@@ -96,7 +96,7 @@ def silhouette_faults(sample: Sample) -> Iterator[Fault]:
 
 
 def _instance_contradictions(one: InstanceLabel) -> Iterator[str]:
-    visibility_tolerance = 1e-6  # Difference of shares.
+    visibility_tolerance = 1e-6
     within, pixels = int(np.count_nonzero(one.amodal)), one.silhouette_pixels
     if within > pixels:
         yield f"silhouette_pixels is {pixels}, less than the {within} of the amodal mask"
@@ -113,7 +113,7 @@ def _instance_contradictions(one: InstanceLabel) -> Iterator[str]:
 
 
 def surface_faults(sample: Sample, depth_unit: float) -> Iterator[Fault]:
-    """Depth and normals out of their ranges; sensors may measure what they like."""
+    """Depth and normals out of their ranges. The sensor's depth may have any value."""
     length_tolerance = 1e-3  # Difference of a normal's length from 1.
     near, far = sample.view.depth_range
     depth, normals = sample.images.depth, sample.images.normals
@@ -134,7 +134,7 @@ def surface_faults(sample: Sample, depth_unit: float) -> Iterator[Fault]:
 
 
 def grasp_faults(sample: Sample) -> Iterator[Fault]:
-    """Grasps with values that no grasp has."""
+    """Invalid values of grasps."""
     if sample.grasps is None:
         return
     known = {"", *(outcome.value for outcome in Outcome)}
@@ -148,11 +148,11 @@ def grasp_faults(sample: Sample) -> Iterator[Fault]:
 def scene_faults(
     sample: Sample, scene: SceneDocument, X_SO: Mapping[str, Array]
 ) -> Iterator[Fault]:
-    """Instances against the scene: which they are, their order, and their poses.
+    """Contradictions between a sample's instances and the scene: names, order and poses.
 
     Args:
-        sample: its record.
-        scene: of the data set.
+        sample: the sample, with its record.
+        scene: document of the scene.
         X_SO: (4, 4) poses of all instances by name.
     """
     pose_tolerance = 1e-6  # Metres, and difference in the entries of the rotation matrix.
@@ -180,7 +180,7 @@ def scene_faults(
 
 
 def drawing_faults(sample: Sample, drawn: Images, depth_unit: float) -> Iterator[Fault]:
-    """Labels and depth against freshly drawn ones; what is None on either side is left aside."""
+    """Differences of labels and depth from newly rendered ones; skips images that are None."""
     labels, depth = sample.images.labels, sample.images.depth
     if labels is not None and drawn.labels is not None:
         yield from _image_difference("labels", labels, drawn.labels != labels)
@@ -211,17 +211,17 @@ def _contains(outer: Box, inner: Box) -> bool:
 
 
 Redraw = Callable[[Scene, Sample], Images]
-"""Draws the labels and the depth of a sample anew, from its scene and its view."""
+"""Renders the labels and the depth of a sample again, from its scene and its view."""
 
 
 @dataclass(frozen=True)
 class DatasetFinding:
-    """Something that is wrong.
+    """An error in a data set.
 
     Attributes:
-        sample: its key; empty if it is of no sample.
-        file: in the data set; of a sample the shard and the member, with a colon between them.
-        message: what is wrong.
+        sample: key of the sample; empty if the error is of no sample.
+        file: file in the data set; for a sample, shard and member, separated by a colon.
+        message: description of the error.
     """
 
     sample: str
@@ -233,15 +233,15 @@ class DatasetFinding:
 
 
 def check_dataset(folder: str | Path, redraw: Redraw | None = None) -> list[DatasetFinding]:
-    """Looks at every file of a data set.
+    """Checks every file of a data set.
 
     Args:
-        folder: of the data set.
-        redraw: draws labels and depth anew, with which those of the samples are compared; they
-            are not if it is None. It needs the library of the scenes.
+        folder: folder of the data set.
+        redraw: renders labels and depth again, to compare those of the samples with; no comparison
+            if None. Needs the library of the scenes.
 
     Returns:
-        All that is wrong, in the order of the scenes; empty of a sound data set.
+        All errors, in the order of the scenes; empty for a sound data set.
     """
     folder = Path(folder)
     try:
@@ -264,12 +264,12 @@ def check_dataset(folder: str | Path, redraw: Redraw | None = None) -> list[Data
 def check_shard(
     folder: str | Path, scene: int, entry: ShardEntry | None = None, redraw: Redraw | None = None
 ) -> list[DatasetFinding]:
-    """Looks at the samples of one scene; several processes can do so, each with other scenes.
+    """Checks the samples of one scene. Several processes can check different scenes at once.
 
     Args:
-        folder: of the data set.
-        scene: number.
-        entry: of the index, for the check sum; None if there is none.
+        folder: folder of the data set.
+        scene: number of the scene.
+        entry: entry of the index with the checksum, if there is one.
         redraw: see `check_dataset`.
     """
     folder, name = Path(folder), shard_name(scene)
@@ -281,7 +281,8 @@ def check_shard(
     except InvalidInputError as error:
         return [*found, _finding_of_error(folder, name, error)]
     found += [
-        DatasetFinding("", f"{name}: {one}", "it belongs to no sample") for one in shard.strangers
+        DatasetFinding("", f"{name}: {one}", "it belongs to no sample")
+        for one in shard.foreign_members
     ]
     if entry is not None and len(shard.keys) != entry.nsamples:
         message = f"it has {len(shard.keys)} samples, but the index says {entry.nsamples}"
@@ -302,7 +303,7 @@ def check_shard(
 
 
 def _find_leftover_files(folder: Path) -> Iterator[DatasetFinding]:
-    """Scenes without shard, and files that were being written."""
+    """Finds scenes without a shard, and unfinished files."""
     for place in (folder, folder / SCENE_FOLDER, folder / SHARD_FOLDER):
         if not place.is_dir():
             yield DatasetFinding("", place.name, "the folder is missing")
@@ -331,7 +332,7 @@ def _check_index_entry(folder: Path, entry: ShardEntry) -> Iterator[DatasetFindi
 
 
 def _find_scattered_samples(shard: SampleShard, name: str) -> Iterator[DatasetFinding]:
-    """Samples whose files do not lie next to each other, as readers of WebDataset expect."""
+    """Finds samples whose files are not adjacent, as readers of WebDataset expect them."""
     kinds = filter(None, map(member_kind, tar_members(shard.path)))
     runs = Counter(key for key, _ in itertools.groupby(kinds, key=lambda kind: kind[0]))
     for key, count in runs.items():
@@ -348,7 +349,7 @@ def _sample_faults(
     scene: Scene | None,
     redraw: Redraw | None,
 ) -> Iterator[Fault]:
-    """Kind of file and what is wrong with it, of one sample."""
+    """Errors of one sample, with the kinds of files."""
     try:
         record = shard.record(key)
     except InvalidInputError as error:
@@ -388,13 +389,13 @@ def _sample_contradictions(
 
 
 def _finding_of_error(folder: Path, name: str, error: BurgError) -> DatasetFinding:
-    """Of an error about a file of the data set."""
+    """Converts an error about a file of the data set."""
     return DatasetFinding("", name, str(error).removeprefix(str(folder / name)).lstrip(":, "))
 
 
 def _message_without_place(
     error: InvalidInputError, shard: SampleShard, key: str, kind: str
 ) -> str:
-    """What an error says of a member, without where it is."""
+    """Message of an error about a member, without its location."""
     text = str(error).removeprefix(f"{shard.path}: {key}.{FILE_SUFFIXES[kind]}")
     return text.removeprefix(":").strip()

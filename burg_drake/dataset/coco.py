@@ -29,16 +29,15 @@ def write_coco(
     annotation; every image is listed.
 
     Args:
-        samples: with colour and labels.
-        folder: new or empty.
-        images: format of the colours.
+        samples: data set with colour and labels.
+        folder: new or empty folder.
+        images: format of colour images.
 
     Returns:
-        What COCO cannot carry, one sentence each.
+        Data that COCO cannot represent, one sentence each.
 
     Raises:
-        InvalidInputError: a sample lacks an image, or the folder has something in it or cannot be
-            written.
+        InvalidInputError: a sample lacks an image, or the folder is not empty or cannot be written.
         UnknownNameError: an object is not in the list.
     """
     listed: list[dict[str, Any]] = []
@@ -74,7 +73,7 @@ def write_coco(
 def _instance_annotations(
     objects: tuple[str, ...], sample: Sample, labels: NDArray[np.uint16]
 ) -> list[dict[str, Any]]:
-    """Instances that are visible, without ids."""
+    """Annotations of a sample's visible instances, without ids."""
     found = []
     for label in sample.instances:
         mask = labels == label.number

@@ -29,17 +29,17 @@ class DatasetCounts:
     """Counts and distributions of a data set.
 
     Attributes:
-        scenes: numbers of its scenes.
-        views: samples by what their camera was made from.
+        scenes: numbers of the scenes.
+        views: samples by camera (a camera of the station, `sphere` or `wrist`).
         sizes: samples by width and height of their images.
-        images: samples by what images they have.
-        instances: by object, in all samples, visible or not.
-        visible: the same, of those that are visible.
-        outcomes: of grasps.
-        distances: of each visible instance, from the camera to the origin of its frame [m].
-        visibilities: of each instance.
-        elevations: of each view, by which its optical axis points down [rad].
-        objects: of each view, visible instances.
+        images: samples by kind of image.
+        instances: instances in all samples by object, visible or not.
+        visible: visible instances in all samples by object.
+        outcomes: grasps by outcome.
+        distances: distance of each visible instance's origin from the camera [m].
+        visibilities: visibility of each instance.
+        elevations: downward angle of each view's optical axis [rad].
+        objects: number of visible instances of each view.
     """
 
     scenes: set[int] = field(default_factory=set)
@@ -60,7 +60,7 @@ class DatasetCounts:
         return self.views.total()
 
     def add(self, sample: Sample, parts: Collection[str]) -> None:
-        """Counts a sample that has such images, read or not."""
+        """Counts a sample with the parts `parts`, which need not be read."""
         view = sample.view
         self.scenes.add(sample.scene)
         self.views[view.camera] += 1
@@ -80,7 +80,7 @@ class DatasetCounts:
 
 
 def count_dataset(samples: Samples) -> DatasetCounts:
-    """Counts all samples; images of a data set on disk are not decoded for that."""
+    """Counts all samples, without decoding images of a data set on disk."""
     counted = DatasetCounts()
     if isinstance(samples, Dataset):
         for index in range(len(samples)):
@@ -95,7 +95,7 @@ def count_dataset(samples: Samples) -> DatasetCounts:
 
 
 def camera_elevation(X_SC: Array) -> float:
-    """By how much the optical axis of a camera points down [rad]: pi / 2 from straight above."""
+    """Downward angle of a camera's optical axis [rad]: pi / 2 for a view from straight above."""
     return float(np.arcsin(np.clip(-X_SC[2, 2], -1.0, 1.0)))
 
 
@@ -114,19 +114,19 @@ def write_card(
 ) -> None:
     """Writes the card of a data set: `README.md`, and the folder `card` with its pictures.
 
-    An earlier card is replaced.
+    Replaces an earlier card.
 
     Args:
         samples: the data set.
-        folder: for the card.
-        description: a paragraph of what the data set is for.
-        facts: how it was made, such as its seed, by name.
-        licences: of the meshes, by object; libraries of objects have none.
+        folder: folder of the card.
+        description: a paragraph on the purpose of the data set.
+        facts: facts on how the data set was made, such as its seed, by name.
+        licences: licences of the meshes by object, as libraries do not state them.
 
     Raises:
-        InvalidInputError: there are no samples, there is another README.md, or the place cannot be
+        InvalidInputError: there are no samples, there is another README.md, or the folder cannot be
             written to.
-        UnknownNameError: a licence is of no object of the data set.
+        UnknownNameError: the data set has no object that a licence names.
     """
     folder = Path(folder)
     _require_own_card(folder / CARD_FILE)
@@ -164,7 +164,7 @@ def write_card(
 
 
 def _require_own_card(path: Path) -> None:
-    """Refuses to replace a file of somebody else."""
+    """Refuses to replace a file that burg_drake did not write."""
     if not path.exists():
         return
     try:
@@ -178,7 +178,7 @@ def _require_own_card(path: Path) -> None:
 
 
 def _chart_files(counted: DatasetCounts) -> dict[str, str]:
-    """Pictures by the names of their files."""
+    """Charts by file name."""
     degrees = np.rad2deg(counted.elevations).tolist()
     percent = [100.0 * share for share in counted.visibilities]
     return {
@@ -213,7 +213,7 @@ def _summary_table(counted: DatasetCounts) -> str:
 
 
 def _object_table(samples: Samples, counted: DatasetCounts, licences: Mapping[str, str]) -> str:
-    """Objects with their counts, and where their meshes are from."""
+    """Table of the objects with their counts and the sources of their meshes."""
     rows = []
     for number, name in enumerate(samples.objects, start=1):
         source = samples.library.entry(name).source

@@ -1,4 +1,4 @@
-"""Generates data sets with local processes or a cluster, and makes single samples again."""
+"""Generates data sets with local processes or a cluster, and reproduces single samples."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ from burg_drake.scene import Instance, Scene, SceneDocument, SceneLike, as_scene
 from burg_drake.station import Station, StationLike, as_station
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
-Made = Generator[tuple[SceneWork, ShardEntry | BaseException], None, None]
-"""Scenes with their lines of the index, or why they have none, as they come."""
+SceneResults = Generator[tuple[SceneWork, ShardEntry | BaseException], None, None]
+"""Scenes in order of completion, with their entries of the index or their errors."""
 
 
 @contextmanager
@@ -72,18 +72,18 @@ def scene_maker(
     recipe: DatasetRecipe,
     library: ObjectLibrary,
     station: Station,
-) -> Iterator[Callable[[Sequence[SceneWork]], Made]]:
-    """What writes scenes and their samples, until the block is left.
+) -> Iterator[Callable[[Sequence[SceneWork]], SceneResults]]:
+    """A function that writes scenes and their samples, within the block.
 
     Args:
         cluster: see `connect_cluster`; this machine if None.
-        workers: number of processes of this machine.
-        recipe: of the data set.
-        library: of all scenes.
-        station: what they stand on.
+        workers: number of local processes.
+        recipe: recipe of the data set.
+        library: library of all scenes.
+        station: station of the scenes.
 
     Raises:
-        InvalidInputError: a cluster cannot make what the recipe asks for.
+        InvalidInputError: the recipe cannot be made on a cluster.
         BurgError: see `connect_cluster`.
     """
     if cluster is None:
@@ -109,7 +109,7 @@ def _make_on_cluster(
     library: ObjectLibrary,
     station: Station,
     work: Sequence[SceneWork],
-) -> Made:
+) -> SceneResults:
     scenes: dict[int, Scene] = {}
     able = []
     for one in work:
@@ -151,8 +151,8 @@ def _make_on_cluster(
 
 
 def catalogue_scene(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
-    """A scene of all objects of some scenes, to be packed; of the whole library if there are none,
-    as scenes are sampled from that."""
+    """A scene with all objects of some scenes, for packing; without scenes, which are then sampled,
+    with all objects of the library."""
     used = {one.object for scene in scenes for one in scene.document.instances}
     used |= {one.object for scene in scenes for one in scene.document.background}
     objects = [Instance(object=name) for name in library.objects if name in used or not scenes]
@@ -162,14 +162,14 @@ def catalogue_scene(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
 
 @dataclass(frozen=True)
 class GeneratedDataset:
-    """What is in a folder after generating.
+    """Contents of a folder after generating.
 
     Attributes:
-        folder: of the data set.
+        folder: folder of the data set.
         new: numbers of the scenes whose samples were made now.
-        known: of those that were there already.
-        failed: one line for each scene that has no samples, by number: they are tried again the
-            next time.
+        known: numbers of the scenes that existed already.
+        failed: error message of each scene without samples, by number. The next call tries these
+            scenes again.
     """
 
     folder: Path
@@ -189,7 +189,7 @@ def generate_dataset(
     cluster: str | None = None,
     progress: Callable[[int, str], None] | None = None,
 ) -> GeneratedDataset:
-    """Makes the samples of many scenes, but for those that the folder has.
+    """Makes the samples of many scenes; skips scenes that the folder has.
 
     Example::
 
@@ -197,29 +197,29 @@ def generate_dataset(
         burg.generate_dataset(["tabletop_six"], "panda_tabletop", "my_dataset", recipe)
 
     Args:
-        scenes: given ones, with files, all of one library; or the library that scenes are sampled
-            from, as `recipe.sampled` says.
-        station: what they stand on.
-        folder: of the data set; new, or one that this function has begun.
-        recipe: how samples are made.
-        count: of sampled scenes.
-        workers: number of processes; with one this process does it.
-        cluster: in their place, workers of Dask, which need none of this machine's files: as
-            `burg.runs.connect_cluster` takes it, such as `local:4` or the path of a cluster file.
-        progress: called after each scene with its number and what has gone wrong, if anything.
+        scenes: given scenes with files, all of one library; or the library from which scenes are
+            sampled by `recipe.sampled`.
+        station: station of the scenes.
+        folder: folder of the data set; new, or begun by this function.
+        recipe: recipe of the samples.
+        count: number of sampled scenes.
+        workers: number of processes; with one, this process makes the samples.
+        cluster: workers of Dask instead of local processes; they need none of this machine's files.
+            See `burg.runs.connect_cluster`: for example `local:4` or the path of a cluster file.
+        progress: called after each scene with its number and its error message, if any.
 
     Returns:
-        What is there now. A scene that cannot be sampled or rendered leaves the others as they are.
+        Contents of the folder. A scene that cannot be sampled or rendered does not affect others.
 
     Raises:
-        InvalidInputError: the folder holds another data set, is being written or is full, a scene
-            has no file, the scenes are of several libraries, or there is no such run; a number is
-            below 1.
+        InvalidInputError: the folder holds another data set or is being written, the disk is full,
+            a scene has no file, the scenes are of several libraries, there is no such run, or a
+            number is below 1.
         UnknownNameError: the station has no such camera, or there is no library of distractors.
-        MissingDependencyError: the recipe has colours, and what renders them is missing; or Dask is
-            asked for, and not installed.
-        ClusterError: no scheduler is reached, or it is lost; a worker has other versions; scenes
-            that are there stay, and the same call continues.
+        MissingDependencyError: the recipe has colours, and their renderer is missing; or `cluster`
+            is given, and Dask is not installed.
+        ClusterError: the scheduler cannot be reached or is lost, or a worker has other versions.
+            Finished scenes stay, and the same call resumes.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -254,7 +254,7 @@ def generate_dataset(
         with closing(make(work)) as made:
             for one, outcome in made:
                 if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
-                    raise outcome  # a full disk is so for all others, too
+                    raise outcome  # a full disk makes all other scenes fail, too
                 if isinstance(outcome, BaseException):
                     failed[one.number] = (
                         str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
@@ -272,7 +272,7 @@ def generate_dataset(
 
 
 def _require_feasible_recipe(recipe: DatasetRecipe, station: Station) -> None:
-    """Refuses what no scene can have samples with, before a folder is made."""
+    """Refuses a recipe that fails for every scene, before a folder is created."""
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
@@ -290,7 +290,7 @@ def _require_feasible_recipe(recipe: DatasetRecipe, station: Station) -> None:
 def _load_given_scenes(
     scenes: Sequence[SceneLike], recipe: DatasetRecipe
 ) -> tuple[ObjectLibrary, DatasetRecipe, list[Path]]:
-    """The library of given scenes, the recipe with their contents, and their files."""
+    """Library of given scenes, recipe with the hashes of the scenes, and files of the scenes."""
     if recipe.sampled is not None:
         raise InvalidInputError(
             "scenes are given, but the recipe samples scenes; leave one of the two out"
@@ -314,7 +314,7 @@ def _load_given_scenes(
 def _new_document(
     folder: Path, library: ObjectLibrary, station: Station, recipe: DatasetRecipe
 ) -> DatasetDocument:
-    # Installed packages that decide about samples, by their names in the document.
+    # Installed packages that affect samples, by their names in the document.
     packages = {
         "drake": "drake",
         "numpy": "numpy",
@@ -352,18 +352,18 @@ def _write_card(folder: Path, recipe: DatasetRecipe) -> None:
 
 
 def sample_again(dataset: Dataset, key: str) -> Sample:
-    """One sample of a generated data set, rendered anew from what is stored with it.
+    """Renders one sample of a generated data set again, from its stored view and appearance.
 
     Args:
-        dataset: made by `generate_dataset`.
-        key: of the sample, such as `000012_003`.
+        dataset: data set made by `generate_dataset`.
+        key: key of the sample, such as `000012_003`.
 
     Returns:
-        The same images, to the byte if all software is the same; without grasps.
+        The sample with the same images, byte for byte with the same software; without grasps.
 
     Raises:
         UnknownNameError: no such sample.
-        InvalidInputError: nobody generated the data set, or its library or station is another now.
+        InvalidInputError: the data set was not generated, or its library or station has changed.
     """
     stored = dataset.read(dataset.index(key), images=())
     recipe, station = _recipe_and_station(dataset.document, dataset.folder)
@@ -375,11 +375,11 @@ def sample_again(dataset: Dataset, key: str) -> Sample:
 
 
 def check_generated(folder: str | Path) -> list[DatasetFinding]:
-    """All that is wrong with a data set; depth and labels are rendered anew and compared.
+    """Finds all errors of a data set; renders depth and labels again and compares them.
 
     Args:
-        folder: of a data set made by `generate_dataset`, or by anybody with `DatasetWriter`, whose
-            images are not rendered anew.
+        folder: folder of a data set made by `generate_dataset`; or with `DatasetWriter`, whose
+            images are not rendered again.
 
     Raises:
         DocumentError: its document is missing, damaged, or of another version.

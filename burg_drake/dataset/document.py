@@ -66,9 +66,9 @@ class DatasetDocument:
         require_name(self.name, "name")
 
     def differences(self, other: DatasetDocument) -> list[str]:
-        """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those that decide; the
-        name does not count."""
+        """Differences from `other`, in words that call `other` "here" and this document "there".
+        Compares contents of libraries and stations, not their paths; and only versions of software
+        that affects samples. Ignores names."""
         max_shown = 6  # Differences in a message.
         mine, theirs = _deciding_values(self), _deciding_values(other)
         found = [
@@ -86,22 +86,22 @@ def load_dataset_document(path: str | Path) -> DatasetDocument:
     """Reads `dataset.yaml`.
 
     Raises:
-        DocumentError: it is missing, of another version, or a key or value does not fit; the
+        DocumentError: the file is missing, of another version, or a key or value is invalid; the
             message names file, line and key.
     """
     return load_document(path, DatasetDocument)
 
 
 def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
-    """Writes `dataset.yaml`, whole or not at all."""
+    """Writes `dataset.yaml` atomically."""
     header = "What the samples of this data set are of, and what they were made with."
     recipe = None if document.recipe is None else plain_data(dict(document.recipe))
     save_document(dataclasses.replace(document, recipe=recipe), path, header)
 
 
 def _deciding_values(document: DatasetDocument) -> dict[str, Any]:
-    """Values that decide about samples, by their name for messages."""
-    # Software whose versions decide about samples.
+    """Values that affect samples, by their names in messages."""
+    # Software whose versions affect samples.
     deciding_packages = ("burg_drake", "drake", "numpy", "scipy", "embreex", "opencv", "blender")
     values: dict[str, Any] = {
         "objects": list(document.objects),
@@ -114,7 +114,7 @@ def _deciding_values(document: DatasetDocument) -> dict[str, Any]:
 
 
 def _flatten(value: Any, name: str) -> dict[str, Any]:
-    """The values of nested mappings by their names with dots."""
+    """Values of nested mappings, by dotted names."""
     if not isinstance(value, Mapping):
         return {name: value}
     return {
@@ -133,22 +133,23 @@ WIDS_VERSION = 1  # Version of the index format of WebDataset.
 
 
 def shard_numbers(folder: Path) -> list[int]:
-    """Scenes whose shards lie in a data set, in their order."""
+    """Numbers of the scenes that have a shard in a data set, sorted."""
     shards = folder / SHARD_FOLDER
     urls = [f"{SHARD_FOLDER}/{path.name}" for path in shards.iterdir()] if shards.is_dir() else []
     return sorted({_scene_number(url) for url in urls if SHARD_URL.fullmatch(url)})
 
 
 def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = None) -> None:
-    """Writes the index of the shards that are there.
+    """Writes the index of all shards in a folder.
 
     Args:
-        folder: of the data set.
-        known: lines of shards by url that need not be made anew, as `write_shard` has just
-            returned them; all others are read whole for their check sums.
+        folder: folder of the data set.
+        known: entries of shards by url, as `write_shard` returns them. All other shards are read
+            completely for their checksums.
 
     Raises:
-        InvalidInputError: it is no data set, a shard is damaged, or the index cannot be written.
+        InvalidInputError: the folder is no data set, a shard is damaged, or the index cannot be
+            written.
     """
     folder, known = Path(folder), known or {}
     document = load_dataset_document(folder / DATASET_FILE)
@@ -164,13 +165,13 @@ def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = Non
 
 
 def read_index(folder: Path) -> list[ShardEntry]:
-    """The lines of an index.
+    """Reads the entries of an index.
 
     Raises:
-        DocumentError: it is damaged, or of another version.
-        InvalidInputError: it is missing.
+        DocumentError: the index is damaged, or of another version.
+        InvalidInputError: the index is missing.
     """
-    limits = Limits(size=256 << 20, values=10_000_000)  # a shard takes 150 bytes and 6 values
+    limits = Limits(size=256 << 20, values=10_000_000)  # a shard needs 150 bytes and 6 values
     path = folder / SHARD_INDEX_FILE
     if not path.exists():
         raise InvalidInputError(
@@ -196,7 +197,7 @@ def read_index(folder: Path) -> list[ShardEntry]:
 
 
 def scene_of(entry: ShardEntry) -> int:
-    """Number of the scene that a line of the index is of."""
+    """Number of the scene of an index entry."""
     return _scene_number(entry.url)
 
 

@@ -1,4 +1,4 @@
-"""Parts that all exports share: the samples, checks of them, the new folder and image files."""
+"""Parts that all exports share: samples and their checks, the new folder, and image files."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class Samples(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the data set."""
+        """Name of the data set."""
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Names of the library's objects, in the order of their numbers in other formats."""
+        """Names of the library's objects, in the order of their ids in other formats."""
 
     @property
     def library(self) -> ObjectLibrary:
-        """Where these objects are."""
+        """Library of the objects."""
 
     def __len__(self) -> int: ...
 
@@ -51,10 +51,11 @@ class Samples(Protocol):
 
 
 def group_by_scene(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sample]]]:
-    """Scenes with their samples, one sample in memory at a time.
+    """Numbers of scenes with their samples, one sample in memory at a time: use up the samples of a
+    scene before asking for the next.
 
     Raises:
-        InvalidInputError: the samples of a scene do not follow each other.
+        InvalidInputError: the samples of a scene are not consecutive.
     """
     seen: set[int] = set()
     for number, views in groupby(samples, key=lambda sample: sample.scene):
@@ -67,15 +68,15 @@ def group_by_scene(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sa
 
 
 def required_image(sample: Sample, format: str, name: str) -> NDArray[Any]:
-    """An image of a sample that a format is made of.
+    """An image of a sample that a format requires.
 
     Args:
-        sample: of the data set.
-        format: its name, for the message.
-        name: of an attribute of `Images`.
+        sample: the sample.
+        format: name of the format, for the message.
+        name: attribute of `Images`.
 
     Raises:
-        InvalidInputError: it is missing.
+        InvalidInputError: the image is missing.
     """
     image = getattr(sample.images, name)
     if image is None:
@@ -87,10 +88,10 @@ def required_image(sample: Sample, format: str, name: str) -> NDArray[Any]:
 
 
 def require_pinhole(sample: Sample, format: str) -> None:
-    """Refuses a camera whose lens bends straight lines, for a format that has nothing but K.
+    """Refuses a camera with lens distortion, for a format that only has the camera matrix K.
 
     Raises:
-        InvalidInputError: there is distortion.
+        InvalidInputError: the lens has distortion.
     """
     if not sample.view.intrinsics.is_pinhole:
         raise InvalidInputError(
@@ -103,12 +104,12 @@ def exported_depth(sample: Sample, format: str, *, sensor: bool) -> Single:
     """(H, W) depth to write [m].
 
     Args:
-        sample: of the data set.
-        format: its name, for the message.
-        sensor: that of the simulated sensor, and not the exact one.
+        sample: the sample.
+        format: name of the format, for the message.
+        sensor: whether to take the simulated sensor's depth instead of the exact one.
 
     Raises:
-        InvalidInputError: there is none.
+        InvalidInputError: the sample lacks this depth.
     """
     if not sensor:
         return required_image(sample, format, "depth")
@@ -121,7 +122,8 @@ def exported_depth(sample: Sample, format: str, *, sensor: bool) -> Single:
 
 
 def describe_lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str]:
-    """What is lost of the depth by a format that has one depth image of a view, in a sentence.
+    """A set with a sentence on the depth lost in a format with one depth image per view; empty if
+    none is lost.
 
     Args:
         sample, format, sensor: as for `exported_depth`.
@@ -134,10 +136,10 @@ def describe_lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str
 
 
 def object_index(objects: Sequence[str], sample: Sample, label: InstanceLabel) -> int:
-    """The position of an instance's object in the data set's list.
+    """Index of an instance's object in the data set's list.
 
     Raises:
-        UnknownNameError: it is not there.
+        UnknownNameError: the object is not in the list.
     """
     if label.object not in objects:
         raise UnknownNameError(
@@ -149,17 +151,17 @@ def object_index(objects: Sequence[str], sample: Sample, label: InstanceLabel) -
 
 @contextmanager
 def new_folder(folder: str | Path) -> Iterator[Path]:
-    """A folder to write into, which takes its place when the block ends without an error.
+    """Creates a temporary folder, and renames it to `folder` if the block succeeds.
 
     Args:
-        folder: new or empty.
+        folder: new or empty folder.
 
     Yields:
-        The folder beside it.
+        The temporary folder, beside `folder`.
 
     Raises:
-        InvalidInputError: it is a file, or there is something in it, or its place cannot be written
-            to, or the disk is full; then nothing is left of what was written.
+        InvalidInputError: `folder` is a file, is not empty or cannot be written to, or the disk is
+            full. The temporary folder is removed.
     """
     path = Path(os.path.realpath(folder))
     if os.path.lexists(path):
@@ -182,7 +184,7 @@ def new_folder(folder: str | Path) -> Iterator[Path]:
 
 
 def encode_color_image(image: Bytes, suffix: str) -> bytes:
-    """Colours (H, W, 3) as `.jpg` or `.png`."""
+    """Encodes colours (H, W, 3) as `.jpg` or `.png`."""
     if suffix == ".png":
         return encode_png(image)
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
@@ -190,17 +192,17 @@ def encode_color_image(image: Bytes, suffix: str) -> bytes:
 
 
 def depth_in_units(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
-    """Depth as whole numbers.
+    """Depth as 16-bit integers.
 
     Args:
-        depth: (H, W) [m], 0 where there is none.
-        unit: what 1 stands for [m].
-        key: of the sample, for the message.
+        depth: (H, W) depth [m], 0 for no depth.
+        unit: unit of the integers [m].
+        key: key of the sample, for the message.
 
     Raises:
-        InvalidInputError: a depth is beyond the largest number.
+        InvalidInputError: a depth does not fit into 16 bits.
     """
-    max_number = np.iinfo(np.uint16).max  # Largest number of a pixel in a depth image.
+    max_number = np.iinfo(np.uint16).max
     numbers = np.rint(depth / unit)
     if numbers.max(initial=0.0) > max_number:
         raise InvalidInputError(

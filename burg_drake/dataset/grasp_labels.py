@@ -25,21 +25,21 @@ from burg_drake.dataset.sample import LabelledGrasps
 from burg_drake.dataset.tsdf import VGN_VOLUME_SIZE, VGN_VOXELS, voxel_size_and_truncation
 
 MAX_APPROACH_ANGLE = float(np.arccos(0.99))
-"""Radians between approach and optical axis, as in graspnetAPI: 8.1 degrees."""
+"""Largest angle between approach and optical axis in radians, as in graspnetAPI: 8.1 degrees."""
 
 
 @dataclass(frozen=True, eq=False)
 class GraspRectangles:
-    """K rectangles.
+    """K oriented grasp rectangles in an image.
 
     Attributes:
-        grasp: (K,) rows of the grasps that they stand for.
+        grasp: (K,) indices of the grasps.
         center: (K, 2) u, v of the origin of G [pixels].
-        angle: (K,) of the closing direction, from the axis u towards v, in (-pi/2, pi/2] [rad]: a
-            grasp and the same with fingers swapped are one.
+        angle: (K,) angle of the closing direction, from the u axis towards v, in (-pi/2, pi/2]
+            [rad]; the same after swapping the fingers.
         opening: (K,) extent along the closing direction [pixels].
-        height: (K,) extent across it, of the jaws [pixels].
-        depth: (K,) of the origin of G along the optical axis [m].
+        height: (K,) extent of the jaws across the closing direction [pixels].
+        depth: (K,) depth of the origin of G along the optical axis [m].
     """
 
     grasp: Indices
@@ -54,8 +54,8 @@ class GraspRectangles:
 
     @property
     def corners(self) -> Array:
-        """(K, 4, 2) u, v of the corners, one after the other; the first and the third side lie
-        along the closing direction [pixels]."""
+        """(K, 4, 2) u, v of the corners in order around the rectangle; the first and the third side
+        lie along the closing direction [pixels]."""
         along = np.stack([np.cos(self.angle), np.sin(self.angle)], axis=-1)
         across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
         a, b = 0.5 * self.opening[:, None] * along, 0.5 * self.height[:, None] * across
@@ -70,26 +70,26 @@ def grasp_rectangles(
     jaw: float = 0.02,
     most_angle: float = MAX_APPROACH_ANGLE,
 ) -> GraspRectangles:
-    """The rectangles of those grasps that look like one.
+    """Rectangles of the grasps that approach roughly along the optical axis.
 
-    Opening and angle are those of the line between the images of the two pads' centres, the height
-    is the distance between the images of the middles of the jaws' ends. With square pixels and an
-    approach along the optical axis, the rectangle is the image of the pads; else it deviates by
-    terms of the angle, and of the ratio of the focal lengths.
+    Opening and angle are those of the line between the projected centres of the pads; the height is
+    the distance between the projected middles of the jaws' ends. With square pixels and an approach
+    along the optical axis, the rectangle is the image of the pads. Otherwise it deviates, depending
+    on the angle and on the ratio of the focal lengths.
 
     Args:
-        grasps: in the camera's frame.
-        intrinsics: of the camera; lens distortion is that of its images.
+        grasps: grasps in the camera's frame.
+        intrinsics: of the camera, with the lens distortion of its images.
         opening: distance between the pads [m]; each grasp's own width if None.
         jaw: size of the jaws along y of G [m].
         most_angle: largest angle between approach and optical axis [rad].
 
     Returns:
-        Rectangles of the grasps within the angle whose centre is in the image; `grasp` says which.
+        Rectangles of the grasps within the angle whose centres are in the image.
 
     Raises:
-        InvalidInputError: a length or the angle is not above 0, the angle is not below a right one,
-            or no opening is given and the width of a grasp in view is not known.
+        InvalidInputError: a length or the angle is not positive, the angle is not below 90 degrees,
+            or no opening is given and the width of a grasp in view is unknown.
     """
     for name, value in (("opening", opening), ("jaw", jaw), ("most_angle", most_angle)):
         if value is not None and not 0.0 < value < np.inf:
@@ -122,7 +122,7 @@ def _are_in_view(X_CG: Array, intrinsics: Intrinsics, most_angle: float) -> Bool
     """(N,) whether the approach is within the angle, and the origin of G in the image."""
     p = X_CG[:, :3, 3]
     chosen: Booleans = (X_CG[:, 2, 2] >= np.cos(most_angle)) & (p[:, 2] >= NEAR_DISTANCE)
-    if not intrinsics.is_pinhole:  # far outside, a lens model leads back into the image
+    if not intrinsics.is_pinhole:  # a lens model can map points far outside into the image
         chosen &= camera_rays(intrinsics).sees(p)
     pixel = intrinsics.project(p[chosen])
     size = np.array((intrinsics.width, intrinsics.height))
@@ -131,23 +131,23 @@ def _are_in_view(X_CG: Array, intrinsics: Intrinsics, most_angle: float) -> Bool
 
 
 def _image_span(intrinsics: Intrinsics, p_CQ: Array, half: Array) -> Array:
-    """(K, 2) from the images of points moved back by some vectors to those of points moved on."""
+    """(K, 2) image vectors from `p_CQ - half` to `p_CQ + half`."""
     return np.asarray(intrinsics.project(p_CQ + half) - intrinsics.project(p_CQ - half))
 
 
 def _wrap_line_angle(angle: Array) -> Array:
-    """Directions of lines, in (-pi/2, pi/2]."""
+    """Wraps the angles of undirected lines into (-pi/2, pi/2]."""
     return np.asarray(np.pi / 2 - (np.pi / 2 - angle) % np.pi)
 
 
 @dataclass(frozen=True, eq=False)
 class VoxelTargets:
-    """One value a voxel, where grasps were tried.
+    """Training targets of voxels, from grasps that were tried.
 
     Attributes:
-        quality: (n, n, n) share of the grasps in the voxel that held; nan where none was tried.
-        rotation: (n, n, n, 4) quaternion wxyz of the first of them that held; nan where none did.
-        width: (n, n, n) its width in voxels.
+        quality: (n, n, n) success rate of the grasps in the voxel; nan if none was tried.
+        rotation: (n, n, n, 4) quaternion wxyz of the voxel's first successful grasp; nan if none.
+        width: (n, n, n) width of that grasp in voxels.
     """
 
     quality: Single
@@ -160,16 +160,16 @@ class GraspVolume:
     """K grasps with their voxels.
 
     Attributes:
-        grasp: (K,) rows of the grasps that have a label.
-        voxel: (K, 3) indices of the voxels that hold the origins of G.
+        grasp: (K,) indices of the grasps that have a label.
+        voxel: (K, 3) indices of the voxels with the origins of G.
         rotation: (K, 2, 4) unit quaternions wxyz of G in the frame V of the volume, and of the same
             grasp with fingers swapped.
-        width: (K,) distance of the pads in voxels; nan if not known.
+        width: (K,) distance between the pads in voxels; nan if unknown.
         success: (K,) whether the grasp held: `Outcome.held`, also if another object was moved
             (`lifted_disturbed`), or it turned or slid beyond the limits (`lifted_turned`).
-        untried: (L,) rows of grasps whose outcome does not tell whether it holds.
-        outside: (M,) rows of the others whose centre is not in the volume.
-        voxels: along each edge of the volume.
+        untried: (L,) indices of the grasps whose outcome leaves success unknown.
+        outside: (M,) indices of the other grasps, with centres outside the volume.
+        voxels: number of voxels along each edge of the volume.
     """
 
     grasp: Indices
@@ -185,7 +185,7 @@ class GraspVolume:
         return len(self.grasp)
 
     def targets(self) -> VoxelTargets:
-        """One value a voxel, for losses over whole volumes; those that share one count together."""
+        """Targets of all voxels, for losses over whole volumes; merges grasps in the same voxel."""
         cube = (self.voxels,) * 3
         flat = np.ravel_multi_index(tuple(self.voxel.T), cube)
         tried = np.bincount(flat, minlength=self.voxels**3)
@@ -207,24 +207,24 @@ class GraspVolume:
 def volume_grasps(
     grasps: LabelledGrasps, X_CV: Array, *, size: float = VGN_VOLUME_SIZE, voxels: int = VGN_VOXELS
 ) -> GraspVolume:
-    """Labels of voxels.
+    """Assigns grasps to the voxels of a volume.
 
-    A grasp succeeds if its outcome is `Outcome.held`, so also if it disturbed others or the object
-    turned in the hand, and fails with every other outcome that tells, those of an arm that does not
-    get there among them; for labels of the hand alone, judge without an arm.
+    A grasp succeeds if its outcome is `Outcome.held`, so also if it disturbed other objects or the
+    object turned in the hand. It fails with every other conclusive outcome, also if the arm cannot
+    reach it; for labels of the hand alone, judge without an arm.
 
     Args:
-        grasps: in any frame C.
-        X_CV: (4, 4) lower corner of the volume in C, `inverse(X_SC) @ X_SV`. Grasps from
-            `label_grasps(..., X_SV)` are in V already: give the identity.
+        grasps: grasps in any frame C.
+        X_CV: (4, 4) pose of the volume's lower corner in C, `inverse(X_SC) @ X_SV`. Grasps from
+            `label_grasps(..., X_SV)` are in V already: pass the identity.
         size: edge of the volume [m].
-        voxels: along each edge.
+        voxels: number of voxels along each edge.
 
     Returns:
         All grasps, in one of three groups: with a label, untried, outside.
 
     Raises:
-        InvalidInputError: a number does not make sense, or `X_CV` is no pose.
+        InvalidInputError: a number is out of range, or `X_CV` is no pose.
     """
     voxel, _ = voxel_size_and_truncation(size, voxels, None)
     X_VG = inverse(check_pose(X_CV, "X_CV")) @ grasps.X_CG

@@ -42,17 +42,16 @@ GRASPNET_DEPTH_UNIT = 1e-3
 
 
 def grasp_scores(grasps: LabelledGrasps) -> Array:
-    """Scores as the API has them: higher is better, from 0 to 1.
+    """Scores in [0, 1] for graspnetAPI; higher is better.
 
-    There they are 1.1 less the friction coefficient that a grasp needs, and grasps from 0.7 on are
-    loaded unless asked otherwise. Here a grasp that lifts its object gets 1, less up to 0.3 in
-    proportion to how far the object slips in the hand (`slip`, up to 20 mm); if others were
-    disturbed, or the object turned in the hand, 0.7, less the same. A grasp that was tried and
-    failed gets 0.
+    In GraspNet the score is 1.1 minus the friction coefficient that a grasp needs, and grasps from
+    0.7 on are loaded by default. Here a grasp that lifts its object gets 1, or 0.7 if it disturbed
+    other objects or the object turned in the hand; minus up to 0.3 in proportion to the object's
+    slip in the hand (`slip`, up to 20 mm). A grasp that was tried and failed gets 0.
 
     Returns:
-        (N,) scores; nan where nothing is known: grasps that were not judged, that are reachable
-        and were not tried, or whose simulation failed.
+        (N,) scores; nan for grasps that were not judged, that are reachable and were not tried, or
+        whose simulation failed.
     """
     unknown = ("", Outcome.REACHABLE.value, Outcome.SIMULATION_FAILED.value)
     slip = np.nan_to_num(grasps.margins.get("slip", np.zeros(len(grasps))), nan=0.0)
@@ -82,25 +81,24 @@ def write_graspnet(
     Object ids are positions in `samples.objects`, from 0; views are counted from 0 in each scene.
 
     Args:
-        samples: with colour, depth and labels.
-        folder: new or empty.
-        camera: name of the folder of all views; None for one folder for each camera of a scene, by
-            its own name.
-        opening: distance of the pads, for rectangles of grasps [m]; each grasp's own width if None,
-            and no rectangle where it is not known.
-        sensor_depth: depth of the simulated sensor, and not the exact one.
+        samples: data set with colour, depth and labels.
+        folder: new or empty folder.
+        camera: name of the folder of all views; None for one folder per camera, named after it.
+        opening: distance between the pads for grasp rectangles [m]; each grasp's own width if None,
+            without rectangles for unknown widths.
+        sensor_depth: whether to write the simulated sensor's depth instead of the exact one.
 
     Returns:
-        What the layout cannot carry, one sentence each.
+        Data that the layout cannot represent, one sentence each.
 
     Raises:
         InvalidInputError: a sample lacks an image, a lens has distortion, a depth is too large, a
             scene has an object twice, views of one folder have different intrinsics, or the folder
-            has something in it or cannot be written.
+            is not empty or cannot be written.
         UnknownNameError: an object is not in the list or the library.
         MeshError: a mesh of the library is damaged.
     """
-    train_scenes = 100  # Scenes of the split `train`; graspnetAPI reads them all at first.
+    train_scenes = 100  # Scenes of the split `train`, all of which graspnetAPI reads at the start.
     lost = {
         "GraspNet has no amodal masks and no visibilities.",
         "graspnetAPI's loadGrasp of 6D grasps and its evaluation do not work: grasp_label and"
@@ -150,7 +148,7 @@ class _Camera:
             (self._folder / kind).mkdir(parents=True)
 
     def add(self, sample: Sample, depth: NDArray[np.float32]) -> None:
-        """Writes all of a view."""
+        """Writes all files of a view."""
         require_pinhole(sample, "GraspNet")
         color = required_image(sample, "GraspNet", "color")
         labels = required_image(sample, "GraspNet", "labels")
@@ -175,7 +173,7 @@ class _Camera:
             self._write_grasps(sample, sample.grasps, ids, name)
 
     def finish(self) -> None:
-        """Writes what all views share."""
+        """Writes the files that all views share."""
         assert self._K is not None
         X_SC = np.stack(self._X_SC)
         np.save(self._folder / "camera_poses.npy", inverse(X_SC[0]) @ X_SC)
@@ -185,7 +183,7 @@ class _Camera:
         (self._scene / "object_id_list.txt").write_text(ids, encoding="ascii")
 
     def _object_ids(self, sample: Sample) -> list[int]:
-        """By instance."""
+        """Object ids of the instances."""
         ids = [object_index(self._objects, sample, label) for label in sample.instances]
         for k, number in enumerate(ids):
             if number in ids[:k]:
@@ -227,8 +225,8 @@ class _Camera:
         np.save(self._folder / "rect" / f"{name}.npy", rows.astype(np.float32))
 
     def _rectangles(self, sample: Sample, grasps: LabelledGrasps, rated: Array) -> Array:
-        """(K, 7) rows of `rect` of the grasps whose score and opening are known; `rated` has scores
-        and object ids."""
+        """(K, 7) rows of `rect` of grasps with known score and opening; `rated` has scores and
+        object ids."""
         known = np.isfinite(rated[:, 0])
         if self._opening is None:
             known &= np.isfinite(grasps.width)
@@ -254,7 +252,7 @@ def _select_grasps(grasps: LabelledGrasps, kept: Booleans) -> LabelledGrasps:
 
 
 def _meta_mat_file(sample: Sample, ids: list[int]) -> bytes:
-    """A MAT file, the same whenever it is written."""
+    """Reproducible bytes of a MAT file."""
     header_size = 116  # Bytes of text at the start of a MAT file, in which scipy writes the time.
     poses = np.zeros((3, 4, len(ids)))
     for k, label in enumerate(sample.instances):
@@ -271,7 +269,7 @@ def _meta_mat_file(sample: Sample, ids: list[int]) -> bytes:
 
 
 def _pose_annotations(sample: Sample, ids: list[int]) -> bytes:
-    """Poses of the objects as XML; what is called world there is the camera's frame."""
+    """Object poses as XML, in the camera's frame, which the format calls world."""
     top = ElementTree.Element("scene")
     for label, number in zip(sample.instances, ids, strict=True):
         entry = ElementTree.SubElement(top, "obj")

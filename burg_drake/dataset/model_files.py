@@ -16,13 +16,13 @@ from burg_drake.objects import ObjectLibrary, SymmetrySearch
 
 @dataclass(frozen=True, eq=False)
 class VisualModel:
-    """The mesh that an object is looked at with.
+    """Visual mesh of an object.
 
     Attributes:
         vertices: (V, 3) in the object frame O [m].
         normals: (V, 3) unit vectors, outward.
         faces: (F, 3) vertices of each triangle.
-        colors: (V, 3) of the vertices; None for a texture.
+        colors: (V, 3) vertex colours; None with a texture.
         uv: (V, 2) texture coordinates, v upward; None without a texture.
         image: the texture (PIL image), or None.
     """
@@ -36,8 +36,8 @@ class VisualModel:
 
 
 def visual_model(library: ObjectLibrary, name: str) -> VisualModel:
-    """What an object of a library looks like. Of several materials with textures, each part gets
-    the colour of its material instead.
+    """Visual mesh of a library's object. With several textured materials, each part gets the main
+    colour of its material instead of a texture.
 
     Raises:
         UnknownNameError: no such object, or its mesh file is missing.
@@ -61,19 +61,19 @@ def visual_model(library: ObjectLibrary, name: str) -> VisualModel:
 
 
 def uncolored_model(surface: trimesh.Trimesh) -> VisualModel:
-    """A surface without colours."""
+    """Visual mesh of a surface without colours."""
     return VisualModel(
         np.asarray(surface.vertices), np.asarray(surface.vertex_normals), np.asarray(surface.faces)
     )
 
 
 def write_ply(model: VisualModel, path: Path, *, unit: float) -> None:
-    """Writes a PLY file of ASCII; its texture, if there is one, goes beside it as PNG.
+    """Writes an ASCII PLY file, and its texture, if any, beside it as PNG.
 
     Args:
         model: the mesh.
-        path: of the file.
-        unit: of its numbers [m].
+        path: path of the file.
+        unit: unit of the file's coordinates [m].
     """
     columns = [(model.vertices / unit).round(9), model.normals]
     forms = ["%.7g"] * 3 + ["%.5g"] * 3
@@ -108,24 +108,24 @@ def _part_material(part: trimesh.Trimesh) -> Any:
 
 
 def _main_color(part: trimesh.Trimesh) -> Bytes:
-    """(3,) main colour of a part."""
+    """Main colour (3,) of a part."""
     material = _part_material(part)
     rgba = part.visual.main_color if material is None else material.main_color
     return np.asarray(rgba, np.uint8)[:3]
 
 
 def find_symmetries(model: VisualModel, diameter: float) -> dict[str, Any]:
-    """Symmetries by the names of `models_info.json`; empty if there are none.
+    """Symmetries of an object under the keys of `models_info.json`; empty if there are none.
 
     Args:
-        model: what the object looks like. Turns that do not take each colour onto itself do not
-            count; what a texture shows is not known, so that a model with one has none.
-        diameter: of the model [m].
+        model: visual mesh of the object. Symmetries have to preserve colours. A model with a
+            texture has none, as the texture is not analysed.
+        diameter: diameter of the model [m].
 
     Returns:
         `symmetries_continuous`: axes, each with a point on it in millimetres, and
-        `symmetries_discrete`: 4 x 4 matrices, row by row, in millimetres; those there are. A sphere
-        gets three axes, as BOP has no more than axes.
+        `symmetries_discrete`: 4 x 4 matrices, row by row, in millimetres. A key without symmetries
+        is left out. A sphere gets three axes, as BOP can only represent axes.
     """
     max_deviation = 0.01  # Distance of a turned surface from itself, per diameter (BOP allows 0.1).
     if model.image is not None:
@@ -149,7 +149,7 @@ def find_symmetries(model: VisualModel, diameter: float) -> dict[str, Any]:
 
 
 def _colored_parts(model: VisualModel) -> list[trimesh.Trimesh]:
-    """The surface of each colour, if there are several."""
+    """Surfaces of the model by colour, if it has several."""
     if model.colors is None:
         return []
     _, color = np.unique(model.colors[model.faces[:, 0]], axis=0, return_inverse=True)

@@ -19,26 +19,25 @@ def apply_photometry(
     appearance: Appearance,
     rng: np.random.Generator,
 ) -> Bytes:
-    """What a camera makes of a rendered image.
+    """Applies a camera's response to a rendered image.
 
-    The light is multiplied by the gains of objects, exposure and white balance, spread by the blur
-    and counted in electrons: their number varies with its square root, and by the sensor's own
-    noise.
+    Multiplies the light by object gains, exposure and white balance, blurs it, and adds noise: shot
+    noise, the square root of the number of electrons, and the sensor's read noise.
 
     Args:
-        color: (H, W, 3) rendered.
-        labels: (H, W) numbers of instances, from 1; only needed where objects have gains.
-        appearance: what is to be done.
-        rng: draws the noise.
+        color: (H, W, 3) rendered image.
+        labels: (H, W) numbers of instances, from 1; needed only with object gains.
+        appearance: appearance with the camera response.
+        rng: random numbers for the noise.
 
     Returns:
         (H, W, 3) sRGB.
 
     Raises:
-        InvalidInputError: the labels are missing, of another size, or of more instances than there
-            are gains for.
+        InvalidInputError: the labels are missing, of another size, or have more instances than
+            there are gains.
     """
-    read_noise = 3.0  # Electrons; standard deviation of an unlit pixel of a usual CMOS sensor.
+    read_noise = 3.0  # Electrons; standard deviation of an unlit pixel of a typical CMOS sensor.
     light = srgb_to_linear(color)
     if appearance.object_gains:
         light *= _pixel_gains(labels, color.shape[:2], appearance)
@@ -72,6 +71,6 @@ def _pixel_gains(
 
 
 def _srgb_encoding_table(gamma: float) -> Bytes:
-    """(LINEAR_LEVELS,) sRGB of linear light."""
+    """(LINEAR_LEVELS,) sRGB values of levels of linear light."""
     light = np.linspace(0.0, 1.0, LINEAR_LEVELS) ** (1.0 / gamma)
     return linear_to_srgb(light)

@@ -1,4 +1,4 @@
-"""Point clouds of depth images, and points on the true surfaces of the objects."""
+"""Point clouds from depth images, and points on the true surfaces of objects."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from burg_drake.scene import SceneLike, as_scene
 
 @dataclass(frozen=True, eq=False)
 class DepthCloud:
-    """What an image shows, row by row.
+    """Point cloud of a depth image, row by row.
 
     Attributes:
-        points: (N, 3) in the camera's optical frame [m].
+        points: (N, 3) points in the camera's optical frame [m].
         color: (N, 3) red, green, blue; None without a colour image.
         labels: (N,) numbers of the instances; None without a label image.
     """
@@ -34,12 +34,12 @@ class DepthCloud:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceCloud:
-    """Points on the surfaces of a scene's objects, hidden or not, instance by instance.
+    """Points on the surfaces of a scene's objects, visible or not, instance by instance.
 
     Attributes:
-        points: (N, 3) in the scene frame [m].
+        points: (N, 3) points in the scene frame [m].
         normals: (N, 3) outward unit normals of the faces.
-        number: (N,) instance, as in label images.
+        number: (N,) instance numbers, as in label images.
     """
 
     points: Array
@@ -57,18 +57,17 @@ def depth_cloud(
     color: Bytes | None = None,
     labels: NDArray[np.uint16] | None = None,
 ) -> DepthCloud:
-    """The points that the pixels' centres show.
+    """Back-projects a depth image to points.
 
     Args:
-        depth: (H, W) distance along the optical axis [m]; what is not finite or not above 0 is
-            no point.
-        intrinsics: of the camera; lens distortion is taken out.
+        depth: (H, W) distance along the optical axis [m]; pixels that are not finite or not
+            positive are skipped.
+        intrinsics: of the camera; lens distortion is corrected.
         color: (H, W, 3) of the same pixels.
         labels: (H, W) of the same pixels.
 
     Raises:
-        InvalidInputError: an image has another size than the intrinsics, or the depth is of whole
-            numbers.
+        InvalidInputError: an image has another size than the intrinsics, or the depth has integers.
     """
     metres = checked_depth(depth, intrinsics, "the depth image")
     for name, image in (("color", color), ("labels", labels)):
@@ -90,17 +89,16 @@ def surface_cloud(
     per_object: int | None = None,
     density: float | None = None,
 ) -> SurfaceCloud:
-    """Random points on the surfaces of all instances, background included.
+    """Draws points on the surfaces of all instances, background included.
 
     Args:
-        scene: has the instances at their places.
-        rng: source of the points.
-        per_object: points on each instance.
-        density: points on a square metre, in place of `per_object`; each instance has its area
-            times that, rounded.
+        scene: scene with the placed instances.
+        rng: random numbers.
+        per_object: number of points on each instance.
+        density: points per square metre, instead of `per_object`; rounded for each instance.
 
     Raises:
-        InvalidInputError: not exactly one of the two is given, or it is not above 0.
+        InvalidInputError: not exactly one of the two is given, or it is not positive.
         UnknownNameError: a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
@@ -128,11 +126,11 @@ def surface_cloud(
 def checked_depth(
     depth: ArrayLike, intrinsics: Intrinsics, name: str = "the depth image"
 ) -> Single:
-    """A depth image (H, W) in single precision.
+    """Checks a depth image (H, W) and converts it to single precision.
 
     Raises:
-        InvalidInputError: it has another size than the intrinsics, or whole numbers, which are
-            millimetres everywhere.
+        InvalidInputError: the image has another size than the intrinsics, or integers, which are
+            millimetres by convention.
     """
     values = np.asarray(depth)
     if values.dtype.kind != "f":
@@ -147,7 +145,7 @@ def require_image(image: ArrayLike, intrinsics: Intrinsics, name: str) -> None:
     """Refuses an image (H, W, ...) of another size.
 
     Raises:
-        InvalidInputError: it is of another size, or none.
+        InvalidInputError: it is of another size, or no image.
     """
     shape = np.shape(image)
     if len(shape) < 2:

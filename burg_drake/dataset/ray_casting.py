@@ -1,4 +1,4 @@
-"""Exact depth, labels, normals and silhouettes by rays through the centres of pixels."""
+"""Exact depth, labels, normals and silhouettes from rays through the pixel centres."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from burg_drake.geometry import RayCaster
 def pixels_around(
     p_CQ: Array, faces: Indices, intrinsics: Intrinsics, *, beyond: bool = False
 ) -> PixelBox | None:
-    """A rectangle of pixels that holds all that can show a surface before the camera.
+    """Rectangle of pixels that contains the image of a surface.
 
     Args:
-        p_CQ: (V, 3) its vertices in the camera's frame [m].
-        faces: (F, 3) its triangles.
+        p_CQ: (V, 3) vertices of the surface in the camera's frame [m].
+        faces: (F, 3) triangles of the surface.
         intrinsics: of the camera.
-        beyond: whether it may leave the image by the image's size at each edge. A model of lens
-            distortion does not reach further than the image.
+        beyond: whether the rectangle may exceed the image by one image size at each edge. Not
+            with lens distortion, whose model holds only within the image.
 
     Returns:
-        None if there are none.
+        The rectangle; None if no pixel can show the surface.
     """
     before = p_CQ[:, 2] >= NEAR_DISTANCE
     if not before.all():
@@ -51,7 +51,7 @@ def pixels_around(
 
 
 def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Array:
-    """The points that lie before the camera, and where edges come before it."""
+    """Points in front of the camera, and the points where edges cross its near plane."""
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     a, b = p_CQ[edges[before[edges[:, 0]] != before[edges[:, 1]]].T]
     share = (NEAR_DISTANCE - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
@@ -61,15 +61,15 @@ def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Arra
 BOX_NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
 """(6, 3) outward normals of a box: lower x, y, z, then upper x, y, z."""
 SURFACE_TOLERANCE = 1e-9
-"""Metres; smaller lengths of a surface count as 0."""
+"""Metres; smaller dimensions of a surface count as 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class RayBox:
-    """A box, or a rectangle, along the axes of its frame.
+    """A box or rectangle aligned with the axes of its frame.
 
     Attributes:
-        lower, upper: (3,) its corners [m].
+        lower, upper: (3,) corners [m].
     """
 
     lower: Array
@@ -77,7 +77,7 @@ class RayBox:
 
     @classmethod
     def of_surface(cls, vertices: Array, faces: Indices) -> RayBox | None:
-        """The box whose surface triangles are, however they divide it; None if it is another one.
+        """The box that triangles form, however they divide its faces; None for other shapes.
 
         Args:
             vertices: (V, 3) [m].
@@ -96,8 +96,8 @@ class RayBox:
         return cls(lower, upper)
 
     def inverse_depth(self, intrinsics: Intrinsics, X_CB: Array) -> Single | None:
-        """(H, W) 1 / z [1/m] of where a camera's rays meet it, 0 where they do not; None if the
-        camera is within it or in one of its planes.
+        """(H, W) inverse depth 1 / z [1/m] at which a camera's rays hit the box, 0 for a miss; None
+        if the camera is inside the box or in the plane of a face.
 
         Of a plane n . p = d, d from the camera, a ray along (x, y, 1) meets 1 / z =
         n . (x, y, 1) / d, which is linear in x and y. The ray enters where 1 / z is least among
@@ -118,7 +118,7 @@ class RayBox:
         return enter
 
     def planes(self, intrinsics: Intrinsics, X_CB: Array) -> NDArray[np.int16]:
-        """(H, W) number in `BOX_NORMALS` of the plane by which rays enter; where none does, any."""
+        """(H, W) index in `BOX_NORMALS` of the face that each ray enters; arbitrary for a miss."""
         enter: Single | None = None
         found = np.zeros((intrinsics.height, intrinsics.width), np.int16)
         distances = self._distances(X_CB)
@@ -133,12 +133,12 @@ class RayBox:
         return found
 
     def _distances(self, X_CB: Array) -> Array:
-        """(6,) of the camera to each plane, below 0 outside [m]."""
+        """(6,) distances of the camera from the planes of the faces, negative outside [m]."""
         offsets: Array = np.concatenate([-self.lower, self.upper])
         return offsets - BOX_NORMALS @ inverse(X_CB)[:3, 3]
 
     def _planes(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
-        """The number of each plane, and (H, W) 1 / z of where rays meet it, below 0 behind the
+        """Index of each plane, and the (H, W) inverse depth of rays on it, negative behind the
         camera."""
         x, y = camera_rays(intrinsics).slopes
         planes = BOX_NORMALS @ X_CB[:3, :3].T / self._distances(X_CB)[:, None]
@@ -152,13 +152,13 @@ NO_FACE = -1
 
 @dataclass(frozen=True, eq=False)
 class SurfaceHits:
-    """What the rays of a rectangle of pixels meet of one surface.
+    """Hits of the rays through a rectangle of pixels on one surface.
 
     Attributes:
         pixels: the rectangle.
-        unit: (N, 3) directions of the rays in the camera's frame, row by row.
-        face: (h, w) face that each meets, `NO_FACE` for none.
-        depth: (h, w) along the optical axis [m], infinite for none.
+        unit: (N, 3) unit directions of the rays in the camera's frame, row by row.
+        face: (h, w) index of the face that each ray hits, `NO_FACE` for a miss.
+        depth: (h, w) depth along the optical axis [m], infinite for a miss.
     """
 
     pixels: PixelBox
@@ -168,18 +168,18 @@ class SurfaceHits:
 
 
 class RaySurface:
-    """Triangles of one label.
+    """A triangle mesh with one label.
 
     Attributes:
-        label: of the pixels that show it.
-        box: which box they make, if one.
+        label: label of the pixels that show the surface.
+        box: the box that the triangles form; None for other shapes.
     """
 
     def __init__(self, label: int, vertices: Array, faces: Indices) -> None:
-        """Takes the surface.
+        """Stores the mesh.
 
         Args:
-            label: of the pixels that show it.
+            label: label of the pixels that show the surface.
             vertices: (V, 3) in the body's frame [m].
             faces: (F, 3) with F >= 1.
         """
@@ -190,12 +190,12 @@ class RaySurface:
     def cast_rays(
         self, intrinsics: Intrinsics, X_CB: Array, *, beyond: bool = False
     ) -> SurfaceHits | None:
-        """What a camera's rays meet; None if there are no pixels that could show it.
+        """Hits of a camera's rays; None if no pixel can show the surface.
 
         Args:
             intrinsics: of the camera.
-            X_CB: (4, 4) the body in the camera's frame.
-            beyond: whether rays beyond the image's edges count, see `pixels_around`.
+            X_CB: (4, 4) pose of the body in the camera's frame.
+            beyond: whether to cast rays beyond the image's edges, see `pixels_around`.
         """
         p_CQ = transform_points(X_CB, self._vertices)
         pixels = pixels_around(p_CQ, self._faces, intrinsics, beyond=beyond)
@@ -209,13 +209,13 @@ class RaySurface:
         shape = pixels[3] - pixels[1], pixels[2] - pixels[0]
         return SurfaceHits(pixels, unit, face.reshape(shape), distance.reshape(shape))
 
-    def normals(self, met: SurfaceHits, X_CB: Array) -> Single:
-        """(h, w, 3) unit normals of the faces that are met, in the camera's frame, towards it;
-        those of pixels that meet nothing mean nothing."""
+    def normals(self, hits: SurfaceHits, X_CB: Array) -> Single:
+        """(h, w, 3) unit normals of the hit faces in the camera's frame, towards the camera;
+        arbitrary for a miss."""
         normals = self._normals @ X_CB[:3, :3].astype(np.float32).T
-        seen: Single = normals[met.face.ravel()]
-        seen[np.einsum("ij,ij->i", seen, met.unit) > 0.0] *= -1.0
-        return seen.reshape(*met.face.shape, 3)
+        seen: Single = normals[hits.face.ravel()]
+        seen[np.einsum("ij,ij->i", seen, hits.unit) > 0.0] *= -1.0
+        return seen.reshape(*hits.face.shape, 3)
 
     @cached_property
     def _rays(self) -> RayCaster:
@@ -223,7 +223,7 @@ class RaySurface:
 
     @cached_property
     def _normals(self) -> Single:
-        """(F, 3) unit normals, zeros for a face without area."""
+        """(F, 3) unit normals of the faces, zero for a face without area."""
         a, b, c = self._vertices[self._faces].transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -232,11 +232,11 @@ class RaySurface:
 
 
 def surfaces_of_body(label: int, parts: Sequence[tuple[Array, Indices]]) -> list[RaySurface]:
-    """The surfaces that stand for a body's shapes, as few as possible: one for an object, and for
-    what makes a box together, such as the two colours of a board.
+    """Surfaces of a body's shapes, as few as possible: an object gets one, and so do shapes that
+    form a box together, such as the two colours of a board.
 
     Args:
-        label: of the body.
+        label: label of the body.
         parts: vertices (V, 3) in the body's frame [m] and faces (F, 3) of each shape.
     """
     parts = [one for one in parts if len(one[1])]
@@ -254,7 +254,7 @@ def surfaces_of_body(label: int, parts: Sequence[tuple[Array, Indices]]) -> list
 
 
 def _rotate_vectors(unit: Single, R_BC: Array) -> Single:
-    """(N, 3) vectors turned; a matrix product of such a shape starts threads, and takes longer."""
+    """(N, 3) rotated vectors. A matrix product of this shape would start threads and be slower."""
     import cv2
 
     turned = cv2.transform(unit[:, None], R_BC.astype(np.float32))
@@ -263,11 +263,11 @@ def _rotate_vectors(unit: Single, R_BC: Array) -> Single:
 
 @dataclass(frozen=True, eq=False)
 class Silhouette:
-    """All that a camera would see of an object if it were alone.
+    """Silhouette of an object as a camera would see it without anything in front of it.
 
     Attributes:
-        left, top: column and row of the image where `mask` begins; they may lie outside [pixels].
-        mask: (h, w) the smallest rectangle that holds it; empty if there is none.
+        left, top: image column and row where `mask` begins; may lie outside the image [pixels].
+        mask: (h, w) the silhouette in its bounding box; empty if the object is out of view.
     """
 
     left: int
@@ -275,7 +275,7 @@ class Silhouette:
     mask: NDArray[np.bool_]
 
     def mask_in_image(self, width: int, height: int) -> NDArray[np.bool_]:
-        """(height, width) the part that lies in an image of that size."""
+        """(height, width) part of the silhouette within an image of that size."""
         image = np.zeros((height, width), bool)
         rows, columns = self.mask.shape
         x, y = max(self.left, 0), max(self.top, 0)
@@ -287,11 +287,11 @@ class Silhouette:
 
 
 class RayScene:
-    """Surfaces at their places in S, and rays at them.
+    """Surfaces placed in the scene frame S, for ray casting.
 
     Args:
-        surfaces: at most one of each label but for `SURROUNDINGS_LABEL`.
-        X_SB: (4, 4) frame of each; all in S if None.
+        surfaces: at most one of each label, except `SURROUNDINGS_LABEL`.
+        X_SB: (4, 4) pose of each surface in S; identity if None.
     """
 
     def __init__(self, surfaces: Sequence[RaySurface], X_SB: Sequence[Array] | None = None) -> None:
@@ -301,41 +301,41 @@ class RayScene:
         self._last: tuple[View | None, dict[int, SurfaceHits | None]] = None, {}
 
     def images(self, view: View, *, normals: bool = False) -> Images:
-        """Depth and labels of a view; its normals as well if asked for."""
+        """Depth and labels of a view, and its normals if `normals` is set."""
         depth, directions, meshes = self._render_boxes(view, normals)
         labels = np.full(depth.shape, SURROUNDINGS_LABEL, np.uint16)
         self._last = view, {}
         for surface, X_CB in meshes:
-            met = surface.cast_rays(view.intrinsics, X_CB)
-            self._last[1][surface.label] = met
-            if met is None:
+            hits = surface.cast_rays(view.intrinsics, X_CB)
+            self._last[1][surface.label] = hits
+            if hits is None:
                 continue
-            left, top, right, bottom = met.pixels
+            left, top, right, bottom = hits.pixels
             part = np.s_[top:bottom, left:right]
-            nearest = met.depth < depth[part]
-            depth[part][nearest] = met.depth[nearest]
+            nearest = hits.depth < depth[part]
+            depth[part][nearest] = hits.depth[nearest]
             labels[part][nearest] = surface.label
             if directions is not None:
-                directions[part][nearest] = surface.normals(met, X_CB)[nearest]
+                directions[part][nearest] = surface.normals(hits, X_CB)[nearest]
         near, far = view.depth_range
         depth[(depth < near) | (depth > far)] = 0.0
         return Images(depth=depth, labels=labels, normals=directions)
 
     def silhouette(self, number: int, view: View) -> Silhouette:
-        """As `SceneRenderer.silhouette`."""
-        met = self._cast_whole_surface(number, view)
-        mask = np.zeros((0, 0), bool) if met is None else met.face != NO_FACE
+        """See `SceneRenderer.silhouette`."""
+        hits = self._cast_whole_surface(number, view)
+        mask = np.zeros((0, 0), bool) if hits is None else hits.face != NO_FACE
         box = box_of_mask(mask)
-        if met is None or box is None:
+        if hits is None or box is None:
             return Silhouette(0, 0, np.zeros((0, 0), bool))
         left, top, width, height = box
         cut = mask[top : top + height, left : left + width]
-        return Silhouette(met.pixels[0] + left, met.pixels[1] + top, cut)
+        return Silhouette(hits.pixels[0] + left, hits.pixels[1] + top, cut)
 
     def _render_boxes(
         self, view: View, normals: bool
     ) -> tuple[Single, Single | None, list[tuple[RaySurface, Array]]]:
-        """Depth and normals of what is seen of boxes alone, and what rays have to be cast at."""
+        """Depth and normals of the surroundings' boxes, and the surfaces that need ray casting."""
         shape = view.intrinsics.height, view.intrinsics.width
         nearness: Single = np.zeros(shape, np.float32)
         plane, directions = np.zeros(shape, np.int16), [np.zeros((1, 3))]
@@ -358,8 +358,8 @@ class RayScene:
         return depth, np.take(of_plane, plane, axis=0) if normals else None, meshes
 
     def _cast_whole_surface(self, number: int, view: View) -> SurfaceHits | None:
-        """What rays in the image and beyond it meet of an object; what the last image found of it
-        if that is all."""
+        """Hits of rays on an object, in the image and beyond it. Reuses the hits of the last image
+        if they are complete."""
         last, found = self._last
         known = found.get(number) if last is view else None
         if known is not None:

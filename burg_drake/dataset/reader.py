@@ -1,4 +1,4 @@
-"""Reads a data set: any sample by its index, and only the parts that are asked for."""
+"""Reads a data set: any sample by its index, and only the requested parts."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ REMAKE_SHARD_ADVICE = (
 class Dataset(Sequence[Sample]):
     """The samples of a data set, in the order of their scenes.
 
-    It keeps no open files and no pixels, so that it can be pickled, and be read by several
-    processes and threads at once. Samples are told apart by their keys: `"000012_003" in dataset`
-    and `dataset.index("000012_003")` read no images, and the shard of that scene alone.
+    Keeps no open files and no pixels, so that it can be pickled, and read by several processes and
+    threads at once. Keys identify samples: `"000012_003" in dataset` and
+    `dataset.index("000012_003")` read no images, and only the shard of that scene.
 
     Attributes:
-        folder: of the data set.
-        document: what it holds, and was made with.
+        folder: folder of the data set.
+        document: contents of the data set, and how it was made.
     """
 
     def __init__(
@@ -76,18 +76,18 @@ class Dataset(Sequence[Sample]):
         return self.read(index)
 
     def read(self, index: int | str, images: Iterable[str] = READABLE_PARTS) -> Sample:
-        """A sample, with those of its images that are asked for.
+        """Reads the requested parts of a sample.
 
         Args:
-            index: from 0, negative ones count from the end; or the key of the sample.
-            images: of `color`, `depth`, `labels`, `normals` and `sensor_depth`, and `grasps`; no
-                others are decoded. What the sample does not have is None.
+            index: index of the sample, from 0, or negative from the end; or its key.
+            images: parts to decode: `color`, `depth`, `labels`, `normals`, `sensor_depth` and
+                `grasps`. Parts that the sample lacks are None.
 
         Raises:
             IndexError: there is no such sample.
-            UnknownNameError: there is no sample of that key, or no such images.
-            InvalidInputError: the shard is missing or damaged, or a file of the sample is; the
-                message names both.
+            UnknownNameError: there is no sample of that key, or no such part.
+            InvalidInputError: the shard or a file of the sample is missing or damaged; the message
+                names both.
         """
         asked = check_part_names(images)
         shard, key = self._place(self.index(index) if isinstance(index, str) else index)
@@ -99,7 +99,7 @@ class Dataset(Sequence[Sample]):
             raise InvalidInputError(f"{error}; {REMAKE_SHARD_ADVICE}") from error
 
     def parts(self, index: int) -> tuple[str, ...]:
-        """What a sample has of `read`'s images, and `grasps`; none is decoded.
+        """Names of the parts that a sample has; see `read`. Decodes nothing.
 
         Raises:
             IndexError, InvalidInputError: as `read`.
@@ -109,7 +109,7 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
-        """Of all samples, such as `000012_003`; reads the headers of all shards, once.
+        """Keys of all samples, such as `000012_003`. Reads the headers of all shards, once.
 
         Raises:
             InvalidInputError: a shard is missing or damaged.
@@ -134,40 +134,40 @@ class Dataset(Sequence[Sample]):
 
     @property
     def name(self) -> str:
-        """Of the data set."""
+        """Name of the data set."""
         return self.document.name
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Names of the library's objects, in the order of their ids, which count from 1."""
+        """Names of the library's objects, in the order of their ids from 1."""
         return self.document.objects
 
     @cached_property
     def library(self) -> ObjectLibrary:
-        """Where these objects are.
+        """Library of the objects.
 
         Raises:
-            UnknownNameError: it is not there any more.
+            UnknownNameError: the library does not exist any more.
         """
         return load_library(resolve_reference(self.document.library, "models", self.folder))
 
     @cached_property
     def station(self) -> Station:
-        """What the scenes stand on.
+        """Station of the scenes.
 
         Raises:
-            InvalidInputError: the data set names none.
-            UnknownNameError: it is not there any more.
+            InvalidInputError: the data set names no station.
+            UnknownNameError: the station does not exist any more.
         """
         if not self.document.station:
             raise InvalidInputError(f"{self.folder} has no station: its document does not name one")
         return load_station(resolve_reference(self.document.station, "stations", self.folder))
 
     def index(self, value: Sample | str, start: int = 0, stop: int | None = None) -> int:
-        """Index of a sample, by its key or itself.
+        """Index of a sample, or of the sample with a key.
 
         Raises:
-            UnknownNameError: no such sample, or not from `start` on and before `stop`.
+            UnknownNameError: no such sample between `start` (included) and `stop` (excluded).
             InvalidInputError: the shard of its scene is missing or damaged.
         """
         key = value if isinstance(value, str) else value.key
@@ -186,7 +186,7 @@ class Dataset(Sequence[Sample]):
         return indices[keys.index(key)]
 
     def __contains__(self, value: object) -> bool:
-        """Whether there is a sample of this key, or of the key of this sample.
+        """Whether the data set has this key, or the key of this sample.
 
         Raises:
             InvalidInputError: the shard of its scene is missing or damaged.
@@ -200,7 +200,7 @@ class Dataset(Sequence[Sample]):
         return True
 
     def count(self, value: Sample | str) -> int:
-        """1 if it is there, 0 if not: no key is there twice."""
+        """1 if the data set has the sample, else 0, as keys are unique."""
         return int(value in self)
 
     def scene(self, number: int) -> Scene:
@@ -219,7 +219,7 @@ class Dataset(Sequence[Sample]):
         return self.scenes.index(number)
 
     def _place(self, index: int) -> tuple[SampleShard, str]:
-        """SampleShard and key of a sample."""
+        """Shard and key of a sample."""
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.folder} has no sample {index}; it has {len(self)} samples")
         index %= len(self)
@@ -228,10 +228,10 @@ class Dataset(Sequence[Sample]):
         return shard, shard.keys[index - self._ends[number] + self._entries[number].nsamples]
 
     def _shard(self, number: int) -> SampleShard:
-        """The shard of a line of the index.
+        """The shard of an entry of the index.
 
         Raises:
-            InvalidInputError: it is missing, or not what the index says.
+            InvalidInputError: the shard is missing, or does not match the entry.
         """
         entry = self._entries[number]
         path = self.folder / entry.url
@@ -256,8 +256,8 @@ class Dataset(Sequence[Sample]):
 def load_dataset(folder: str | Path) -> Dataset:
     """Opens a data set for reading.
 
-    No shard is looked at yet: one that is damaged is named when a sample of it is read, and all
-    others can be.
+    Opens no shard yet: a damaged shard raises an error when one of its samples is read; samples of
+    other shards stay readable.
 
     Example::
 
@@ -266,11 +266,11 @@ def load_dataset(folder: str | Path) -> Dataset:
         print(len(samples), images.color.shape)
 
     Args:
-        folder: of the data set.
+        folder: folder of the data set.
 
     Raises:
-        InvalidInputError: it is not finished.
-        DocumentError: it is of another version, or damaged.
+        InvalidInputError: the data set is not finished.
+        DocumentError: its document or index is of another version, or damaged.
     """
     folder = Path(folder)
     if not (folder / DOCUMENT_FILE).is_file():
@@ -280,13 +280,13 @@ def load_dataset(folder: str | Path) -> Dataset:
 
 
 class ReadableSamples:
-    """The samples of a data set that can be read; the others are left out, and named.
+    """The readable samples of a data set; skips damaged ones and records why.
 
     Attributes:
-        dataset: where they are.
-        name, objects: of the data set.
-        damaged: how many samples were left out so far, by what is wrong with them: shard, file, and
-            what mends it. All samples of a shard that cannot be opened count as one line.
+        dataset: the data set.
+        name, objects: name and objects of the data set.
+        damaged: number of samples skipped so far, by error message (shard, file, remedy). All
+            samples of a shard that cannot be opened share one message.
     """
 
     def __init__(self, dataset: Dataset) -> None:
@@ -296,18 +296,18 @@ class ReadableSamples:
 
     @property
     def library(self) -> ObjectLibrary:
-        """Where these objects are."""
+        """Library of the objects."""
         return self.dataset.library
 
     def __len__(self) -> int:
-        """All that the index has, damaged ones as well."""
+        """Number of samples in the index, including damaged ones."""
         return len(self.dataset)
 
     def __getitem__(self, index: int, /) -> Sample:
-        """A sample by its index, which a damaged one keeps.
+        """A sample by its index; damaged samples count.
 
         Raises:
-            InvalidInputError: it is damaged.
+            InvalidInputError: the sample is damaged.
         """
         return self.dataset[index]
 
@@ -318,10 +318,10 @@ class ReadableSamples:
         """Reads samples one after the other.
 
         Args:
-            indices: of those that are wanted.
+            indices: indices of the samples.
 
         Raises:
-            InvalidInputError: in the end, if some were wanted and none can be read.
+            InvalidInputError: at the end, if there were indices and no sample was readable.
         """
         found, first = False, None
         for index in indices:

@@ -104,7 +104,7 @@ class DatasetRecipe:
             )
 
     def _require_size(self) -> None:
-        """Refuses images that the sensor does not have, or that are too large to be rendered."""
+        """Refuses image sizes that the sensor does not have, or that are too large to render."""
         try:
             camera = sensor(self.sensor).depth_camera(self.size)
         except InvalidInputError as error:
@@ -117,20 +117,20 @@ class DatasetRecipe:
             )
 
     def plain(self) -> dict[str, Any]:
-        """As dicts, lists, numbers and texts; `read_recipe` reads it."""
+        """The recipe as dicts, lists, numbers and strings, for `read_recipe`."""
         found: dict[str, Any] = plain_data(self)
         return found
 
 
 def read_recipe(data: Mapping[str, Any], name: str = "recipe") -> DatasetRecipe:
-    """A recipe from plain data.
+    """Reads a recipe from plain data.
 
     Args:
-        data: as `DatasetRecipe.plain` gives it.
-        name: stands for the place that it is from in messages.
+        data: as `DatasetRecipe.plain` returns it.
+        name: source of the data, for messages.
 
     Raises:
-        DocumentError: it does not fit; the message names the key.
+        DocumentError: the data are invalid; the message names the key.
     """
     return read_plain_data(data, DatasetRecipe, name)
 
@@ -139,17 +139,17 @@ CONTENT_DIGITS = 16  # Digits of the content hashes in `dataset.yaml`.
 
 
 def library_content(library: ObjectLibrary) -> str:
-    """Hash of what is in a library."""
+    """Hash of a library's content."""
     return content_hash(library.content)[:CONTENT_DIGITS]
 
 
 def portable_recipe(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
-    """A recipe whose references, to a library of distractors and a run, start from the folder of
-    the data set and not from the working directory.
+    """A recipe whose paths, of the distractor library and the run, are relative to the folder of
+    the data set instead of the working directory.
 
     Args:
-        recipe: with a built-in name, or paths from the working directory.
-        folder: of the data set.
+        recipe: recipe with a built-in name, or paths relative to the working directory.
+        folder: folder of the data set.
 
     Raises:
         UnknownNameError: there is no such library.
@@ -163,10 +163,10 @@ def portable_recipe(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
 
 
 def resolve_library_path(reference: str, folder: Path) -> str:
-    """Where a library is that a data set refers to.
+    """Path or built-in name of a library that a data set refers to.
 
     Raises:
-        UnknownNameError: it is not there.
+        UnknownNameError: the library does not exist.
     """
     if reference.startswith(PACKAGE_URI) or reference in builtin_names("models"):
         return str(resolve_reference(reference, "models"))
@@ -174,17 +174,17 @@ def resolve_library_path(reference: str, folder: Path) -> str:
 
 
 def run_folder(recipe: DatasetRecipe, folder: Path) -> Path:
-    """The folder of the run that a data set takes grasps from."""
+    """Folder of the run that provides a data set's grasps."""
     return _resolve_from(folder, recipe.run)
 
 
 def _resolve_from(folder: Path, reference: str) -> Path:
-    """A path from the folder of a data set, which may not be there yet."""
+    """A path relative to the folder of a data set, which need not exist yet."""
     return Path(os.path.normpath(folder.absolute() / reference))
 
 
 def distractors_content(recipe: DatasetRecipe, folder: Path) -> str:
-    """Hash of what is in the library that distractors are from; empty without one."""
+    """Hash of the distractor library's content; empty without distractors."""
     if recipe.looks is None or not recipe.looks.distractors[1]:
         return ""
     root = resolve_library_path(recipe.looks.distractor_library, folder)
@@ -194,11 +194,11 @@ def distractors_content(recipe: DatasetRecipe, folder: Path) -> str:
 def require_same_contents(
     document: DatasetDocument, recipe: DatasetRecipe, folder: Path
 ) -> Station:
-    """The station of a data set, if its libraries and itself are what they were.
+    """Loads the station of a data set. It and the libraries must not have changed.
 
     Raises:
-        InvalidInputError: one is another now; the message names it.
-        UnknownNameError: one is not there any more.
+        InvalidInputError: the station or a library has changed; the message names it.
+        UnknownNameError: the station or a library does not exist any more.
     """
     library = load_library(resolve_reference(document.library, "models", folder))
     station = load_station(resolve_reference(document.station, "stations", folder))

@@ -1,7 +1,7 @@
-"""A room around the table: its environment map, and the background that it gives to images.
+"""A room around the table: its environment map, and the background of images.
 
 The room has walls with windows and furniture, a ceiling with lamps, and a floor. It is drawn once
-as an image of all directions, infinitely far from the camera.
+as an environment map, infinitely far from the camera.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class Panel:
     """A rectangle on a wall.
 
     Attributes:
-        left, right, bottom, top: along the wall from its middle, and above the floor [m].
+        left, right, bottom, top: edges along the wall from its middle, and above the floor [m].
         color: sRGB, from 0 to 1.
-        stripes: upright ones of random tones, as books in a shelf; how many there are.
+        stripes: number of vertical stripes of random tones, like books on a shelf.
     """
 
     left: float
@@ -41,7 +41,7 @@ class Panel:
     stripes: int = 0
 
     def paint(self, image: Array, s: Array, z: Array, rng: np.random.Generator) -> None:
-        """Draws it where pixels (N, 3) lie in it, whose places on the wall are `s` and `z`."""
+        """Paints the panel into pixels (N, 3) at positions `s`, `z` on the wall."""
         inside = (s > self.left) & (s < self.right) & (z > self.bottom) & (z < self.top)
         tones = rng.uniform(0.5, 1.2, (max(1, self.stripes), 3))
         share = (s[inside] - self.left) / (self.right - self.left)
@@ -51,13 +51,13 @@ class Panel:
 
 @lru_cache(maxsize=4)
 def environment_map(seed: int) -> Bytes:
-    """A room as an image of all directions, which cannot be changed; the last ones are kept.
+    """Draws the environment map of a room. The array is read-only; recent maps are cached.
 
     Args:
-        seed: of all that is random about it.
+        seed: seed of the room.
 
     Returns:
-        (ROWS, 2 ROWS, 3) sRGB; see `environment_directions` for where its pixels look.
+        (ROWS, 2 ROWS, 3) sRGB; see `environment_directions` for the directions of its pixels.
     """
     rng = rng_from("room", seed)
     d_W = environment_directions()
@@ -92,14 +92,14 @@ def environment_map(seed: int) -> Bytes:
 
 
 def room_radiance(seed: int, irradiance: float) -> Single:
-    """The light of a room.
+    """Radiance map of a room.
 
     Args:
-        seed: of the room.
-        irradiance: of a table; with 1, what is white is white in the image.
+        seed: seed of the room.
+        irradiance: irradiance of a table; at 1 a white surface is white in the image.
 
     Returns:
-        (RADIANCE_ROWS, 2 RADIANCE_ROWS, 3) linear, arranged as `environment_map`.
+        (RADIANCE_ROWS, 2 RADIANCE_ROWS, 3) linear radiance, arranged as `environment_map`.
     """
     radiance_rows = 64  # Rows of the image that lights the scene.
     seen = environment_map(seed) / 255.0
@@ -115,8 +115,8 @@ def room_radiance(seed: int, irradiance: float) -> Single:
 
 
 def environment_directions(rows: int = ENVIRONMENT_ROWS) -> Array:
-    """(rows, 2 rows, 3) unit vectors in the world along which the pixels' centres look: the first
-    row up, the middle of a row along x, and a quarter of the image to the left of it along y."""
+    """(rows, 2 rows, 3) unit vectors in the world of the pixels' centres: the first row points up,
+    the middle of a row along x, and a quarter of the image to the left of it along y."""
     row = (np.arange(rows) + 0.5) / rows
     column = (np.arange(2 * rows) + 0.5) / (2 * rows)
     polar, azimuth = np.pi * row[:, None], 2.0 * np.pi * (0.5 - column)[None]
@@ -127,8 +127,8 @@ def environment_directions(rows: int = ENVIRONMENT_ROWS) -> Array:
 
 
 def environment_pixels(d_W: Array) -> Array:
-    """(..., 2) column and row of the image of all directions where unit vectors (..., 3) in the
-    world meet it, pixel centres at integers."""
+    """(..., 2) column and row in the environment map of unit vectors (..., 3) in the world, pixel
+    centres at integers."""
     azimuth = np.arctan2(d_W[..., 1], d_W[..., 0])
     polar = np.arccos(np.clip(d_W[..., 2], -1.0, 1.0))
     column = (0.5 - azimuth / (2.0 * np.pi)) * 2 * ENVIRONMENT_ROWS - 0.5
@@ -138,7 +138,7 @@ def environment_pixels(d_W: Array) -> Array:
 def _wall_colors(
     tone: Array, s: Array, z: Array, half: float, windows: bool, rng: np.random.Generator
 ) -> Array:
-    """(N, 3) colours of places on a wall: `s` along it from its middle, `z` above the floor."""
+    """(N, 3) colours at positions on a wall: `s` along it from its middle, `z` above the floor."""
     image = np.broadcast_to(tone, (len(s), 3)) * (0.9 + 0.06 * z[:, None])
     panels = _window_panels(half, rng) if windows else _furniture_panels(half, rng)
     skirting = Panel(-half, half, 0.0, 0.08, tone * 0.7)
@@ -217,14 +217,14 @@ def _paint_ceiling(
 
 
 def _blur_environment(image: Array, sigma: float) -> Array:
-    """The image out of focus; its columns go round."""
+    """Blurs an environment map; its columns wrap around."""
     margin = 32
     wide = np.concatenate([image[:, -margin:], image, image[:, :margin]], axis=1)
     return np.asarray(cv2.GaussianBlur(wide, (0, 0), sigma)[:, margin:-margin])
 
 
 NO_SURFACE_COLOR = (255, 0, 254)
-"""sRGB of pixels in which the renderer found no surface. No surface has this colour."""
+"""sRGB of pixels without a surface in the renderer's images. No surface has this colour."""
 BACKGROUND_GREY = 150
 """sRGB value of the background of an appearance without a room."""
 NO_APPEARANCE_COLOR = (204, 229, 255)
@@ -232,16 +232,16 @@ NO_APPEARANCE_COLOR = (204, 229, 255)
 
 
 def fill_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance) -> Bytes:
-    """An image with the room where the renderer has found nothing.
+    """Fills pixels without a surface with the room.
 
     Args:
-        color: (H, W, 3) of the renderer that `apply_appearance` adds, as it is.
-        X_WC: (4, 4) the camera's optical frame in the world.
+        color: (H, W, 3) image of the renderer that `apply_appearance` adds.
+        X_WC: (4, 4) pose of the camera's optical frame in the world.
         intrinsics: of the camera.
-        look: has the room.
+        look: appearance with the room.
 
     Returns:
-        (H, W, 3) sRGB; the same array if nothing is to be filled.
+        (H, W, 3) sRGB; the same array if every pixel shows a surface.
     """
     nothing = (color == NO_SURFACE_COLOR).all(axis=2)
     if not nothing.any():
@@ -257,14 +257,13 @@ def fill_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
 def blend_over_background(
     color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
 ) -> Bytes:
-    """An image with the room where the renderer has found nothing, mixed in linear light.
+    """Blends an image over the room, in linear light.
 
     Args:
-        color: (H, W, 4) sRGB, and the share of each pixel that anything is in, which colours are
-            not multiplied by.
-        X_WC: (4, 4) the camera's optical frame in the world.
+        color: (H, W, 4) sRGB and coverage of each pixel by surfaces, not premultiplied.
+        X_WC: (4, 4) pose of the camera's optical frame in the world.
         intrinsics: of the camera.
-        look: has the room; None for the sky of simulated cameras.
+        look: appearance with the room; None for the sky of simulated cameras.
 
     Returns:
         (H, W, 3) sRGB.
@@ -283,7 +282,7 @@ def blend_over_background(
 def _background_colors(
     where: Booleans, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
 ) -> Bytes:
-    """(H, W, 3) what is behind everything, in pixels of the mask `where`."""
+    """(H, W, 3) background, in pixels of the mask `where`."""
     behind = np.empty((*where.shape, 3), np.uint8)
     behind[:] = NO_APPEARANCE_COLOR if look is None else BACKGROUND_GREY
     if look is not None and look.room is not None:
@@ -293,11 +292,10 @@ def _background_colors(
 
 
 def _blend_edge_pixels(color: Bytes, nothing: Booleans, edge: Booleans, behind: Bytes) -> Bytes:
-    """(N, 3) pixels of edges, which the renderer has mixed with `NO_SURFACE_COLOR`, mixed with what
-    is behind instead.
+    """(N, 3) pixels on edges, blended with the background instead of `NO_SURFACE_COLOR`.
 
-    The share of `NO_SURFACE_COLOR` in a pixel follows from how much more red and blue it has than
-    green, compared with pixels around it that are not mixed.
+    The share of `NO_SURFACE_COLOR` in a pixel follows from its excess of red and blue over green,
+    compared with unblended pixels around it.
     """
     solid = (~nothing & ~edge).astype(np.float32)
     excess = color[..., [0, 2]].astype(np.float32).mean(axis=2) - color[..., 1]
@@ -313,7 +311,7 @@ def _blend_edge_pixels(color: Bytes, nothing: Booleans, edge: Booleans, behind: 
 
 
 def _sample_environment_map(room: Bytes, pixels: Array) -> Bytes:
-    """(N, 3) colours at columns and rows (N, 2), in parts that OpenCV can take."""
+    """(N, 3) colours at columns and rows (N, 2), looked up in batches that OpenCV accepts."""
     at = pixels.astype(np.float32)[None]
     most = (1 << 15) - 2
     parts = [

@@ -19,18 +19,18 @@ SURROUNDINGS_LABEL = 0
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """Images of one view; those that were not asked for are None.
+    """Images of one view; images that were not requested are None.
 
-    Labels and normals are those of the nearest surface, whether its depth is in the depth range of
-    the view or not: a pixel can have both and no depth.
+    Labels and normals are those of the nearest surface, even outside the view's depth range: a
+    pixel can have both and no depth.
 
     Attributes:
         color: (H, W, 3) red, green, blue.
         depth: (H, W) distance along the optical axis [m]; 0 where nothing is in the depth range.
-        labels: (H, W) number of the instance that the pixel's centre shows: 1 for the first free
-            one of the scene, free ones before background; `SURROUNDINGS_LABEL` for everything else.
+        labels: (H, W) number of the instance at the pixel's centre, from 1, the scene's free
+            instances before background; `SURROUNDINGS_LABEL` for everything else.
         normals: (H, W, 3) unit normals of the surfaces' faces in the camera frame, towards the
-            camera; 0 where nothing is.
+            camera; 0 without a surface.
     """
 
     color: Bytes | None = None
@@ -53,20 +53,20 @@ Box = tuple[int, int, int, int]
 class InstanceLabel:
     """An instance in a view.
 
-    Its silhouette is all that the camera would see of it if it were alone, and if the image had no
-    edges (up to one image size beyond each).
+    Its silhouette is that of the unoccluded object, up to one image size beyond each edge of the
+    image.
 
     Attributes:
-        name: instance in the scene.
-        object: of the library.
-        number: in the label image.
-        X_CO: (4, 4) object's frame in the camera's optical frame.
-        visible_pixels: pixels that show it.
-        silhouette_pixels: of its silhouette, within the image or not.
-        visibility: the first as a share of the second, in [0, 1]; 0 without silhouette.
-        visible_box: smallest one around the visible pixels; None if there are none.
-        amodal_box: around the silhouette; it may reach beyond the image.
-        amodal: (H, W) the part of the silhouette that lies within the image.
+        name: name of the instance in the scene.
+        object: name of the object in the library.
+        number: number in the label image.
+        X_CO: (4, 4) pose of the object in the camera's optical frame.
+        visible_pixels: number of visible pixels.
+        silhouette_pixels: number of pixels of the silhouette, within the image or not.
+        visibility: visible share of the silhouette, in [0, 1]; 0 without silhouette.
+        visible_box: bounding box of the visible pixels; None if there are none.
+        amodal_box: bounding box of the silhouette; may exceed the image.
+        amodal: (H, W) part of the silhouette within the image.
     """
 
     name: str
@@ -82,7 +82,7 @@ class InstanceLabel:
 
 
 def box_of_mask(mask: NDArray[np.bool_]) -> Box | None:
-    """The smallest box around the pixels of a mask (H, W) that are on; None if there are none."""
+    """Bounding box of a mask (H, W); None for an empty mask."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return None
@@ -96,10 +96,10 @@ class LabelledGrasps:
 
     Attributes:
         X_CG: (N, 4, 4) grasp frames in the camera's optical frame: z approach, x closing.
-        width: (N,) distance of the pads when they touch [m]; nan if not known.
-        number: (N,) instance that each grasps, as in the label image.
+        width: (N,) distance between the pads at contact [m]; nan if unknown.
+        number: (N,) number of each grasp's instance in the label image.
         outcome: (N,) outcomes as in a run's table; `""` for a grasp that was not judged.
-        margins: (N,) each by its column in a run's table; nan where there is none.
+        margins: (N,) arrays of margins, by column of a run's table; nan if unknown.
     """
 
     X_CG: Array
@@ -118,15 +118,15 @@ class Sample:
 
     Attributes:
         scene: number of the scene in the data set.
-        number: of the view among those of its scene.
-        view: the camera at its place.
-        X_WS: (4, 4) scene frame in the world.
-        images: what it sees, without noise.
-        sensor_depth: (H, W) the depth as the sensor measures it [m], 0 where it does not; None if
-            no sensor is simulated.
+        number: number of the view in the scene.
+        view: camera and its pose.
+        X_WS: (4, 4) pose of the scene frame in the world.
+        images: images without sensor noise.
+        sensor_depth: (H, W) depth measured by the simulated sensor [m], 0 for no measurement; None
+            without a simulated sensor.
         instances: objects of the scene, in the order of their numbers.
-        grasps: on them; None if none were asked for.
-        appearance: how it looks, as plain data; empty if as usual.
+        grasps: grasps on the objects; None if not requested.
+        appearance: appearance of the scene, as plain data; empty for the default.
     """
 
     scene: int
@@ -141,5 +141,5 @@ class Sample:
 
     @property
     def key(self) -> str:
-        """Names it in the data set, as in `000012_003`."""
+        """Key of the sample in the data set, such as `000012_003`."""
         return f"{self.scene:06d}_{self.number:03d}"

@@ -25,22 +25,22 @@ from burg_drake.core import (
 from burg_drake.dataset.sample import LabelledGrasps
 
 MAX_DEPTH_NUMBER = 65535
-"""Largest number of a pixel in a depth image."""
-NORMAL_OFFSET = 32768  # Number that stands for 0 in an image of normals.
+"""Largest pixel value of a depth image."""
+NORMAL_OFFSET = 32768  # Pixel value of 0 in an image of normals.
 NORMAL_SCALE = 32767
-"""Difference of the numbers for 1 and 0 in an image of normals."""
+"""Difference of the pixel values of 1 and 0 in an image of normals."""
 
 
 @dataclass(frozen=True)
 class PngKind:
-    """What a kind of image is as PNG.
+    """PNG format of a kind of image.
 
     Attributes:
-        types: of its numbers, one of them.
-        channels: 1, or 3.
-        strategy, filter: OpenCV's options, chosen for time first and bytes second, all at level 1;
-            `benchmarks/dataset_io.py` measures them. Where there is grain, looking for anything but
-            runs takes twice the time and more bytes.
+        types: allowed types of the pixel values.
+        channels: 1 or 3.
+        strategy, filter: OpenCV's options, chosen for speed first and size second, all at level 1;
+            `benchmarks/dataset_io.py` measures them. For grainy images, any strategy other than
+            run lengths takes twice the time and more bytes.
     """
 
     types: tuple[type[np.uint8] | type[np.uint16], ...]
@@ -64,15 +64,15 @@ PNG_KINDS = {
 
 
 def encode_image(name: str, image: NDArray[Any], depth_unit: float) -> bytes:
-    """The file of an image.
+    """Encodes an image of a sample.
 
     Args:
         name: a key of `PNG_KINDS`.
-        image: as a sample has it.
-        depth_unit: of depth [m].
+        image: the image, as in `Images`.
+        depth_unit: unit of depth images [m].
 
     Raises:
-        InvalidInputError: depth that cannot be kept, or normals beyond 1.
+        InvalidInputError: a depth is out of range, or a component of a normal exceeds 1.
     """
     kind = PNG_KINDS[name]
     if name in ("depth", "sensor_depth"):
@@ -90,11 +90,11 @@ def encode_image(name: str, image: NDArray[Any], depth_unit: float) -> bytes:
 
 
 def encode_png(image: NDArray[Any], options: Sequence[int] = ()) -> bytes:
-    """Numbers as PNG, without loss.
+    """Encodes an image as PNG, without loss.
 
     Args:
         image: (H, W) of uint8 or uint16, or RGB (H, W, 3).
-        options: OpenCV's, in pairs.
+        options: OpenCV's options, as pairs of key and value.
     """
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
@@ -104,17 +104,17 @@ def encode_png(image: NDArray[Any], options: Sequence[int] = ()) -> bytes:
 def decode_image_of(
     name: str, data: bytes, size: tuple[int, int], depth_unit: float, where: str
 ) -> NDArray[Any]:
-    """The image of a file, as a sample has it.
+    """Decodes an image of a sample.
 
     Args:
         name: a key of `PNG_KINDS`.
-        data: of the file.
-        size: width and height that it has to have; nothing is decoded of another one.
-        depth_unit: of depth [m].
+        data: content of the file.
+        size: required width and height, checked before decoding.
+        depth_unit: unit of depth images [m].
         where: shard and member, for messages.
 
     Raises:
-        InvalidInputError: it is cut off, damaged, of another kind or of another size.
+        InvalidInputError: the image is truncated, damaged, of another kind or of another size.
     """
     kind = PNG_KINDS[name]
     _require_header(data, kind, size, where)
@@ -137,12 +137,12 @@ def decode_image_of(
 
 
 def depth_unit_of(depth_range: tuple[float, float]) -> float:
-    """The unit that depth in this range is kept in [m].
+    """Unit of 16-bit depth images for a depth range [m].
 
     Raises:
-        InvalidInputError: the range reaches farther than 16 bits do.
+        InvalidInputError: the range does not fit into 16 bits.
     """
-    # Metres; the first unit whose range includes the farthest depth is taken.
+    # Metres. The first unit that can represent the farthest depth is taken.
     depth_units = (1e-4, 1e-3)
     for unit in depth_units:
         if depth_range[1] <= MAX_DEPTH_NUMBER * unit:
@@ -171,7 +171,7 @@ def _quantize_normals(normals: Single) -> NDArray[np.uint16]:
 
 
 def _require_header(data: bytes, kind: PngKind, size: tuple[int, int], where: str) -> None:
-    """Compares what is announced, before anything of that size is made (specification, 11.2.2).
+    """Checks the header of a PNG before memory is allocated (PNG specification, 11.2.2).
     libpng compares the check sums."""
     start, end = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"\0\0\0\0IEND\xaeB`\x82"
     if not data.startswith(start):
@@ -195,17 +195,17 @@ def _require_header(data: bytes, kind: PngKind, size: tuple[int, int], where: st
         )
 
 
-FIRST_CHARACTER = 48  # Code of the character that stands for 0.
-CHARACTER_BITS = 5  # Bits of a number in each character.
+FIRST_CHARACTER = 48  # Code of the character for 0.
+CHARACTER_BITS = 5  # Bits of a number per character.
 CONTINUATION_BIT = 1 << CHARACTER_BITS
-"""Bit of a character that another one follows."""
+"""Bit of a character that is not the last of its number."""
 SIGN_BIT = 1 << (CHARACTER_BITS - 1)  # Sign bit of the last character of a number.
 FIRST_DIFFERENCE_RUN = 3
-"""Index of the first run that is written as a difference."""
+"""Index of the first run that is encoded as a difference."""
 
 
 def encode_mask(mask: Booleans) -> str:
-    """The text of a mask.
+    """Encodes a mask as text.
 
     Args:
         mask: (H, W).
@@ -217,14 +217,14 @@ def encode_mask(mask: Booleans) -> str:
 
 
 def decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
-    """(H, W) mask of a text.
+    """Decodes a mask (H, W) from text.
 
     Args:
         text: as `encode_mask` writes it.
-        height, width: of the mask; a caller bounds them.
+        height, width: size of the mask; the caller has to limit it.
 
     Raises:
-        InvalidInputError: the text is no mask, or one of another size.
+        InvalidInputError: the text is no mask, or a mask of another size.
     """
     runs = _decode_runs(text)
     total, size = sum(runs), height * width
@@ -239,14 +239,14 @@ def decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     is_on = np.zeros(len(runs), dtype=bool)
     is_on[1::2] = True
     columns = np.repeat(is_on, runs).reshape(width, height)
-    first = runs[0] // height  # all columns before it are off, and so are those behind the last
+    first = runs[0] // height  # all columns outside `first` to `last` are off
     last = width - (runs[-1] // height if len(runs) % 2 else 0)
     mask[:, first:last] = columns[first:last].T
     return mask
 
 
 def run_lengths(mask: Booleans) -> Indices:
-    """(N,) lengths of the runs of a mask, the first one of pixels that are off.
+    """(N,) lengths of a mask's runs; the first run is of pixels that are off.
 
     Args:
         mask: (H, W).
@@ -275,7 +275,7 @@ def _encode_number(number: int) -> str:
 
 
 def _decode_runs(text: str) -> list[int]:
-    max_characters = 8  # Characters of a number: 40 bits.
+    max_characters = 8  # Of a number: 40 bits.
     runs: list[int] = []
     number = shift = 0
     for character in text:
@@ -298,16 +298,16 @@ def _decode_runs(text: str) -> list[int]:
 
 
 MARGIN_PREFIX = "margin."
-"""Prefix of the names of margin arrays."""
+"""Prefix of the names of arrays of margins."""
 
 
 def encode_grasps(grasps: LabelledGrasps) -> bytes:
-    """The file of grasps."""
+    """Encodes grasps as an `.npz` file with reproducible bytes."""
     timestamp = (1980, 1, 1, 0, 0, 0)  # Earliest time of the ZIP format.
-    unix_system = 3  # ZIP's number of the system that wrote the file.
-    # Read by all, written by the owner; in the upper half of the attributes.
+    unix_system = 3  # ZIP's number of the operating system.
+    # Readable by all, writable by the owner; in the upper half of the attributes.
     permissions = 0o644 << 16
-    compression_level = 1  # Higher ones save nothing: outcomes shrink at any, poses at none.
+    compression_level = 1  # Higher levels save nothing: outcomes shrink at any, poses at none.
     arrays: dict[str, NDArray[Any]] = {
         "X_CG": np.asarray(grasps.X_CG, dtype="<f8"),
         "width": np.asarray(grasps.width, dtype="<f8"),
@@ -328,14 +328,14 @@ def encode_grasps(grasps: LabelledGrasps) -> bytes:
 
 
 def decode_grasps(data: bytes, where: str) -> LabelledGrasps:
-    """The grasps of a file.
+    """Decodes grasps.
 
     Args:
-        data: of the file.
+        data: content of the file.
         where: shard and member, for messages.
 
     Raises:
-        InvalidInputError: it is damaged, or holds something else.
+        InvalidInputError: the file is damaged, or is no file of grasps.
     """
     with (
         report_read_errors(where, "a .npz file of grasps"),
@@ -359,10 +359,10 @@ def decode_grasps(data: bytes, where: str) -> LabelledGrasps:
 
 
 def require_fitting(grasps: LabelledGrasps, instances: int, where: str) -> None:
-    """Refuses grasps whose arrays have different lengths, or that grasp nothing of the sample.
+    """Refuses grasps whose arrays have different lengths or whose instances do not exist.
 
     Raises:
-        InvalidInputError: they do.
+        InvalidInputError: lengths differ, or an instance does not exist.
     """
     if grasps.X_CG.shape != (len(grasps), 4, 4):
         raise InvalidInputError(

@@ -39,7 +39,7 @@ from burg_drake.dataset.sample_encoding import (
 from burg_drake.dataset.views import View
 
 INTRINSICS_KEYS = ("camera", "width", "height", "focal", "center", "distortion", "residual")
-"""Keys of the intrinsics in a record."""
+"""Keys of intrinsics in a record."""
 
 
 class SampleLimits:
@@ -47,7 +47,7 @@ class SampleLimits:
 
     image_pixels = 1 << 26  # Pixels of an image: 8192 x 8192.
     mask_pixels = 1 << 30  # Pixels of all masks of a sample: 3,400 objects at 640 x 480.
-    instances = 65535  # Instances that labels of 16 bits distinguish.
+    instances = 65535  # Instances that 16-bit labels can distinguish.
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +55,9 @@ class SampleRecord:
     """The record of a sample.
 
     Attributes:
-        sample: without images and grasps.
-        files: kinds of those that it has besides, such as `depth` and `grasps`.
-        depth_unit: of its depth images [m].
+        sample: the sample without images and grasps.
+        files: kinds of the sample's other files, such as `depth` and `grasps`.
+        depth_unit: unit of its depth images [m].
     """
 
     sample: Sample
@@ -66,21 +66,21 @@ class SampleRecord:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of its images."""
+        """Width and height of the images [pixels]."""
         intrinsics = self.sample.view.intrinsics
         return intrinsics.width, intrinsics.height
 
 
 def record_text(sample: Sample, files: Sequence[str]) -> str:
-    """The record of a sample as JSON, the same for the same values.
+    """The record of a sample as JSON; equal samples give equal text.
 
     Args:
-        sample: whose images are left aside.
-        files: kinds of those that it has besides.
+        sample: the sample; its images and grasps are not written.
+        files: kinds of the sample's other files.
 
     Raises:
-        InvalidInputError: it is too large, its appearance is no plain data, or its depth range
-            cannot be kept.
+        InvalidInputError: the record is too large, its appearance is no plain data, or its depth
+            range cannot be represented.
     """
     width, height = sample.view.intrinsics.width, sample.view.intrinsics.height
     count = len(sample.instances)
@@ -118,7 +118,7 @@ MAX_COUNT = 1 << 53
 
 @dataclass(frozen=True, kw_only=True)
 class ViewFields:
-    """The view of a record, its pose not yet checked; see `View`."""
+    """View of a record, before its pose is checked; see `View`."""
 
     camera: str
     intrinsics: Intrinsics
@@ -129,7 +129,7 @@ class ViewFields:
 
 @dataclass(frozen=True, kw_only=True)
 class InstanceFields:
-    """An instance of a record, its pose not yet checked, its mask as text; see `InstanceLabel`."""
+    """Instance of a record, before its pose is checked, its mask as text; see `InstanceLabel`."""
 
     RANGES: ClassVar[Ranges] = {
         "number": (1, SampleLimits.instances),
@@ -155,7 +155,7 @@ class InstanceFields:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordFields:
-    """A record as JSON has it, its pose not yet checked; see `Sample` and `SampleRecord`."""
+    """Fields of a record in JSON, before its pose is checked; see `Sample` and `SampleRecord`."""
 
     RANGES: ClassVar[Ranges] = {
         "scene": (0, MAX_COUNT),
@@ -187,14 +187,15 @@ class RecordFields:
 
 
 def parse_record(text: str, where: str) -> SampleRecord:
-    """The record of a sample.
+    """Reads the record of a sample.
 
     Args:
-        text: of the file.
+        text: content of the file.
         where: shard and member, for messages.
 
     Raises:
-        DocumentError: of another version, or a value that does not fit; the message names it.
+        DocumentError: the record is of another version, or a value is invalid; the message names
+            the value.
     """
     fields = read_plain_data(parse_json(text, where), RecordFields, where)
     with _locate_errors(f"{where}: view"):
@@ -220,7 +221,7 @@ def parse_record(text: str, where: str) -> SampleRecord:
 
 
 def _read_pose(rows: Any, name: str) -> Array:
-    """(4, 4) pose of four lists of four numbers."""
+    """(4, 4) pose from four lists of four numbers."""
     try:
         X = np.array(rows, dtype=float)
     except (TypeError, ValueError):
@@ -268,11 +269,11 @@ FILE_KINDS = {suffix: kind for kind, suffix in FILE_SUFFIXES.items()}
 SAMPLE_KEY = re.compile(r"\d{6,12}_\d{3,12}", re.ASCII)
 """Pattern of the keys of samples."""
 READABLE_PARTS = (*PNG_KINDS, GRASPS_KIND)
-"""Parts of a sample that can be read besides its record."""
+"""Parts of a sample that can be read, other than its record."""
 
 
 def member_kind(name: str) -> tuple[str, str] | None:
-    """Key and kind of a file by its name; None for a file that is none of a sample."""
+    """Sample key and kind of a file from its name; None if the file is not part of a sample."""
     key, _, suffix = name.partition(".")
     return (key, FILE_KINDS[suffix]) if suffix in FILE_KINDS and SAMPLE_KEY.fullmatch(key) else None
 
@@ -281,8 +282,8 @@ def encode_sample(sample: Sample) -> Iterator[tuple[str, bytes]]:
     """Names and contents of the files of a sample, the record first.
 
     Raises:
-        InvalidInputError: images that do not fit its intrinsics, values that cannot be kept, or
-            numbers of instances that are not 1, 2, 3...
+        InvalidInputError: images do not match the intrinsics, a value cannot be represented, or the
+            instances are not numbered 1, 2, 3...
     """
     require_consistent(sample)
     images = _available_images(sample)
@@ -300,10 +301,10 @@ def encode_sample(sample: Sample) -> Iterator[tuple[str, bytes]]:
 
 
 def require_consistent(sample: Sample) -> None:
-    """Refuses a sample whose parts do not fit one another.
+    """Refuses a sample whose parts contradict each other.
 
     Raises:
-        InvalidInputError: they do not; the message names the sample.
+        InvalidInputError: parts contradict each other; the message names the sample.
     """
     where = f"sample {sample.key}"
     intrinsics = sample.view.intrinsics
@@ -332,10 +333,10 @@ def require_consistent(sample: Sample) -> None:
 
 
 def check_part_names(parts: Iterable[str]) -> frozenset[str]:
-    """Names of parts that are asked for.
+    """The requested parts as a set.
 
     Raises:
-        UnknownNameError: one is none.
+        UnknownNameError: there is no part of a name.
     """
     asked = frozenset([parts] if isinstance(parts, str) else parts)
     for name in asked:
@@ -347,7 +348,7 @@ def check_part_names(parts: Iterable[str]) -> frozenset[str]:
 
 
 def _available_images(sample: Sample) -> dict[str, Any]:
-    """Those that there are, by name."""
+    """The images that the sample has, by name."""
     images = {name: getattr(sample.images, name) for name in PNG_KINDS if name != "sensor_depth"}
     images["sensor_depth"] = sample.sensor_depth
     return {name: image for name, image in images.items() if image is not None}

@@ -42,17 +42,17 @@ SMALL_PNG_OPTIONS = (cv2.IMWRITE_PNG_COMPRESSION, 9)
 def contact_sheet(
     samples: Sequence[Sample], path: str | Path, rows: int = 4, columns: int = 1, *, title: str = ""
 ) -> None:
-    """Writes samples from all over a data set, evenly spaced: colour, depth and labels of each.
+    """Writes colour, depth and labels of samples that are evenly spaced over a data set.
 
-    Depth is bright where it is near, and grey where there is none; its limits are in the caption.
-    Beside it is that of the sensor, if there is one, in the same colours.
-    Labels are colours of instances, with names and the boxes of what is visible.
+    Near depth is bright, missing depth is grey; the caption has the depth limits. The sensor's
+    depth, if any, is beside it in the same colours. Labels are drawn as colours of instances, with
+    their names and visible bounding boxes.
 
     Args:
         samples: the data set.
         path: file to write, `.png` or `.html`.
-        rows, columns: of samples.
-        title: of the page.
+        rows, columns: numbers of rows and columns of samples.
+        title: title of the page.
 
     Raises:
         InvalidInputError: another suffix, no samples, or the file cannot be written.
@@ -75,7 +75,7 @@ def contact_sheet(
 
 
 def evenly_spaced_indices(count: int, wanted: int) -> list[int]:
-    """Positions in a sequence, evenly spaced, without repetitions."""
+    """Evenly spaced indices of a sequence, without repetitions."""
     return [int(k) for k in np.unique(np.linspace(0, count - 1, min(count, wanted)).round())]
 
 
@@ -95,8 +95,8 @@ def sheet_png(samples: Sequence[Sample], columns: int) -> bytes:
 
 
 def sample_picture(sample: Sample) -> Bytes:
-    """(h, w, 3) colour, depth, that of the sensor and labels side by side; what the sample has not
-    is left out."""
+    """(h, w, 3) colour, depth, sensor depth and labels side by side, as far as the sample has
+    them."""
     intrinsics = sample.view.intrinsics
     height = max(1, round(SheetStyle.panel_width * intrinsics.height / intrinsics.width))
     color, limits = sample.images.color, _sample_depth_limits(sample)
@@ -119,13 +119,13 @@ def depth_colors(depth: Single, limits: tuple[float, float]) -> Bytes:
 
 
 def depth_limits(depth: Single) -> tuple[float, float]:
-    """Nearest and farthest depth of an image [m]; zeros if there is none."""
+    """Nearest and farthest depth of an image [m]; zeros without depth."""
     there = depth[depth > 0.0]
     return (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
 
 
 def sample_caption(sample: Sample) -> str:
-    """What a sample shows, in a line."""
+    """One-line caption of a sample."""
     seen = [label for label in sample.instances if label.visible_pixels]
     text = f"{sample.key}, camera {sample.view.camera}, {len(seen)} of {len(sample.instances)} seen"
     if sample.images.depth is not None or sample.sensor_depth is not None:
@@ -135,14 +135,14 @@ def sample_caption(sample: Sample) -> str:
 
 
 def _sample_depth_limits(sample: Sample) -> tuple[float, float]:
-    """Limits of the exact depth, else of the sensor's [m]."""
+    """Limits of the exact depth, or else of the sensor's depth [m]."""
     exact = sample.images.depth
     depth = sample.sensor_depth if exact is None else exact
     return (0.0, 0.0) if depth is None else depth_limits(depth)
 
 
 def _draw_labels(sample: Sample, height: int) -> Bytes:
-    """Labels over the picture in grey, with names and boxes."""
+    """Draws labels over the colours in grey, with names and boxes."""
     labels, color = sample.images.labels, sample.images.color
     if labels is None:
         return np.full((height, SheetStyle.panel_width, 3), (225, 229, 233), dtype=np.uint8)
@@ -176,14 +176,13 @@ def _draw_labels(sample: Sample, height: int) -> Bytes:
 def place_name_tag(
     box: Array, size: Array, image: tuple[int, int], taken: Sequence[Array]
 ) -> Array:
-    """Where a name is written: at one of the sides of its box, or in it, wherever it covers least
-    of the names that are there.
+    """Place for a name at a side of its box, or in it, with the least overlap with other names.
 
     Args:
         box: (4,) left, top, width, height [pixel].
         size: (2,) width and height of the name.
-        image: width and height of the picture, which it does not leave.
-        taken: (4,) left, top, right, bottom of each name that is there.
+        image: width and height of the picture, which has to contain the name.
+        taken: (4,) left, top, right, bottom of each name placed so far.
 
     Returns:
         (4,) left, top, right, bottom.
@@ -198,13 +197,13 @@ def place_name_tag(
 
 
 def _overlap_area(one: Array, other: Array) -> float:
-    """Area that two rectangles share."""
+    """Area of the intersection of two rectangles."""
     sides = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
     return float(np.prod(np.maximum(sides, 0.0)))
 
 
 def _instance_colors(instances: Sequence[InstanceLabel]) -> dict[int, tuple[int, int, int]]:
-    """Colours by number."""
+    """Colours of instances, by number."""
     found = {}
     for label, color in zip(instances, distinct_colors(len(instances)), strict=True):
         red, green, blue = (round(255 * c) for c in color)
@@ -213,7 +212,7 @@ def _instance_colors(instances: Sequence[InstanceLabel]) -> dict[int, tuple[int,
 
 
 def _contrasting_color(tint: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Black or white, whichever stands out."""
+    """Black or white, whichever has more contrast."""
     return (0, 0, 0) if np.dot(tint, LUMA_WEIGHTS) > 140.0 else (255, 255, 255)
 
 

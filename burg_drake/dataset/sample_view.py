@@ -39,9 +39,9 @@ from burg_drake.visualization import (
 class SamplePaths:
     """Meshcat paths of a sample."""
 
-    cloud = "/drake/cloud"  # Meshcat path of the exact depth.
-    sensor = "/drake/sensor"  # Meshcat path of the sensor's depth.
-    camera = "/drake/camera"  # Meshcat path of the camera and its image.
+    cloud = "/drake/cloud"  # The exact depth.
+    sensor = "/drake/sensor"  # The sensor's depth.
+    camera = "/drake/camera"  # The camera and its image.
 
 
 VIEW_CAMERA_COLOR = "#b3471d"  # Colour of the camera's pyramid, in hexadecimal sRGB.
@@ -50,15 +50,14 @@ VIEW_CAMERA_COLOR = "#b3471d"  # Colour of the camera's pyramid, in hexadecimal 
 def show_sample(
     sample: Sample, scene: Scene, station: Station, meshcat: Meshcat
 ) -> list[LegendEntry]:
-    """Shows a sample in Meshcat: models where the labels say they are, the points that the depth
-    image has, in the colours of the image, those of the sensor, the camera with its picture, and
-    the grasps by outcome. Distractors are among the points alone. The picture is drawn as that of a
-    camera without lens distortion.
+    """Shows a sample in Meshcat: object models at their labelled poses, coloured point clouds of
+    the exact and the sensor's depth, the camera with its image, and grasps by outcome. Distractors
+    appear only in the point clouds. The image is drawn as that of a camera without lens distortion.
 
     Args:
-        sample: with those of its images that are to be seen.
-        scene: of the sample.
-        station: that it stands on; its arm is shown where the view has it.
+        sample: sample with the images to show.
+        scene: scene of the sample.
+        station: station of the scene; its arm is shown in the view's posture.
         meshcat: where to show it.
 
     Returns:
@@ -96,8 +95,8 @@ def show_sample(
 
 
 def picture_corners(intrinsics: Intrinsics, depth: float) -> Array:
-    """(4, 3) corners of a pinhole camera's image at a depth [m], in the optical frame: around it
-    from its upper left."""
+    """(4, 3) corners of a pinhole camera's image at a depth [m], in the optical frame, in order
+    around the image from its upper left."""
     right, bottom = intrinsics.width - 0.5, intrinsics.height - 0.5
     corners = np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
     rays = (corners - intrinsics.center) / intrinsics.focal
@@ -107,9 +106,9 @@ def picture_corners(intrinsics: Intrinsics, depth: float) -> Array:
 def _draw_depth(
     meshcat: Meshcat, path: str, depth: Single, sample: Sample, X_WC: Array
 ) -> LegendEntry:
-    """Points of a depth image, in the colours of the picture; the sensor's, which are hidden at
-    first, are tinted."""
-    max_points = 80_000  # Points of a cloud (3 MB of a page); larger images are thinned out.
+    """Draws a depth image as points in the colours of the image. Points of the sensor are tinted,
+    and hidden at first."""
+    max_points = 80_000  # Per cloud (3 MB of a page); larger images are thinned out.
     # Point size by spacing of far points; three.js draws them 2.4 times too small.
     size_factor = 3.5
     there = np.count_nonzero(depth)
@@ -136,8 +135,8 @@ def _draw_depth(
 
 
 def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, side: float) -> None:
-    """Draws points (N, 3) with colours (N, 3), sRGB in [0, 1], as squares of a side [m]. They are
-    nearer to the camera than they should be by as much as lets them be seen on a model's surface.
+    """Draws points (N, 3) with colours (N, 3), sRGB in [0, 1], as squares of side `side` [m].
+    Moves them slightly towards the camera, so that they show on a model's surface.
     """
     lift = 2e-3  # Metres towards the camera, so that points show on a model's surface.
     cloud = PointCloud(len(points), Fields(int(BaseField.kXYZs) | int(BaseField.kRGBs)))
@@ -149,7 +148,7 @@ def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, sid
 
 
 def _draw_camera(meshcat: Meshcat, corners: Array, color: Bytes | None, X_WC: Array) -> None:
-    """The pyramid over the image, with the picture on it."""
+    """Draws a camera as the pyramid over its image, with the colours on it."""
     rgba = Rgba(*(int(VIEW_CAMERA_COLOR[k : k + 2], 16) / 255.0 for k in (1, 3, 5)))
     outline = np.asfortranarray(np.vstack([corners, corners[:1]]).T)
     meshcat.SetLine(f"{SamplePaths.camera}/image", outline, 2.0, rgba)
@@ -161,7 +160,7 @@ def _draw_camera(meshcat: Meshcat, corners: Array, color: Bytes | None, X_WC: Ar
 
 
 def _draw_grasps(meshcat: Meshcat, grasps: LabelledGrasps, X_WC: Array) -> list[LegendEntry]:
-    """Grasps by outcome; of those whose width is not known, as wide as the widest."""
+    """Draws grasps by outcome. Grasps of unknown width get the largest known width."""
     groups = group_by_outcome([Outcome(text) if text else None for text in grasps.outcome.tolist()])
     known = np.isfinite(grasps.width)
     widest = float(grasps.width[known].max()) if known.any() else 0.08
@@ -170,7 +169,7 @@ def _draw_grasps(meshcat: Meshcat, grasps: LabelledGrasps, X_WC: Array) -> list[
 
 
 def _viewing_direction(X_WC: Array) -> Array:
-    """(3,) where the eye looks: from the camera's side, which is somewhere if it looks down."""
+    """Viewing direction (3,) from the camera's side; from below its image if it looks down."""
     ahead = X_WC[:3, 2] * (1.0, 1.0, 0.0)
     if np.linalg.norm(ahead) < 1e-3:
         ahead = -X_WC[:3, 1] * (1.0, 1.0, 0.0)

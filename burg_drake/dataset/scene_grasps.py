@@ -25,17 +25,17 @@ from burg_drake.station import StationLike, as_station
 
 @dataclass(frozen=True, eq=False)
 class SceneGrasps:
-    """N grasps on the instances of a scene, with what became of them.
+    """N grasps on the instances of a scene, with their outcomes.
 
     Attributes:
         X_OG: (N, 4, 4) grasp frames in the frames of their objects.
         instance: (N,) names of the placed objects.
-        width: (N,) distance of the pads when they touch [m]; nan if not known.
-        outcome: (N,) outcomes as in a run's table; `""` for a grasp that was not judged to its end.
-        margins: (N,) each by its column in a run's table; nan where there is none.
+        width: (N,) distance between the pads at contact [m]; nan if unknown.
+        outcome: (N,) outcomes as in a run's table; `""` for a grasp without a final outcome.
+        margins: (N,) arrays of margins, by column of a run's table; nan if unknown.
 
     Raises:
-        InvalidInputError: the arrays are not of one length, or a pose is none.
+        InvalidInputError: the arrays differ in length, or a pose is invalid.
     """
 
     X_OG: Array
@@ -59,13 +59,13 @@ class SceneGrasps:
 
 
 def label_grasps(grasps: SceneGrasps, scene: SceneLike, X_SC: Array) -> LabelledGrasps:
-    """Grasps as a camera has them: all of them, in their order, seen or not.
+    """Transforms grasps into a camera's frame: all grasps in their order, in view or not.
 
     Args:
-        grasps: on instances of the scene.
-        scene: has them at their places; its order gives their numbers.
-        X_SC: (4, 4) camera's optical frame in the scene frame, or any other frame that the grasps
-            are wanted in, such as that of a volume.
+        grasps: grasps on instances of the scene.
+        scene: scene with the placed instances, whose order gives their numbers.
+        X_SC: (4, 4) pose of the camera's optical frame in the scene frame, or of any other target
+            frame, such as that of a volume.
 
     Raises:
         UnknownNameError: the scene has no such instance.
@@ -87,16 +87,16 @@ def grasps_of_run(run: Run | Campaign | str | Path, scene: SceneLike) -> SceneGr
     """All grasps of a scene in a run, in the order of its candidates.
 
     Args:
-        run: of one scene or of many, complete or not; or its folder.
-        scene: the one that is wanted: the same objects at the same places, under any name. If
-            several scenes of the run are alike, the grasps of all follow each other.
+        run: run of one scene or of many, complete or not; or its folder.
+        scene: the scene: same objects at the same poses, under any name. If several scenes of the
+            run are equal, the grasps of all are concatenated.
 
     Returns:
-        Outcomes and margins as in the run's table. Grasps that it has not judged, or not in this
-        shard, are there with `""` and nan; those whose simulation failed with that outcome.
+        Grasps with outcomes and margins as in the run's table. Grasps that the run has not judged
+        have `""` and nan. Grasps whose simulation failed have that outcome.
 
     Raises:
-        InvalidInputError: the run is of another scene, or could not judge this one.
+        InvalidInputError: the run is of another scene, or failed for this one.
         UnknownNameError: the scene or its library is missing.
         DocumentError: a document does not fit the schema.
     """
@@ -125,18 +125,18 @@ def sampled_grasps(
 
     Args:
         scene: the scene.
-        station: has the hand.
-        per_object: grasps on each free instance; there are fewer where there are no more.
-        seed: of the random numbers.
-        settings: of the sampler. By default it is blind, so that grasps at which the open hand
-            collides are examples, too; with `blind=False` all are clear.
+        station: station with the hand.
+        per_object: number of grasps on each free instance; fewer if the sampler finds no more.
+        seed: seed of the random numbers.
+        settings: settings of the sampler. By default it ignores collisions, to include negative
+            examples; with `blind=False` the open hand collides at no grasp.
 
     Returns:
-        The grasps. The outcome is `""` where the hand is clear, as nothing tells how the grasp
-        would end, else that of the screen, as a run would have it. Margins are those of the screen.
+        The grasps. The outcome is `""` for a clear hand, as there is no trial; otherwise the
+        screen's outcome, as in a run. Margins are those of the screen.
 
     Raises:
-        InvalidInputError: `per_object` is below 1, or a setting does not fit.
+        InvalidInputError: `per_object` is below 1, or a setting is invalid.
         UnknownNameError: a file is missing.
     """
     screen_margins = ("overlap", "clearance")  # Margins that the screen of the open hand measures.
@@ -161,7 +161,7 @@ def sampled_grasps(
 
 
 def _candidates_with_results(run: Run) -> SceneGrasps:
-    """All candidates of a run, with what is known of them."""
+    """All candidates of a run, with their results so far."""
     candidates, results = run.candidates, run.results
     place = {id: k for k, id in enumerate(candidates.id)}
     rows = np.array([place[id] for id in results["id"].tolist()], dtype=np.intp)
@@ -177,8 +177,8 @@ def _candidates_with_results(run: Run) -> SceneGrasps:
 
 
 def _find_runs(campaign: Campaign, scene: Scene) -> list[Run]:
-    """The runs of a scene among those of many, at least one."""
-    entries = campaign.document.mine
+    """Runs of a scene in a campaign, at least one."""
+    entries = campaign.document.assigned_scenes
     names = [entry.name for entry in entries if entry.content == scene.content]
     if not names:
         raise InvalidInputError(

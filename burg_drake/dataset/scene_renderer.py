@@ -1,4 +1,4 @@
-"""Renders images of a scene from any place, and labels the instances in them.
+"""Renders images of a scene from any camera pose, and labels the instances in them.
 
 Drake or Blender renders the colours; `ray_casting` gives depth, labels and normals.
 """
@@ -54,10 +54,10 @@ ImageKind = Literal["color", "depth", "labels", "normals"]
 
 
 class SceneRenderer:
-    """Renders one scene on one station from many places.
+    """Renders one scene on one station from many camera poses.
 
-    Depth, labels and normals come from rays and are exact, and the same with any renderer; colours
-    come from Drake's renderer or Blender.
+    Depth, labels and normals come from ray casting: they are exact, and the same with any renderer.
+    Colours come from Drake's renderer or Blender.
 
     Attributes:
         scene, station: what is rendered.
@@ -77,13 +77,13 @@ class SceneRenderer:
         """Builds the scene.
 
         Args:
-            scene: what stands on the board.
-            station: what is around it.
-            appearance: how it looks; as simulated cameras see it if None.
-            arm: whether the station's arm is there.
-            colors: whether colours will be asked for; without them no system libraries are needed,
-                and all other images are the same.
-            renderer: of colours, `drake` or `blender`, which needs no system libraries.
+            scene: objects on the board.
+            station: surroundings of the board.
+            appearance: lights, textures and distractors; as in simulated cameras if None.
+            arm: whether to include the station's arm.
+            colors: whether to render colours. Without them no system libraries are needed, and all
+                other images are the same.
+            renderer: renderer of colours, `drake` or `blender`, which needs no system libraries.
 
         Raises:
             MissingDependencyError: a system library of Drake's renderer is missing.
@@ -101,7 +101,7 @@ class SceneRenderer:
             self.scene,
             self.station,
             robot="arm" if arm else "none",
-            # The board has markers in any case.
+            # The board has markers in either case.
             cameras=() if self._in_blender else colors or (),
         )
         self._renderer = RENDERER_NAME if colors else None
@@ -121,15 +121,15 @@ class SceneRenderer:
         *,
         rng: np.random.Generator | None = None,
     ) -> Images:
-        """What a camera sees.
+        """Renders the images of a view.
 
         Args:
             view: the camera.
-            kinds: of images.
-            rng: draws the noise of colours, where the appearance has some.
+            kinds: kinds of images.
+            rng: random numbers for the noise of colours, if the appearance has noise.
 
         Raises:
-            InvalidInputError: an image of another kind, or colours of a renderer without them.
+            InvalidInputError: a kind is unknown, or colours were not enabled.
         """
         known_kinds = get_args(ImageKind)
         kinds = tuple(kinds)
@@ -158,12 +158,13 @@ class SceneRenderer:
         )
 
     def silhouette(self, number: int, view: View) -> Silhouette:
-        """All that a camera would see of an object if it were alone.
+        """Silhouette of an object as a camera would see it without anything in front of it.
 
         Args:
-            number: its label.
-            view: the camera. Without lens distortion up to one image size beyond each edge of the
-                image counts, with it the image alone: the model of a lens does not reach further.
+            number: label of the object.
+            view: the camera. Without lens distortion, the silhouette extends up to one image size
+                beyond each edge of the image; with it, it ends at the edge, where the lens model
+                ends.
         """
         self._place_arm(view)
         return self._ray_scene.silhouette(number, view)
@@ -171,13 +172,13 @@ class SceneRenderer:
     def _color_image(
         self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
     ) -> Bytes:
-        """(H, W, 3) what a camera at `X_WC` sees.
+        """(H, W, 3) colour image of a camera at `X_WC`.
 
-        A camera whose lens distorts is rendered as a pinhole camera that sees all that it sees, in
-        whose image its pixels are looked up.
+        For a lens with distortion, renders a pinhole camera that covers its field of view, and
+        resamples that image.
 
         Raises:
-            InvalidInputError: it sees nearly to its sides.
+            InvalidInputError: the field of view is too wide for a pinhole camera.
         """
         if self._renderer is None:
             raise InvalidInputError(
@@ -230,7 +231,7 @@ class SceneRenderer:
 
     @cached_property
     def _surfaces(self) -> list[tuple[BodyIndex, RaySurface]]:
-        """The surfaces that rays meet, each in its body's frame."""
+        """Surfaces for ray casting, each in its body's frame."""
         placed = {**self._built.free, **self._built.fixed}
         owner = {placed[name]: number for name, number in self.numbers.items()}
         found = []
@@ -264,7 +265,7 @@ def render(
     arm: bool = False,
     renderer: RendererName = "drake",
 ) -> Images:
-    """What a camera sees of a scene on a station.
+    """Renders the images of a camera of a scene on a station.
 
     Example::
 
@@ -272,19 +273,19 @@ def render(
         print(images.depth.max(), images.labels.max())
 
     Args:
-        scene: what stands on the board.
-        station: what is around it.
-        camera: its name in the station, or any view.
-        kinds: of images: `color`, `depth`, `labels`, `normals`.
-        arm: whether the station's arm is there, in its home posture if the camera is a name.
-        renderer: of colours, `drake` or `blender`; all else is the same with both.
+        scene: objects on the board.
+        station: surroundings of the board.
+        camera: name of a camera of the station, or any view.
+        kinds: kinds of images: `color`, `depth`, `labels`, `normals`.
+        arm: whether to include the station's arm, in its home posture if the camera is a name.
+        renderer: renderer of colours, `drake` or `blender`; other images are the same with both.
 
     Returns:
-        Images whose pixels are the same ones; those that were not asked for are None.
+        Pixel-aligned images. Images that were not requested are None.
 
     Raises:
         UnknownNameError: there is no such camera, scene, station or renderer.
-        MissingDependencyError: colours were asked for, and the renderer is not installed or lacks a
+        MissingDependencyError: colours are requested, and the renderer is not installed or lacks a
             system library.
         SimulationError: Blender failed.
         InvalidInputError: there is no such kind of image, or the station has no arm.
@@ -306,9 +307,9 @@ def station_view(station: Station, camera: str, *, arm: bool = False) -> View:
     """The view of a station's camera.
 
     Args:
-        station: has the camera.
-        camera: its name.
-        arm: whether the arm is there, in its home posture.
+        station: station with the camera.
+        camera: name of the camera.
+        arm: whether to include the arm, in its home posture.
 
     Raises:
         UnknownNameError: there is no such camera.
@@ -335,9 +336,9 @@ def label_instances(
     """Labels of all instances, in the order of their numbers.
 
     Args:
-        renderer: of the scene.
+        renderer: renderer of the scene.
         view: the camera.
-        images: what it sees, with labels; looked at again if None.
+        images: images of the view, with labels; rendered if None.
     """
     labels = images.labels if images is not None else None
     if labels is None:

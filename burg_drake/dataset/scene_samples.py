@@ -1,4 +1,4 @@
-"""Makes the samples of one scene, on this machine or for another one."""
+"""Makes the samples of one scene, locally or on a remote worker."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class SceneSamples:
 
     Args:
         scene: the scene.
-        number: of it in the data set.
-        station: what it stands on.
-        recipe: how samples are made.
-        folder: of the data set, which the recipe's references start from.
-        appearance: how it looks; drawn by the recipe if None.
-        grasps: on its objects; those that the recipe asks for if None.
+        number: number of the scene in the data set.
+        station: station of the scene.
+        recipe: recipe of the samples.
+        folder: folder of the data set; the recipe's paths are relative to it.
+        appearance: appearance of the scene; drawn by the recipe if None.
+        grasps: grasps on the scene's objects; sampled or read by the recipe if None.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class SceneSamples:
         self._renderers: dict[tuple[bool, bool], SceneRenderer] = {}
 
     def __iter__(self) -> Iterator[Sample]:
-        """The samples, as they are made.
+        """Makes the samples one by one.
 
         Raises:
-            InvalidInputError: a view of the scene cannot be found.
+            InvalidInputError: no view of the scene fulfils the rules.
         """
         recipe, intrinsics, depth_range = self._recipe, None, None
         if recipe.sensor:
@@ -96,9 +96,9 @@ class SceneSamples:
         """The sample of a view.
 
         Args:
-            number: of the view; noise follows from it.
+            number: number of the view; seeds the noise.
             view: the camera.
-            grasps: on the scene's objects.
+            grasps: grasps on the scene's objects.
         """
         recipe, renderer = self._recipe, self._renderer(view, self._recipe.colors)
         rng = rng_from("dataset image", recipe.seed, self._number, number)
@@ -121,7 +121,7 @@ class SceneSamples:
         )
 
     def render_again(self, view: View) -> Images:
-        """Depth and labels of a view, for checks."""
+        """Depth and labels of a view, to compare stored ones with."""
         return self._renderer(view, colors=False).images(view, ("depth", "labels"))
 
     def _renderer(self, view: View, colors: bool) -> SceneRenderer:
@@ -158,10 +158,10 @@ class SceneSamples:
 
 
 def appearance_of(sample: Sample) -> Appearance | None:
-    """How a sample looks, from what is stored with it.
+    """Appearance of a sample, from the data stored with it.
 
     Raises:
-        DocumentError: it does not fit.
+        DocumentError: the data are invalid.
     """
     if not sample.appearance:
         return None
@@ -173,12 +173,12 @@ class SceneWork:
     """A scene to make samples of.
 
     Attributes:
-        number: of the scene.
-        path: of its document; None if it is sampled.
-        recipe: of the data set.
-        folder: of the data set.
-        station: its file.
-        library: folder of the objects of sampled scenes; None for given ones.
+        number: number of the scene.
+        path: path of the scene's document; None for a sampled scene.
+        recipe: recipe of the data set.
+        folder: folder of the data set.
+        station: file of the station.
+        library: library folder for a sampled scene; None for a given one.
     """
 
     number: int
@@ -193,8 +193,8 @@ def make_scene(work: SceneWork) -> ShardEntry:
     """Writes a scene and its samples.
 
     Raises:
-        SimulationError: no scene was accepted, or Drake ended by a failed condition.
-        Exception: what cannot be rendered is one failure.
+        SimulationError: no scene was accepted, or an assertion of Drake failed.
+        Exception: the scene cannot be rendered.
     """
     recipe = work.recipe
     with convert_drake_errors():
@@ -212,14 +212,14 @@ def make_scene(work: SceneWork) -> ShardEntry:
 def given_scene(
     work: SceneWork, library: Callable[[str, Path | None], ObjectLibrary] = load_library
 ) -> Scene:
-    """The scene of a document, as it was when the data set was begun.
+    """Loads a given scene, which must not have changed since the data set was begun.
 
     Args:
-        work: with a path.
+        work: the scene, with a path.
         library: as in `load_scene`.
 
     Raises:
-        InvalidInputError: it is another one by now.
+        InvalidInputError: the scene has changed.
         UnknownNameError, DocumentError: as `load_scene`.
     """
     assert work.path is not None
@@ -232,15 +232,15 @@ def given_scene(
 
 
 def accepted_scene(sampler: SceneSampler, number: int, folder: Path) -> Scene:
-    """The sampled scene of a number.
+    """Samples the scene of a number.
 
     Args:
-        sampler: of the recipe.
-        number: of the scene.
-        folder: of the data set.
+        sampler: sampler of the recipe.
+        number: number of the scene.
+        folder: folder of the data set.
 
     Raises:
-        SimulationError: none was accepted.
+        SimulationError: no attempt was accepted.
     """
     sampled = sampler.sample(number, folder / "scenes")
     if not sampled.accepted:
@@ -259,14 +259,14 @@ class SampleTask:
     """A scene to make samples of.
 
     Attributes:
-        world: hashes of the bundle with station and library, without data.
-        recipe: of the data set, without what is of other scenes or needs files.
-        number: of the scene.
-        document: of it; None if it is sampled.
-        path: of the document on the machine of the data set; of the data set for a sampled scene.
-            Only messages have it.
-        grasps: on its objects; those that the recipe asks for if None.
-        blender: version of Blender, if that renders.
+        world: hashes of the bundle with station and library, without file contents.
+        recipe: recipe of the data set, without other scenes and without references to files.
+        number: number of the scene.
+        document: document of the scene; None for a sampled scene.
+        path: for messages: path of the document on the machine of the data set; of the data set for
+            a sampled scene.
+        grasps: grasps on the scene's objects; sampled by the recipe if None.
+        blender: version of Blender, if Blender renders.
     """
 
     world: Bundle
@@ -280,12 +280,12 @@ class SampleTask:
 
 @dataclass(frozen=True)
 class SampleTaskResult:
-    """What has become of it.
+    """Result of a `SampleTask`.
 
     Attributes:
-        document: of the scene.
-        shard: bytes of its shard.
-        entry: the shard's line of the index.
+        document: document of the scene.
+        shard: bytes of the shard.
+        entry: the shard's entry in the index.
     """
 
     document: SceneDocument
@@ -298,10 +298,10 @@ def run_sample_task(sent: SampleTask, folder: Path) -> SampleTaskResult:
 
     Args:
         sent: the scene.
-        folder: where its world is unpacked.
+        folder: folder of the unpacked bundle.
 
     Raises:
-        Exception: as `make_scene`; or the world is not the one that was sent.
+        Exception: as `make_scene`; or the bundle has other content than the task expects.
     """
     if sent.blender and (version := running_blender().version) != sent.blender:
         raise InvalidInputError(
@@ -317,7 +317,7 @@ def run_sample_task(sent: SampleTask, folder: Path) -> SampleTaskResult:
             sampler = _bundle_scene_sampler(sent.recipe.sampled, sent.world, folder)
             scene = accepted_scene(sampler, sent.number, sent.path)
         samples = SceneSamples(scene, sent.number, station, sent.recipe, folder, grasps=sent.grasps)
-        # beside the bundle, as that is where this machine has room, and old folders are removed
+        # beside the bundle, where this machine has disk space and old folders are removed
         with TemporaryDirectory(dir=folder.parent, prefix=".samples.") as place:
             path = Path(place) / shard_name(sent.number)
             entry = write_shard(path, samples)

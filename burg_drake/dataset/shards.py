@@ -1,4 +1,4 @@
-"""Shards: the samples of a scene as one tar archive with reproducible bytes."""
+"""Shards: the samples of a scene in one tar archive with reproducible bytes."""
 
 from __future__ import annotations
 
@@ -35,33 +35,33 @@ from burg_drake.dataset.sample_files import (
     parse_record,
 )
 
-TAR_BLOCK = 512  # Bytes of a block.
-TAR_END = bytes(2 * TAR_BLOCK)  # Blocks of zeros that end an archive.
+TAR_BLOCK = 512  # Block size in bytes.
+TAR_END = bytes(2 * TAR_BLOCK)  # Zero blocks that end an archive.
 
 
 @dataclass(frozen=True)
 class MemberPlace:
-    """Where in an archive a member's content is [bytes]."""
+    """Offset and size of a member's content in an archive [bytes]."""
 
     start: int
     size: int
 
 
 def tar_member(name: str, data: bytes) -> bytes:
-    """A member with header; time, owner and mode are always the same."""
+    """Bytes of a member with its header. Time, owner and mode are always the same."""
     info = tarfile.TarInfo(name)  # by default of 1970, of nobody, readable for all
     info.size = len(data)
     return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % TAR_BLOCK)
 
 
 def tar_members(path: Path) -> dict[str, MemberPlace]:
-    """The members of an archive by name, in their order.
+    """Members of an archive by name, in archive order.
 
     Raises:
-        InvalidInputError: the archive is missing, cut off, damaged, has a member twice, or one that
-            is no plain file; the message names archive and member.
+        InvalidInputError: the archive is missing, truncated or damaged, or a member is duplicated
+            or no plain file; the message names archive and member.
     """
-    max_members = 1_000_000  # Members of an archive.
+    max_members = 1_000_000
     found: dict[str, MemberPlace] = {}
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -84,10 +84,10 @@ def tar_members(path: Path) -> dict[str, MemberPlace]:
 
 
 def read_member(path: Path, place: MemberPlace) -> bytes:
-    """The content of a member. The file is opened for each, so that processes share none.
+    """Content of a member. Opens the file each time, so that processes share no open file.
 
     Raises:
-        InvalidInputError: it cannot be read, or ends before.
+        InvalidInputError: the archive cannot be read or is truncated.
     """
     with open_regular(path) as stream:
         try:
@@ -100,7 +100,7 @@ def read_member(path: Path, place: MemberPlace) -> bytes:
 
 
 def _parse_header(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]:
-    """Name and place of the member whose header lies at this place."""
+    """Name of a member, and the place of its content, from the header at offset `at`."""
     try:
         info = tarfile.TarInfo.frombuf(header, "ascii", "strict")
     except (tarfile.HeaderError, ValueError) as error:
@@ -117,23 +117,23 @@ def _parse_header(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]
     return info.name, MemberPlace(at + TAR_BLOCK, info.size)
 
 
-SHARD_FOLDER = "shards"  # Folder of the shards in a data set.
+SHARD_FOLDER = "shards"  # Name of the folder of shards in a data set.
 SHARD_URL = re.compile(SHARD_FOLDER + r"/(\d{6,12})\.tar", re.ASCII)
 """Pattern of the paths of shards in a data set."""
 
 
 @dataclass(frozen=True)
 class ShardEntry:
-    """A line of the index.
+    """A shard's entry in the index.
 
     Attributes:
-        url: of the shard, relative to the data set.
-        nsamples: in it.
-        filesize: bytes.
-        md5sum: of the file, as 32 hexadecimal digits.
+        url: path of the shard, relative to the data set.
+        nsamples: number of samples in the shard.
+        filesize: size of the file [bytes].
+        md5sum: MD5 checksum of the file, 32 hexadecimal digits.
 
     Raises:
-        InvalidInputError: a value is none of a shard's.
+        InvalidInputError: a value is invalid.
     """
 
     url: str
@@ -160,20 +160,20 @@ def shard_name(scene: int) -> str:
 
 
 def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
-    """Writes the samples of a scene beside `path`, one by one, and renames the file into place.
+    """Writes the samples of a scene, one by one, to a temporary file and renames it to `path`.
 
-    Several processes can write at once, each another shard. The same samples give the same bytes.
+    Several processes can write different shards at once. The same samples give the same bytes.
 
     Args:
         path: the file, named after the scene's number, as in `shards/000012.tar`.
-        samples: of that scene; they may be made as they are asked for.
+        samples: samples of that scene; may be a generator.
 
     Returns:
-        Its line of the index.
+        The shard's entry in the index.
 
     Raises:
-        InvalidInputError: the disk is full or cannot be written to; a sample is of another scene,
-            is there twice, or does not fit itself. Nothing stays of the shard then.
+        InvalidInputError: the disk is full or cannot be written to; or a sample is of another
+            scene, duplicated, or inconsistent. The unfinished shard is removed.
     """
     path = Path(path)
     digest = hashlib.md5(usedforsecurity=False)
@@ -200,20 +200,21 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
 
 
 def write_made_shard(path: Path, data: bytes) -> None:
-    """Writes the bytes of a shard that was made elsewhere, as `write_shard` does.
+    """Writes the bytes of a shard from another machine, atomically as `write_shard` does.
 
     Raises:
-        InvalidInputError: the disk is full or cannot be written to; nothing stays of it then.
+        InvalidInputError: the disk is full or cannot be written to; the unfinished shard is
+            removed.
     """
     with _write_atomically(path) as stream, _report_write_errors(path):
         stream.write(data)
 
 
 def shard_entry(path: Path) -> ShardEntry:
-    """The line of the index of a shard that is there.
+    """Index entry of an existing shard.
 
     Raises:
-        InvalidInputError: it is damaged.
+        InvalidInputError: the shard is damaged.
     """
     return ShardEntry(
         f"{SHARD_FOLDER}/{path.name}", len(open_shard(path).keys), *size_and_md5(path)
@@ -224,7 +225,7 @@ def size_and_md5(path: Path) -> tuple[int, str]:
     """Size [bytes] and MD5 of a file.
 
     Raises:
-        InvalidInputError: it cannot be read.
+        InvalidInputError: the file cannot be read.
     """
     with open_regular(path) as stream:
         try:
@@ -235,37 +236,37 @@ def size_and_md5(path: Path) -> tuple[int, str]:
 
 
 class SampleShard:
-    """A shard that is read; it holds no open file.
+    """A shard for reading, without an open file.
 
     Attributes:
-        path: of the file.
-        samples: by key, in the order of the archive: for each kind of its files where it is.
-        strangers: names of members that belong to no sample of the scene.
+        path: path of the shard.
+        samples: places of each sample's files by kind, by sample key in archive order.
+        foreign_members: names of members that belong to no sample of the scene.
     """
 
     def __init__(self, path: Path) -> None:
         """Reads the headers; see `open_shard`."""
         self.path = path
         self.samples: dict[str, dict[str, MemberPlace]] = {}
-        self.strangers: list[str] = []
+        self.foreign_members: list[str] = []
         for name, place in tar_members(path).items():
             key_kind = member_kind(name)
             if key_kind is None or key_kind[0].partition("_")[0] != path.stem:
-                self.strangers.append(name)
+                self.foreign_members.append(name)
                 continue
             key, kind = key_kind
             self.samples.setdefault(key, {})[kind] = place
 
     @property
     def keys(self) -> list[str]:
-        """Of its samples, in their order."""
+        """Keys of the samples, in archive order."""
         return list(self.samples)
 
     def record(self, key: str) -> SampleRecord:
         """The record of a sample.
 
         Raises:
-            InvalidInputError: it is missing, damaged, too large or of another version.
+            InvalidInputError: the record is missing, damaged, too large or of another version.
         """
         where = f"{self.path}: {key}.{FILE_SUFFIXES[RECORD_KIND]}"
         try:
@@ -278,12 +279,12 @@ class SampleShard:
         return record
 
     def sample(self, record: SampleRecord, parts: Iterable[str]) -> Sample:
-        """The sample of a record, with those of the parts that it has.
+        """The sample of a record, with the requested parts that it has.
 
         Raises:
             InvalidInputError: a file is missing, damaged, or does not fit the record.
         """
-        max_size = 256 << 20  # Bytes of a file other than the record.
+        max_size = 256 << 20  # Bytes, of any file other than the record.
         sample = record.sample
         for name in parts:
             if name not in record.files:
@@ -312,11 +313,11 @@ class SampleShard:
 
 
 def open_shard(path: Path) -> SampleShard:
-    """A shard for reading; its headers are read once while the file is the same.
+    """Opens a shard for reading. Its headers are cached until the file changes.
 
     Raises:
-        InvalidInputError: it is missing, cut off, damaged, has a member twice, or one that is no
-            plain file; the message names shard and member.
+        InvalidInputError: the shard is missing, truncated or damaged, or a member is duplicated or
+            no plain file; the message names shard and member.
     """
     try:
         state = os.stat(path)
@@ -327,14 +328,14 @@ def open_shard(path: Path) -> SampleShard:
 
 @functools.lru_cache(maxsize=256)
 def _open_unchanged_shard(path: Path, size: int, changed: int) -> SampleShard:
-    """The shard as it was with this size and time of change."""
+    """The shard; file size and modification time are keys of the cache."""
     del size, changed
     return SampleShard(path)
 
 
 @contextmanager
 def _write_atomically(path: Path) -> Iterator[BinaryIO]:
-    """A new file beside `path`, which takes its place when the block ends well."""
+    """Opens a temporary file beside `path` and renames it to `path` if the block succeeds."""
     beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")  # as `UNFINISHED_FILE` has it
     try:
         with _report_write_errors(path):

@@ -15,9 +15,9 @@ def smooth_noise(rng: np.random.Generator, size: int, rows: int, columns: int) -
     """Value noise: random numbers on a periodic grid, with smooth steps between them.
 
     Args:
-        rng: draws.
-        size: of the image, in pixels along each side.
-        rows, columns: of the grid.
+        rng: random numbers.
+        size: pixels along each side of the image.
+        rows, columns: size of the grid.
 
     Returns:
         (size, size) from 0 to 1.
@@ -33,7 +33,7 @@ def smooth_noise(rng: np.random.Generator, size: int, rows: int, columns: int) -
 def layered_noise(
     rng: np.random.Generator, size: int, rows: int, columns: int, layers: int = 5
 ) -> Array:
-    """Sum of value noise of ever finer grids, each half as strong as the one before.
+    """Sum of value noise on successively finer grids, each with half the amplitude.
 
     Returns:
         (size, size) from 0 to 1.
@@ -47,7 +47,7 @@ def layered_noise(
 
 
 def _interpolation_weights(size: int, cells: int) -> tuple[Indices, Indices, Array]:
-    """(size,) the grid's index before and after each pixel, and how far it is from the first."""
+    """(size,) grid indices before and after each pixel, and its smooth weight between them."""
     place = (np.arange(size) + 0.5) * cells / size
     first = np.floor(place).astype(np.intp)
     share = place - first
@@ -57,7 +57,7 @@ def _interpolation_weights(size: int, cells: int) -> tuple[Indices, Indices, Arr
 TEXTURE_PIXELS = 512
 """Pixels along each side of a texture."""
 TEXTURE_EXTENTS = {"wood": 0.8, "cloth": 0.32, "stone": 0.7, "plain": 0.8}
-"""Metres of table that a texture covers along each side, by pattern."""
+"""Side of a texture on the table in metres, by pattern."""
 WOOD_TONES = (
     ((0.80, 0.65, 0.46), (0.66, 0.49, 0.31)),
     ((0.62, 0.43, 0.27), (0.46, 0.29, 0.17)),
@@ -65,14 +65,14 @@ WOOD_TONES = (
     ((0.86, 0.77, 0.62), (0.75, 0.63, 0.46)),
     ((0.55, 0.50, 0.45), (0.42, 0.37, 0.33)),
 )
-"""Light and dark tone (sRGB) of beech, oak, walnut, birch and weathered wood."""
+"""Light and dark tones (sRGB) of beech, oak, walnut, birch and weathered wood."""
 
 
 def table_texture(appearance: Appearance) -> bytes:
-    """The table's texture, a PNG of `TEXTURE_PIXELS` x `TEXTURE_PIXELS`, sRGB; opposite edges fit.
+    """Seamless texture of the table, an sRGB PNG of `TEXTURE_PIXELS` x `TEXTURE_PIXELS`.
 
     Raises:
-        InvalidInputError: the table has its own colour.
+        InvalidInputError: the appearance has no table pattern.
     """
     if appearance.table is None:
         raise InvalidInputError("the appearance has no pattern of the table, so it has no texture")
@@ -93,7 +93,7 @@ def _texture_image(surface: TableSurface) -> Bytes:
 
 
 def _wood_texture(rng: np.random.Generator) -> Array:
-    """Boards with their grain along x."""
+    """Wooden boards with their grain along x."""
     board_counts = (4, 5, 6, 8)  # Wooden boards side by side in one texture.
     light, dark = (np.array(tone) for tone in WOOD_TONES[int(rng.integers(len(WOOD_TONES)))])
     boards = int(rng.choice(board_counts))
@@ -117,7 +117,7 @@ def _wood_texture(rng: np.random.Generator) -> Array:
 
 
 def _cloth_texture(rng: np.random.Generator) -> Array:
-    """A weave, plain, striped or chequered."""
+    """A plain, striped or chequered weave."""
     ground, second = _random_color(rng, 0.35, (0.55, 0.92)), _random_color(rng, 0.6, (0.3, 0.8))
     image = np.broadcast_to(ground, (TEXTURE_PIXELS, TEXTURE_PIXELS, 3)).copy()
     kind, stripes = int(rng.integers(3)), int(rng.choice([4, 8, 16]))
@@ -134,7 +134,7 @@ def _cloth_texture(rng: np.random.Generator) -> Array:
 
 
 def _stone_texture(rng: np.random.Generator) -> Array:
-    """Grains of several tones, and veins."""
+    """Stone with grains of several tones, and veins."""
     ground = _random_color(rng, 0.12, (0.35, 0.85))
     clouds = layered_noise(rng, TEXTURE_PIXELS, 4, 4, 6) - 0.5
     grains = smooth_noise(rng, TEXTURE_PIXELS, 170, 170) - 0.5
@@ -145,13 +145,13 @@ def _stone_texture(rng: np.random.Generator) -> Array:
 
 
 def _plain_texture(rng: np.random.Generator) -> Array:
-    """A colour, somewhat worn."""
+    """A plain, slightly worn surface."""
     ground = _random_color(rng, 0.4, (0.15, 0.95))
     worn = layered_noise(rng, TEXTURE_PIXELS, 4, 4, 6) - 0.5
     return np.asarray(ground * (1.0 + 0.08 * worn)[..., None])
 
 
 def _random_color(rng: np.random.Generator, saturation: float, value: tuple[float, float]) -> Array:
-    """(3,) a random sRGB colour; half of them are nearly grey."""
+    """Draws an sRGB colour (3,); half of the colours are nearly grey."""
     most = saturation if rng.random() < 0.5 else 0.08
     return np.array(colorsys.hsv_to_rgb(rng.random(), rng.uniform(0.0, most), rng.uniform(*value)))

@@ -1,6 +1,6 @@
 """Truncated signed distances on a grid, fused from depth images or computed from the true surfaces.
 
-VGN and the methods derived from it train on fused ones. Exact ones are labels for shape completion.
+VGN and its successors train on fused distances. Exact ones are labels for shape completion.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class Tsdf:
         X_SV: (4, 4) frame of the cube in the scene frame: the origin is its lower corner, x, y and
             z lie along the first, second and third index.
         voxel: edge of a voxel [m]; the centre of voxel (i, j, k) is at ((i, j, k) + 0.5) voxel.
-        truncation: distances are cut off at plus and minus this [m].
-        distance: (n, n, n) signed distances, above 0 outside [m]; nan where nothing is known.
-        weight: (n, n, n) number of images that the distance is a mean of, 0 where it is nan.
+        truncation: distances are clipped to plus and minus this value [m].
+        distance: (n, n, n) signed distances, positive outside [m]; nan in unobserved voxels.
+        weight: (n, n, n) number of images averaged in the distance, 0 where it is nan.
     """
 
     X_SV: Array
@@ -60,8 +60,8 @@ class Tsdf:
 
     @property
     def values(self) -> Single:
-        """(n, n, n) what VGN's network gets: from 0.01 inside over 0.5 at a surface to 0.99; 0 in
-        free space, and where nothing is known."""
+        """(n, n, n) input of VGN's network: from 0.01 inside through 0.5 at a surface to 0.99; 0 in
+        free space and in unobserved voxels."""
         share = self.distance / np.float32(self.truncation)
         near = (share >= -0.98) & (share < 0.98)  # as in Open3D; nan is neither
         return np.asarray(np.where(near, 0.5 * (share + 1.0), 0.0).astype(np.float32))
@@ -77,20 +77,20 @@ def fuse_tsdf(
     voxels: int = VGN_VOXELS,
     truncation: float | None = None,
 ) -> Tsdf:
-    """Fuses depth images; see the module.
+    """Fuses depth images into a grid of truncated signed distances.
 
     Args:
-        depths: K images (H, W) [m]; 0 where there is none.
-        intrinsics: of the camera, or K of them; with lens distortion if they have some.
-        X_SC: (K, 4, 4) camera's optical frames in the scene frame.
-        X_SV: (4, 4) lower corner of the cube in the scene frame.
-        size: its edge [m].
-        voxels: along each edge.
-        truncation: [m]; 4 voxels if None.
+        depths: K depth images (H, W) [m]; 0 for no measurement.
+        intrinsics: of the camera, or of each of the K images. Lens distortion is modelled.
+        X_SC: (K, 4, 4) poses of the camera's optical frame in the scene frame.
+        X_SV: (4, 4) pose of the cube's lower corner in the scene frame.
+        size: edge of the cube [m].
+        voxels: number of voxels along each edge.
+        truncation: truncation distance [m]; 4 voxels if None.
 
     Raises:
-        InvalidInputError: there is no image, images, poses and intrinsics are not as many or do
-            not fit, or a number does not make sense.
+        InvalidInputError: there is no image, the numbers or sizes of images, poses and intrinsics
+            differ, or a number is out of range.
     """
     images = list(np.asarray(depths) if isinstance(depths, np.ndarray) else depths)  # type: ignore[arg-type]
     poses = check_pose(X_SC, "X_SC").reshape(-1, 4, 4)
@@ -125,12 +125,12 @@ def fuse_tsdf(
 def voxel_size_and_truncation(
     size: float, voxels: int, truncation: float | None
 ) -> tuple[float, float]:
-    """Edge of a voxel and truncation [m].
+    """Edge of a voxel and truncation distance [m].
 
     Raises:
-        InvalidInputError: a number does not make sense.
+        InvalidInputError: a number is out of range.
     """
-    max_voxels = 512  # Voxels along an edge; larger grids do not fit into usual memory.
+    max_voxels = 512  # Along an edge; larger grids do not fit into usual memory.
     if not 0.0 < size < np.inf:
         raise InvalidInputError(f"the size of a volume is {size:g} m; give more than 0")
     if not 1 <= voxels <= max_voxels:
@@ -144,7 +144,7 @@ def voxel_size_and_truncation(
 
 
 def voxel_centers(voxels: int, voxel: float) -> Array:
-    """(n^3, 3) centres of the voxels in V [m], the last index first."""
+    """(n^3, 3) centres of the voxels in V [m]; the last index varies fastest."""
     axis = (np.arange(voxels) + 0.5) * voxel
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
 
@@ -152,15 +152,15 @@ def voxel_centers(voxels: int, voxel: float) -> Array:
 def _distances_before_surface(
     depth: Single, camera: Intrinsics, p_CQ: Array
 ) -> tuple[Indices, Array]:
-    """How far points lie before the surface that their pixels show.
+    """Distances of points in front of the surface in a depth image.
 
     Args:
-        depth: (H, W) [m].
-        camera: that took it.
-        p_CQ: (N, 3) points in its frame [m].
+        depth: (H, W) depth image [m].
+        camera: intrinsics of its camera.
+        p_CQ: (N, 3) points in the camera's frame [m].
 
     Returns:
-        (M,) points whose pixels show something, and (M,) distances along the ray [m].
+        (M,) indices of points whose pixels have a depth, and (M,) distances along the ray [m].
     """
     if camera.is_pinhole:
         seen = np.flatnonzero(p_CQ[:, 2] >= NEAR_DISTANCE)
@@ -189,21 +189,21 @@ def exact_tsdf(
     """Signed distances to the nearest surface of a scene.
 
     Surfaces are those of all instances, background included, and of a station's obstacles: all that
-    depth images show but for the arm and distractors.
+    depth images show, except the arm and distractors.
 
     Args:
-        scene: has the instances at their places.
-        X_SV: (4, 4) lower corner of the cube in the scene frame.
-        table: whether all below the board, z < 0 of S, is filled, beyond the table's edges, too.
-        station: whose obstacles there are; none if None.
+        scene: the scene with its placed instances.
+        X_SV: (4, 4) pose of the cube's lower corner in the scene frame.
+        table: whether the half space below the board (z < 0 in S) is solid.
+        station: station whose obstacles to include; no obstacles if None.
         size, voxels, truncation: as for `fuse_tsdf`.
 
     Returns:
-        The smallest of the signed distances of the bodies: where they overlap, one inside of both
-        is that of the deeper one. All weights are 1, as all is known.
+        The minimum of the bodies' signed distances; in an overlap that of the deeper body. All
+        weights are 1.
 
     Raises:
-        InvalidInputError: a number does not make sense, or `X_SV` is no pose.
+        InvalidInputError: a number is out of range, or `X_SV` is no pose.
         UnknownNameError: a mesh file is missing, or there is no such station.
         MeshError: a mesh file is damaged.
     """
@@ -226,27 +226,27 @@ def exact_tsdf(
 
 def box_distance(corner: Array, points: Array) -> Array:
     """(N,) signed distances of points (N, 3) from the box between a corner (3,) and its negative,
-    below 0 inside [m]."""
+    negative inside [m]."""
     beyond = np.abs(points) - corner
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))
 
 
 def _station_boxes(station: Station) -> list[tuple[Array, Array]]:
-    """Half the extents (3,) of each, and poses (4, 4) in the scene frame."""
+    """Half extents (3,) and poses (4, 4) in the scene frame of a station's obstacles."""
     X_SW = inverse(station.document.X_WS.matrix())
     boxes = station.document.background.values()
     return [(np.array(box.size) / 2, X_SW @ box.X_WB.matrix()) for box in boxes]
 
 
 def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
-    """Signed distances of points from a surface, below 0 inside.
+    """Signed distances of points from a surface, negative inside.
 
     Args:
-        mesh: closed, wound outward; of an open one the sign is that of the side which is seen by
-            most of three directions.
-        points: (N, 3) in its frame [m].
-        reach: distances above are this, and those below its negative are that [m].
+        mesh: closed, with outward faces. For an open mesh, a majority vote of three rays decides
+            the sign.
+        points: (N, 3) points in the frame of the mesh [m].
+        reach: distances are clipped to plus and minus this value [m].
 
     Returns:
         (N,) [m].
@@ -264,21 +264,21 @@ def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
 
 
 class _FaceIndex:
-    """The faces of a surface, cut into small ones.
+    """Spatial index of a surface's faces, subdivided into small triangles.
 
     Attributes:
-        triangles: (T, 3, 3) their corners.
-        middle: (T, 3) middles.
-        radius: (T,) of the disks about the middles that they lie in.
-        normal: (T, 3) unit normals; 0 without area.
-        tree: of the middles.
+        triangles: (T, 3, 3) corners of the triangles.
+        middle: (T, 3) centroids.
+        radius: (T,) radii of the disks around the centroids that contain the triangles.
+        normal: (T, 3) unit normals; 0 for a triangle without area.
+        tree: k-d tree of the centroids.
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
         from scipy.spatial import cKDTree
         from trimesh.remesh import subdivide_to_size
 
-        # Shorter edges leave fewer candidates for the nearest face; large objects are cut coarsely.
+        # Shorter edges leave fewer candidates for the nearest face. Large objects get longer edges.
         edge = max(0.01, float(np.linalg.norm(mesh.extents)) / 100)
         vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, edge, max_iter=20)
         triangles = self.triangles = np.asarray(vertices)[np.asarray(faces)]
@@ -289,54 +289,57 @@ class _FaceIndex:
         self.normal, self.tree = normal, cKDTree(middle)
 
     def distance(self, points: Array, reach: float) -> Array:
-        """(N,) distances of points (N, 3) to the nearest face [m]; above `reach` something above
-        it.
+        """(N,) distances of points (N, 3) to the nearest face [m]; beyond `reach` only an upper
+        bound.
 
-        Those to the faces of the nearest middles are a bound; all faces are measured whose disks
-        are nearer.
+        Faces with the nearest centroids give a first bound. Then the distance to every face whose
+        disk is nearer than the bound is computed.
         """
         batch_points = 4096  # Points whose candidate faces are looked up at a time.
         largest = float(self.radius.max())
-        nearest = [*range(1, 1 + min(4, len(self.middle)))]  # faces that give a first bound
+        nearest = [*range(1, 1 + min(4, len(self.middle)))]  # faces for the first bound
         bound, first = self.tree.query(points, k=nearest)
         distance: Array = bound[:, 0].copy()
         close = np.flatnonzero(distance <= reach + largest)
-        self._measure(distance, points, np.repeat(close, first.shape[1]), first[close].reshape(-1))
+        first_points = np.repeat(close, first.shape[1])
+        self._lower_distances(distance, points, first_points, first[close].reshape(-1))
         close = close[distance[close] > 0.0]
         for start in range(0, len(close), batch_points):
-            some = close[start : start + batch_points]
-            radius = np.minimum(distance[some], reach) + largest
-            around = self.tree.query_ball_point(points[some], radius)
-            point = np.repeat(some, [len(faces) for faces in around])
-            face = np.concatenate([np.asarray(faces, np.intp) for faces in around])
-            nearer = self._bound(points[point], face) < distance[point]
-            self._measure(distance, points, point[nearer], face[nearer])
+            batch = close[start : start + batch_points]
+            radius = np.minimum(distance[batch], reach) + largest
+            candidates = self.tree.query_ball_point(points[batch], radius)
+            point = np.repeat(batch, [len(faces) for faces in candidates])
+            face = np.concatenate([np.asarray(faces, np.intp) for faces in candidates])
+            nearer = self._disk_distances(points[point], face) < distance[point]
+            self._lower_distances(distance, points, point[nearer], face[nearer])
         return distance
 
-    def _bound(self, points: Array, face: Indices) -> Array:
-        """(M,) distances of points (M, 3) to the disk of one face each [m]."""
+    def _disk_distances(self, points: Array, face: Indices) -> Array:
+        """(M,) distances of points (M, 3) from the disk of one face each [m]."""
         offset = points - self.middle[face]
         height = np.einsum("ij,ij->i", offset, self.normal[face])
         along = np.einsum("ij,ij->i", offset, offset) - height**2
         beside = np.maximum(np.sqrt(np.maximum(along, 0.0)) - self.radius[face], 0.0)
         return np.asarray(np.hypot(height, beside))
 
-    def _measure(self, distance: Array, points: Array, point: Indices, face: Indices) -> None:
-        """Lowers distances of points (N,) to those of some points to one face each."""
+    def _lower_distances(
+        self, distance: Array, points: Array, point: Indices, face: Indices
+    ) -> None:
+        """Lowers `distance` (N,) where the face `face[i]` is nearer to the point `point[i]`."""
         np.minimum.at(distance, point, triangle_distances(points[point], self.triangles[face]))
 
 
 def _are_inside(mesh: trimesh.Trimesh, points: Array) -> Booleans:
-    """(N,) whether most rays meet a face from behind first."""
-    # Along no face of usual objects; the majority of the rays decides.
+    """(N,) whether most rays from a point hit a face from behind first."""
+    # Not parallel to faces of usual objects.
     ray_directions = ((0.36, 0.48, 0.80), (-0.64, 0.60, 0.48), (0.48, -0.80, -0.36))
     faces = np.asarray(mesh.faces, np.int64)
     corners = np.asarray(mesh.vertices)[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     rays = RayCaster(np.asarray(mesh.vertices, float), faces)
     votes = np.zeros(len(points), int)
-    for look in np.array(ray_directions):
-        look = look / np.linalg.norm(look)
-        face, _ = rays.first_hits(points, np.broadcast_to(look, points.shape))
-        votes += (face >= 0) & (normals[face] @ look > 0.0)
+    for direction in np.array(ray_directions):
+        direction = direction / np.linalg.norm(direction)
+        face, _ = rays.first_hits(points, np.broadcast_to(direction, points.shape))
+        votes += (face >= 0) & (normals[face] @ direction > 0.0)
     return np.asarray(2 * votes > len(ray_directions))

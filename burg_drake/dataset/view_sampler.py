@@ -54,9 +54,9 @@ class PlacedBox:
     """A box in the scene.
 
     Attributes:
-        name: of what it is, or is around.
-        X_SB: (4, 4) pose of its middle.
-        half: (3,) half of its extents [m].
+        name: name of the body that it is, or bounds.
+        X_SB: (4, 4) pose of the box's centre.
+        half: (3,) half extents [m].
     """
 
     name: str
@@ -64,14 +64,14 @@ class PlacedBox:
     half: Array
 
     def contains(self, p_SQ: Array) -> bool:
-        """Whether a point (3,) is in it."""
+        """Whether a point (3,) is in the box."""
         p_BQ = transform_points(inverse(self.X_SB), p_SQ[None])[0]
         return bool((np.abs(p_BQ) < self.half).all())
 
-    def hides(self, p_SC: Array, p_SQ: Array) -> Booleans:
-        """(N,) whether it is between a point (3,) and points (N, 3): part of the line to them is in
-        the box, by the slabs between its three pairs of faces."""
-        tolerance = 1e-6  # Share of the line at its ends in which contact does not count.
+    def occludes(self, p_SC: Array, p_SQ: Array) -> Booleans:
+        """(N,) whether the box blocks the line of sight from a point (3,) to points (N, 3), by a
+        slab test."""
+        tolerance = 1e-6  # Share of the line at either end in which contact does not count.
         X_BS = inverse(self.X_SB)
         start = transform_points(X_BS, p_SC[None])
         along = transform_points(X_BS, p_SQ) - start
@@ -85,7 +85,7 @@ class PlacedBox:
 
 
 def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
-    """The box around an object of a library at a pose (4, 4), along its axes."""
+    """Bounding box of an object of a library at a pose (4, 4), along the object's axes."""
     lower, upper = np.array(entry.lower), np.array(entry.upper)
     X_SB = X_SO.copy()
     X_SB[:3, 3] = transform_points(X_SO, 0.5 * (lower + upper)[None])[0]
@@ -96,16 +96,16 @@ class WristCamera:
     """An arm with a camera on its hand, in one scene.
 
     Attributes:
-        X_HC: (4, 4) optical frame in the hand's frame.
+        X_HC: (4, 4) pose of the optical frame in the hand's frame.
     """
 
     def __init__(self, scene: Scene, station: Station, X_HC: Array | None = None) -> None:
-        """Builds the arm among the scene's objects, which takes about a second.
+        """Builds the arm and its obstacles, which takes about a second.
 
         Args:
-            scene: what the arm must not touch.
-            station: has the arm.
-            X_HC: (4, 4) optical frame in the hand's frame; the usual place if None.
+            scene: obstacles of the arm.
+            station: station with the arm.
+            X_HC: (4, 4) pose of the optical frame in the hand's frame; the usual pose if None.
 
         Raises:
             InvalidInputError: the station has no arm, or the arm collides at home.
@@ -128,8 +128,8 @@ class WristCamera:
         self.X_HC = X_HC
 
     def posture(self, X_SC: Array) -> Array | str:
-        """Joint positions (n,) that bring the camera to a pose (4, 4) while nothing collides, as
-        near to home as there are; or why there are none."""
+        """Collision-free joint positions (n,) that bring the camera to a pose (4, 4), the nearest
+        to home; or the reason why there are none."""
         X_AH = self._X_AS @ X_SC @ inverse(self.X_HC)
         found = [
             self._solutions.solve(X_AH[None], turn)[1] for turn in range(self._solutions.rounds)
@@ -155,7 +155,7 @@ class ViewSampler:
     """Views of one scene on one station.
 
     Attributes:
-        settings: how they are drawn.
+        settings: ranges from which views are drawn.
     """
 
     def __init__(
@@ -168,27 +168,28 @@ class ViewSampler:
         depth_range: tuple[float, float] | None = None,
         besides: Sequence[PlacedBox] = (),
     ) -> None:
-        """Checks that there are such cameras.
+        """Checks that the station has the cameras of the settings.
 
         Args:
-            scene: that is looked at.
-            station: what it stands on; has cameras and arm.
-            settings: how views are drawn.
-            intrinsics: of all cameras; if None those of the station have their own, and those on
-                sphere and wrist have them from the first camera of the station.
-            depth_range: nearest and farthest depth [m]; that of the same camera, or
-                `DEFAULT_DEPTH_RANGE` with given intrinsics, if None.
-            besides: boxes in the scene frame around what belongs to neither: cameras on sphere and
-                wrist are not in them, and see past them. Those of the station stand where they do.
+            scene: scene in view.
+            station: station of the scene, with cameras and arm.
+            settings: ranges from which views are drawn.
+            intrinsics: of all cameras. If None, cameras of the station have their own; those on
+                the sphere and the wrist have those of the station's first camera.
+            depth_range: nearest and farthest depth [m]. If None, that of the same camera, or
+                `DEFAULT_DEPTH_RANGE` with given intrinsics.
+            besides: boxes in the scene frame around other things. Cameras on the sphere and the
+                wrist are kept out of them, and must see past them; those of the station are not
+                checked.
 
         Raises:
             UnknownNameError: the station has no such camera.
             InvalidInputError: the scene is empty; no intrinsics are given and the station has no
-                camera to take them from; or a wrist is wanted of a station without an arm.
+                camera; or the settings name the wrist, and the station has no arm.
         """
         self.settings = settings or ViewpointSettings()
         self._scene, self._station = as_scene(scene), as_station(station)
-        self._given, self._depth_range = intrinsics, depth_range
+        self._given_intrinsics, self._depth_range = intrinsics, depth_range
         self._besides = tuple(besides)
         require_cameras(self.settings, self._station)
         known = self._station.document.cameras
@@ -206,12 +207,12 @@ class ViewSampler:
         """Draws a view.
 
         Args:
-            rng: draws; the same one gives the same view.
-            camera: one of those in the settings; drawn if None.
+            rng: random numbers; the same state gives the same view.
+            camera: a camera of the settings; drawn if None.
 
         Raises:
-            InvalidInputError: none of so many draws fulfils the rules; the message says which of
-                them how many of the draws broke.
+            InvalidInputError: no draw fulfils the rules; the message counts the draws that broke
+                each rule.
             UnknownNameError: the settings have no such camera.
         """
         cameras = self.settings.cameras
@@ -238,7 +239,7 @@ class ViewSampler:
         )
 
     def _draw(self, camera: str, rng: np.random.Generator) -> View | str:
-        """A view, or which rule it breaks."""
+        """A view, or the rule that it breaks."""
         known = self._station.document.cameras
         intrinsics, depth_range = self._optics(camera)
         solids = self._solids if camera in known else (*self._solids, *self._besides)
@@ -259,15 +260,15 @@ class ViewSampler:
         return replace(view, posture=tuple(posture.tolist()))
 
     def _optics(self, camera: str) -> tuple[Intrinsics, tuple[float, float]]:
-        """Intrinsics and range of depths of a camera."""
+        """Intrinsics and depth range of a camera."""
         known = self._station.document.cameras
-        if self._given is not None:
-            return self._given, self._depth_range or DEFAULT_DEPTH_RANGE
+        if self._given_intrinsics is not None:
+            return self._given_intrinsics, self._depth_range or DEFAULT_DEPTH_RANGE
         document = known.get(camera) or next(iter(known.values()))
         return camera_intrinsics(document), self._depth_range or document.depth_range
 
     def _broken_rule(self, view: View, solids: Sequence[PlacedBox]) -> str:
-        """Which rule of what is seen a camera breaks, in words; empty if none."""
+        """The visibility rule that a view breaks, in words; empty if none."""
         p_SC = view.X_SC[:3, 3]
         for box in (*solids, *self._objects):
             if box.contains(p_SC):
@@ -278,8 +279,8 @@ class ViewSampler:
         return ""
 
     def _count_visible(self, view: View, solids: Sequence[PlacedBox]) -> int:
-        """How many objects have their centres in the image and the range of depths, with none of
-        the solids before them."""
+        """Number of objects whose centres are in the image and the depth range, and not occluded
+        by the solids."""
         p_SO, intrinsics = self._p_SO, view.intrinsics
         p_CO = transform_points(inverse(view.X_SC), p_SO)
         near, far = view.depth_range
@@ -290,12 +291,12 @@ class ViewSampler:
         size = np.array((intrinsics.width, intrinsics.height))
         seen &= ((pixel >= -0.5) & (pixel <= size - 0.5)).all(axis=1)
         for box in solids:
-            seen &= ~box.hides(view.X_SC[:3, 3], p_SO)
+            seen &= ~box.occludes(view.X_SC[:3, 3], p_SO)
         return int(seen.sum())
 
     @cached_property
     def _solids(self) -> tuple[PlacedBox, ...]:
-        """Table and obstacles."""
+        """Boxes of the table and the obstacles."""
         X_SW = inverse(self._station.document.X_WS.matrix())
         boxes = {"table": table_box(self._station), **obstacle_boxes(self._station)}
         return tuple(
@@ -304,7 +305,7 @@ class ViewSampler:
 
     @cached_property
     def _objects(self) -> tuple[PlacedBox, ...]:
-        """The boxes around all instances, along the axes of each: free ones, then background."""
+        """Bounding boxes of all instances, along the axes of each: free ones, then background."""
         return tuple(
             box_around(name, self._scene.entry(name), self._scene.X_SO(name))
             for name in (*self._scene.instances, *self._scene.background)
@@ -312,8 +313,7 @@ class ViewSampler:
 
     @cached_property
     def _p_SO(self) -> Array:
-        """(N, 3) centres of what there is to see [m]: free instances, or the background if there
-        are none."""
+        """(N, 3) centres of the free instances, or of the background if there are none [m]."""
         seen = self._objects[: len(self._scene.instances)] or self._objects
         return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
 

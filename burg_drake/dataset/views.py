@@ -1,4 +1,4 @@
-"""Views of a scene: camera poses with their intrinsics, and the settings that they are drawn by."""
+"""Views of a scene: camera poses with their intrinsics, and settings for drawing them."""
 
 from __future__ import annotations
 
@@ -29,20 +29,19 @@ DEFAULT_DEPTH_RANGE = (0.05, 5.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """A camera at its place.
+    """A camera at a pose.
 
     Attributes:
-        camera: what it was made from: a camera of the station, `sphere` or `wrist`.
+        camera: origin of the view: a camera of the station, `sphere` or `wrist`.
         intrinsics: size, focal lengths, principal point (OpenCV's: pixel centres at integers) and
             distortion.
-        X_SC: (4, 4) optical frame in the scene frame: z forward, x right, y down.
-        depth_range: nearest and farthest depth that is measured [m]; there is none outside of it.
-        posture: (n,) joint positions of the station's arm, which is in view then [rad]; no robot
-            if None.
+        X_SC: (4, 4) pose of the optical frame in the scene frame: z forward, x right, y down.
+        depth_range: nearest and farthest depth that the camera measures [m].
+        posture: (n,) joint positions of the station's arm [rad]; no robot in the scene if None.
 
     Raises:
-        InvalidInputError: the depth range does not rise from above 0, the pose is none, or the
-            camera is a fisheye, which sees what no image of Drake's cameras shows.
+        InvalidInputError: the depth range is not positive and rising, the pose is invalid, or the
+            camera is a fisheye, whose field of view Drake's cameras cannot cover.
     """
 
     camera: str
@@ -71,11 +70,11 @@ def set_posture(joints: Sequence[Any], context: Any, posture: Sequence[float]) -
 
     Args:
         joints: Drake's revolute joints of the arm.
-        context: of the plant.
+        context: context of the plant.
         posture: (n,) joint positions [rad].
 
     Raises:
-        InvalidInputError: they are of another arm.
+        InvalidInputError: the numbers of joints and positions differ.
     """
     if len(posture) != len(joints):
         raise InvalidInputError(
@@ -85,8 +84,8 @@ def set_posture(joints: Sequence[Any], context: Any, posture: Sequence[float]) -
         joint.set_angle(context, position)
 
 
-SPHERE_CAMERA = "sphere"  # Name of the camera on a sphere around the scene, which no station has.
-WRIST_CAMERA = "wrist"  # Name of the camera on the hand, which no station has.
+SPHERE_CAMERA = "sphere"  # Reserved name of the camera on a sphere around the scene.
+WRIST_CAMERA = "wrist"  # Reserved name of the camera on the hand.
 
 
 Range = tuple[float, float]
@@ -164,10 +163,10 @@ def camera_looking_at(
 
     Args:
         p_ST: (3,) the point [m].
-        distance: of the camera from it [m].
-        elevation: of the camera above the point's level [rad].
-        azimuth: of the camera, from x, counter-clockwise about z [rad].
-        roll: about the optical axis [rad]; at 0 the camera's x axis is level.
+        distance: distance of the camera from the point [m].
+        elevation: angle of the camera above the horizontal plane through the point [rad].
+        azimuth: azimuth of the camera, from x, counter-clockwise about z [rad].
+        roll: rotation about the optical axis [rad]; at 0 the camera's x axis is level.
     """
     (se, ce), (sa, ca) = ((np.sin(a), np.cos(a)) for a in (elevation, azimuth))
     outward = np.array([ce * ca, ce * sa, se])
@@ -179,8 +178,8 @@ def camera_looking_at(
 def draw_camera_on_sphere(
     settings: ViewpointSettings, p_SM: Array, rng: np.random.Generator
 ) -> Array:
-    """`X_SC` (4, 4) of a camera on a sphere around a point near the scene's middle `p_SM` (3,);
-    uniform on the part of the sphere that the settings allow."""
+    """Draws `X_SC` (4, 4) of a camera on a sphere around a point near the scene's middle `p_SM`
+    (3,), uniformly over the part of the sphere that the settings allow."""
     low, high = np.sin(np.deg2rad(settings.elevation_deg))
     elevation = np.arcsin(np.clip(rng.uniform(low, high), -1.0, 1.0))
     azimuth, roll = np.deg2rad(
@@ -192,8 +191,7 @@ def draw_camera_on_sphere(
 
 
 def jitter_camera(X_SC: Array, settings: ViewpointSettings, rng: np.random.Generator) -> Array:
-    """A camera (4, 4) somewhat beside its place and turned a little; exactly there without
-    jitter."""
+    """Adds random translation and rotation to a camera pose (4, 4), by the settings' jitter."""
     offset = draw_in_ball(settings.position_jitter, rng)
     half = 0.5 * np.deg2rad(rng.uniform(0.0, settings.angle_jitter_deg))
     axis = _draw_direction(rng)
@@ -204,11 +202,11 @@ def jitter_camera(X_SC: Array, settings: ViewpointSettings, rng: np.random.Gener
 
 
 def draw_in_ball(radius: float, rng: np.random.Generator) -> Array:
-    """(3,) a random point in a ball around the origin [m]."""
+    """Draws a point (3,) in a ball around the origin [m]."""
     return radius * float(np.cbrt(rng.random())) * _draw_direction(rng)
 
 
 def _draw_direction(rng: np.random.Generator) -> Array:
-    """(3,) a random direction."""
+    """Draws a unit vector (3,)."""
     v = rng.standard_normal(3)
     return np.asarray(v / np.linalg.norm(v))

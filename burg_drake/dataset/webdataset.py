@@ -31,24 +31,24 @@ def write_webdataset(
     images: Literal["jpg", "png"] = "jpg",
     depth_unit: float = 1e-4,
 ) -> tuple[str, ...]:
-    """Writes `shard-000000.tar` and so on.
+    """Writes a data set as WebDataset shards `shard-000000.tar` and so on.
 
-    Of a sample there are KEY.jpg (or .png), KEY.depth.png, KEY.sensor.png (depth of a simulated
-    sensor), KEY.seg.png (numbers of instances) and KEY.json; an image that it lacks is left out.
+    The files of a sample are KEY.jpg (or .png), KEY.depth.png, KEY.sensor.png (depth of a simulated
+    sensor), KEY.seg.png (instance numbers) and KEY.json. Missing images are left out.
 
     Args:
         samples: the data set.
-        folder: new or empty.
-        shard_size: samples in each; the last one has what is left.
-        images: format of the colours.
-        depth_unit: what 1 stands for in a depth image [m].
+        folder: new or empty folder.
+        shard_size: samples per shard; the last shard has the remaining ones.
+        images: format of colour images.
+        depth_unit: unit of depth images [m].
 
     Returns:
-        What was left out, one sentence each.
+        Data that the format cannot represent, one sentence each.
 
     Raises:
-        InvalidInputError: a number is out of its range, a depth is too large, or the folder has
-            something in it or cannot be written.
+        InvalidInputError: a number is out of its range, a depth is too large, or the folder is not
+            empty or cannot be written.
         UnknownNameError: an object is not in the list.
     """
     if shard_size < 1 or not depth_unit > 0.0:
@@ -75,7 +75,7 @@ def write_webdataset(
 def _sample_members(
     objects: tuple[str, ...], sample: Sample, images: str, depth_unit: float
 ) -> Iterator[tuple[str, bytes]]:
-    """Names without the key, and contents."""
+    """Names, without the key, and contents of a sample's files."""
     seen = sample.images
     if seen.color is not None:
         yield images, encode_color_image(seen.color, f".{images}")
@@ -90,8 +90,8 @@ def _sample_members(
 
 
 def _sample_values(objects: tuple[str, ...], sample: Sample, depth_unit: float) -> dict[str, Any]:
-    """What is known of a sample. Lengths are in metres, matrices row by row, masks as COCO has
-    them; None stands for what is not known."""
+    """Metadata of a sample. Lengths are in metres, matrices row by row, masks in COCO's encoding;
+    None stands for an unknown value."""
     view, camera = sample.view, sample.view.intrinsics
     return {
         "scene": sample.scene,

@@ -1,4 +1,4 @@
-"""Writes a data set scene by scene, and continues one that was interrupted."""
+"""Writes a data set scene by scene, and resumes an interrupted one."""
 
 from __future__ import annotations
 
@@ -46,20 +46,20 @@ def scene_name(number: int) -> str:
 def write_scene(
     folder: str | Path, number: int, scene: Scene, samples: Iterable[Sample]
 ) -> ShardEntry:
-    """Writes the document of a scene, then its shard; for processes that a writer has started.
+    """Writes the document of a scene, then its shard. For worker processes of a `DatasetWriter`.
 
     Args:
-        folder: of the data set, which the writer has opened.
-        number: of the scene in it.
-        scene: the scene; its library is referred to from where the document will lie.
-        samples: of the scene; they may be made as they are asked for.
+        folder: folder of the data set, which the writer has opened.
+        number: number of the scene in the data set.
+        scene: the scene; the path of its library is written relative to the document.
+        samples: samples of the scene; may be a generator.
 
     Returns:
-        The shard's line of the index, for `DatasetWriter.add_entry`.
+        The shard's entry in the index, for `DatasetWriter.add_entry`.
 
     Raises:
-        InvalidInputError: the scene is there already; or the disk is full or cannot be written to,
-            which is `about` the folder; and see `write_shard`. Nothing of the scene stays then.
+        InvalidInputError: the scene exists already; or the disk is full or cannot be written to,
+            which is `about` the folder; and see `write_shard`. All files of the scene are removed.
     """
     with _add_scene_document(Path(folder), number, scene) as shard:
         return write_shard(shard, samples)
@@ -68,15 +68,15 @@ def write_scene(
 def write_made_scene(
     folder: str | Path, number: int, scene: Scene, shard: bytes, entry: ShardEntry
 ) -> ShardEntry:
-    """Writes a scene whose shard another machine has made; as `write_scene`.
+    """Writes a scene and its shard from another machine; see `write_scene`.
 
     Args:
         folder, number, scene: as in `write_scene`.
-        shard: the bytes of its shard.
-        entry: its line of the index.
+        shard: bytes of the shard.
+        entry: the shard's entry in the index.
 
     Returns:
-        The line.
+        The entry.
 
     Raises:
         InvalidInputError: as `write_scene`.
@@ -88,7 +88,7 @@ def write_made_scene(
 
 @contextmanager
 def _add_scene_document(folder: Path, number: int, scene: Scene) -> Iterator[Path]:
-    """Writes the document of a scene, and removes it if the block fails to write the shard.
+    """Writes the document of a scene, and removes it if the block raises an error.
 
     Yields:
         The path of the shard.
@@ -110,25 +110,25 @@ def _add_scene_document(folder: Path, number: int, scene: Scene) -> Iterator[Pat
 
 
 class DatasetWriter:
-    """A data set that is opened for writing; one process at a time can hold it.
+    """A data set opened for writing, locked against other processes.
 
-    When its block ends without an error, the index is written.
+    Writes the index when its block ends without an error.
 
     Attributes:
-        folder: of the data set.
+        folder: folder of the data set.
     """
 
     def __init__(self, folder: str | Path, document: DatasetDocument) -> None:
-        """Opens or makes the folder, and removes what a process that was killed has begun.
+        """Opens or creates the folder, and removes unfinished files of a killed process.
 
         Args:
-            folder: of the data set; new, empty, or one of the same content.
-            document: what its samples are made with.
+            folder: folder of the data set: new, empty, or with a data set of the same document.
+            document: document of the data set.
 
         Raises:
-            InvalidInputError: the folder cannot be written to, another process is writing it, it
-                holds samples that are made with other things, or something that is none of this.
-            DocumentError: its document is damaged, or of another version.
+            InvalidInputError: the folder cannot be written to, another process is writing it, its
+                data set was made with other settings or versions, or it holds other files.
+            DocumentError: the folder's document is damaged, or of another version.
         """
         self.folder = ensure_writable_folder(folder)
         self._known: dict[str, ShardEntry] = {}
@@ -164,14 +164,14 @@ class DatasetWriter:
                 path.unlink()
 
     def discard_damaged(self) -> list[int]:
-        """Removes shards that are cut off, have damaged headers, or are not those of the index, so
-        that they can be made anew. All shards are read for it, and need not be in the end.
+        """Removes shards that are truncated, have damaged headers, or differ from the index, so
+        that they can be made again. Reads all shards; `finish` need not read them again.
 
         Returns:
-            Numbers of their scenes.
+            Numbers of the removed scenes.
         """
         listed: dict[str, ShardEntry] = {}
-        with suppress(InvalidInputError):  # an index that is missing or damaged tells nothing
+        with suppress(InvalidInputError):  # a missing or damaged index is ignored
             listed = {entry.url: entry for entry in read_index(self.folder)}
         found = []
         for number in shard_numbers(self.folder):
@@ -189,7 +189,7 @@ class DatasetWriter:
         return found
 
     def missing(self, scenes: Iterable[int]) -> list[int]:
-        """Those of some scenes that are not complete, in the order given."""
+        """The scenes that are not complete, in the order given."""
         there = set(shard_numbers(self.folder))
         return [number for number in scenes if number not in there]
 
@@ -198,12 +198,12 @@ class DatasetWriter:
         self.add_entry(write_scene(self.folder, number, as_scene(scene), samples))
 
     def add_entry(self, entry: ShardEntry) -> None:
-        """Takes note of what another process has written with `write_scene`, so that its check sum
-        need not be made again."""
+        """Adds the entry of a scene that another process wrote with `write_scene`, so that its
+        checksum need not be computed again."""
         self._known[entry.url] = entry
 
     def finish(self) -> None:
-        """Writes the index of all that is there.
+        """Writes the index of all shards.
 
         Raises:
             InvalidInputError: a shard of an earlier run is damaged, or the disk is full.
@@ -211,7 +211,7 @@ class DatasetWriter:
         write_index(self.folder, self._known)
 
     def close(self) -> None:
-        """Lets others write; what is there stays as it is."""
+        """Releases the lock of the folder."""
         self._lock.release()
 
     def __enter__(self) -> DatasetWriter:

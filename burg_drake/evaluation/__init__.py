@@ -1,9 +1,9 @@
-"""The main job: grasps on a station are judged stage by stage, and all of it is recorded.
+"""Evaluation of grasps on a station: judges them stage by stage and records the results.
 
-Read `cascade` first: it prepares a run, and gives its candidates to an executor, whose workers send
+Read `cascade` first: it prepares a run and gives its candidates to an executor, whose workers send
 each grasp through the stages of a `judge`. `run_folder` and `campaign_folder` read runs of one
-scene and of many. The folders have grasps from samplers and files (`grasp_sets`), executors on
-other machines (`cluster`) and the pages of results (`report`).
+scene and of many. Subpackages: `grasp_sets` reads and samples grasps, `cluster` has executors on
+other machines, `report` writes the report pages.
 """
 
 import lazy_loader

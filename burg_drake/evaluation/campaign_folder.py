@@ -1,4 +1,4 @@
-"""The folder of a run over many scenes, states of its scenes, and results of either kind of run."""
+"""Folder of a run over many scenes, progress of its scenes, and results of any run."""
 
 from __future__ import annotations
 
@@ -55,22 +55,25 @@ class Campaign:
     document: CampaignDocument
 
     def __repr__(self) -> str:
-        count, done = len(self.document.mine), sum(s.state == "done" for s in self.states.values())
+        count, done = (
+            len(self.document.assigned_scenes),
+            sum(s.state == "done" for s in self.states.values()),
+        )
         return f"Campaign({str(self.path)!r}, {done} of {count} scenes judged)"
 
     @property
     def names(self) -> list[str]:
-        """Names of the scenes that are judged here, in order."""
-        return [entry.name for entry in self.document.mine]
+        """Names of the scenes assigned to this run (or shard), in order."""
+        return [entry.name for entry in self.document.assigned_scenes]
 
     @cached_property
     def states(self) -> dict[str, SceneState]:
-        """How far scenes are, by name; nothing is known of one that has not been begun."""
+        """Progress by scene name; scenes that have not been begun are left out."""
         return SceneStates(self.path).states
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
-        """The runs of the scenes that have been begun, in order; each is read from its folder."""
+        """Runs of the scenes that have been begun, in order, each read from its folder."""
         return tuple(
             load_run(place.folder) for place in self.places if (place.folder / RUN_FILE).exists()
         )
@@ -80,7 +83,7 @@ class Campaign:
 
         Raises:
             UnknownNameError: there is no such scene.
-            InvalidInputError: it has not been begun, or could not be judged.
+            InvalidInputError: the scene has not been begun, or could not be judged.
         """
         if name not in self.names:
             raise UnknownNameError(
@@ -94,7 +97,7 @@ class Campaign:
 
     @property
     def places(self) -> list[StoredRun]:
-        """Where the runs of the scenes are, begun or not."""
+        """Names and folders of the scenes' runs, begun or not."""
         return [StoredRun(name, self.folder(name)) for name in self.names]
 
     @property
@@ -103,8 +106,9 @@ class Campaign:
         return self.document.instances
 
     def rows(self, names: Sequence[str] | None = None) -> StoredRows:
-        """Columns of all judged grasps, as they lie in the store; `StoredRows.run` is the place of
-        each row's scene in `names`.
+        """Rows of all judged grasps from the columnar store.
+
+        `StoredRows.run` has the index of each row's scene in `self.names`.
 
         Raises:
             MissingDependencyError: pyarrow is not installed.
@@ -115,8 +119,8 @@ class Campaign:
         """Columns of all judged grasps, scene by scene; see `evaluation.results_table`.
 
         Args:
-            names: of the columns; all if None, which takes much memory where there are many
-                grasps. What a scene does not have is NaN, or an empty text.
+            names: names of the columns; all if None, which takes much memory with many grasps.
+                Cells of columns that a scene lacks are NaN or empty texts.
 
         Raises:
             MissingDependencyError: pyarrow is not installed.
@@ -140,42 +144,44 @@ class Campaign:
 
     @property
     def failed(self) -> dict[str, str]:
-        """Why scenes could not be judged, by name."""
+        """Scenes that could not be judged, with the reason of each."""
         return {n: s.why for n in self.names if (s := self.states.get(n)) and s.state == "failed"}
 
     @property
     def open_scenes(self) -> list[str]:
-        """Scenes that have not ended: neither judged, nor without grasps, nor failed."""
+        """Names of scenes that are not finished: not fully judged, empty or failed."""
         ended = {name for name, state in self.states.items() if state.state != "open"}
         return [name for name in self.names if name not in ended]
 
     @property
     def complete(self) -> bool:
-        """Whether every grasp of every scene that is judged here is judged."""
+        """Whether all grasps assigned to this run (or shard) are judged."""
         return not self.open_scenes and not self.failed
 
     @property
     def report_path(self) -> Path:
-        """The report."""
+        """Path of the report."""
         return self.path / REPORT_FILE
 
     @property
     def expected(self) -> int:
-        """Number of grasps that are judged here; see `expected_by_scene`."""
+        """Number of grasps assigned to this run (or shard); see `expected_by_scene`."""
         return sum(self.expected_by_scene.values())
 
     @property
     def expected_by_scene(self) -> dict[str, int]:
-        """Number of grasps that are judged here, by scene; of scenes that have not been begun as
-        many as are asked for, and 0 if grasps are given."""
+        """Number of grasps assigned to this run (or shard), by scene.
+
+        For a scene that has not been begun: the number asked for; 0 if grasps are given.
+        """
         document, shard = self.document, self.document.shard_of_grasps
         only = set(document.grasps.only)
         found = {}
-        for entry in document.mine:
+        for entry in document.assigned_scenes:
             state = self.states.get(entry.name)
-            asked = range((document.grasps.per_object or 0) * len(entry.chosen(only)))
-            mine = select_share(asked, shard)
-            found[entry.name] = len(mine) if state is None or state.why else state.mine
+            asked = range((document.grasps.per_object or 0) * len(entry.selected_instances(only)))
+            assigned = select_share(asked, shard)
+            found[entry.name] = len(assigned) if state is None or state.why else state.mine
         return found
 
 
@@ -189,7 +195,7 @@ def load_campaign(path: str | Path) -> Campaign:
             print(run.path.name, run.best(3))
 
     Raises:
-        InvalidInputError: there is none.
+        InvalidInputError: the folder holds no such run.
         DocumentError: its campaign.yaml does not fit the schema.
     """
     path = Path(path)
@@ -214,10 +220,10 @@ def save_campaign(campaign: Campaign) -> Campaign:
 
 
 def require_campaign_folder(folder: Path) -> None:
-    """Refuses a folder that holds anything but a run over many scenes; makes none.
+    """Refuses a folder that holds anything but a run over many scenes. Does not create it.
 
     Raises:
-        InvalidInputError: it cannot be written, or something else is in it.
+        InvalidInputError: the folder cannot be written, or holds other files.
     """
     if not folder.exists():
         return
@@ -233,7 +239,7 @@ def require_campaign_folder(folder: Path) -> None:
 
 
 def open_results(path: str | Path) -> Run | Campaign:
-    """The run in a folder, of one scene or of many.
+    """Reads the run in a folder, of one scene or of many.
 
     Raises:
         InvalidInputError: there is no run.
@@ -243,7 +249,7 @@ def open_results(path: str | Path) -> Run | Campaign:
 
 
 def load_runs(path: str | Path) -> list[Run]:
-    """The runs in a folder: one, or those of each scene of a run over many scenes.
+    """Reads the runs in a folder: one, or one for each scene of a run over many scenes.
 
     Raises:
         InvalidInputError: there is no run.
@@ -265,8 +271,8 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
 
     Args:
         path: folder of a run, of one scene or of many.
-        names: of the columns, which is all that is read where there are many grasps; all if None.
-            What a run does not have is NaN, or an empty text.
+        names: names of the columns; all if None. With many grasps only these are read from disk.
+            Cells of columns that a run lacks are NaN or empty texts.
 
     Raises:
         InvalidInputError: there is no run.
@@ -285,21 +291,21 @@ LedgerState = Literal["open", "done", "failed", "empty"]
 
 @dataclass(frozen=True, kw_only=True)
 class SceneState:
-    """How far a scene is.
+    """Progress of a scene.
 
     Attributes:
         scene: its name in the run.
-        state: `open` from when its grasps are known, `done` when all that is judged here is,
+        state: `open` once its grasps are known, `done` once all assigned grasps are judged,
             `failed` if it cannot be judged, `empty` if there are no grasps for it.
         run: hash of its run.
-        grasps: how many it has.
-        mine: how many of them are judged here.
+        grasps: number of its grasps.
+        mine: number of grasps assigned to this run (or shard).
         sampling: CPU time of the sampling [s].
-        size: of its journal when it was done [bytes].
-        failed, interrupted: grasps that could not be simulated, and those of them whose worker was
-            ended from outside.
-        why: it failed.
-        missing: what is said of instances with fewer grasps than asked; see `run_notes`.
+        size: size of its journal when it was done [bytes].
+        failed, interrupted: number of grasps that could not be simulated, and how many of these
+            because their worker was killed from outside.
+        why: reason of the failure.
+        missing: notes on instances with fewer grasps than asked for; see `run_notes`.
     """
 
     scene: str
@@ -318,17 +324,17 @@ class SceneState:
 SCENE_STATE_TYPES = dict.fromkeys(("scene", "state", "run", "why", "missing"), str) | {
     "sampling": float
 }
-"""Types of fields; the others are whole numbers."""
+"""Types of the fields of `SceneState`; the others are integers."""
 
 
 class SceneStates:
-    """The states of scenes, kept in a file."""
+    """Progress of the scenes of a run, kept in a file."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads the file of a run, if it is there.
+        """Reads the file of a run, if it exists.
 
         Raises:
-            InvalidInputError: it cannot be read.
+            InvalidInputError: the file cannot be read.
         """
         self._path = folder / LEDGER_FILE
         self.states: dict[str, SceneState] = {}
@@ -336,7 +342,7 @@ class SceneStates:
         self.refresh()
 
     def refresh(self) -> None:
-        """Reads what others have appended since."""
+        """Reads the lines that other processes have appended since the last read."""
         if not self._path.exists():
             self.states, self._offset = {}, 0
             return
@@ -369,23 +375,23 @@ class SceneStates:
 
 
 def ledger_text(states: Iterable[SceneState]) -> str:
-    """The text of a file with these states."""
+    """Contents of the file that `SceneStates` reads."""
     return "".join(_state_line(state) for state in states)
 
 
 def _state_line(state: SceneState) -> str:
-    """Fields at their default are left out."""
-    plain = asdict(SceneState(scene="", state="open"))
+    """Encodes a state as one line of JSON, without fields at their default."""
+    defaults = asdict(SceneState(scene="", state="open"))
     fields = {
         name: value
         for name, value in asdict(replace(state, why=state.why[:4000])).items()
-        if value != plain[name] or name in ("scene", "state")
+        if value != defaults[name] or name in ("scene", "state")
     }
     return json.dumps(fields, separators=(",", ":")) + "\n"
 
 
 def _read_state(line: bytes) -> SceneState | None:
-    """None if the line is something else."""
+    """Decodes a line; None if it is not a valid state."""
     try:
         stored: Any = json.loads(line)
         state = SceneState(**stored)

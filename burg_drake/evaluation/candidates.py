@@ -1,4 +1,4 @@
-"""The grasps that a run judges, with instance and id; and selection of instances by name."""
+"""Candidates: the grasps of a run with their instances and ids. Selects instances by name."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ class Candidate:
         id: `INSTANCE-GRASP`, unique in a run.
         instance: name of the placed object.
         X_OG: (4, 4) grasp in the object frame.
-        friction: the target's coefficient, in place of the library's.
-        mass: of the target, in place of the library's [kg].
-        width: distance of the contacts [m]; NaN if unknown.
-        lift: length of the lift, in place of the motion's [m].
+        friction: friction coefficient of the target; None for the library's.
+        mass: mass of the target [kg]; None for the library's.
+        width: distance between the contacts [m]; NaN if unknown.
+        lift: length of the lift [m]; None for the motion's.
     """
 
     id: str
@@ -55,7 +55,7 @@ class Candidate:
 
 
 class GraspIds(Sequence[str]):
-    """Identifiers of grasps, instance and grasp joined by a hyphen, made when they are asked for.
+    """Identifiers of grasps (instance and grasp joined by a hyphen), made on access.
 
     Args:
         instance: (N,) names of the placed objects.
@@ -119,11 +119,11 @@ class Candidates:
         return GraspIds(self.instance, self.grasps.id)
 
     def at(self, rows: Sequence[int] | NDArray[np.int64]) -> Sequence[Candidate]:
-        """The grasps in some rows (M,), each made when it is asked for."""
+        """Candidates at the given rows (M,), each made on access."""
         return _ChosenCandidates(self, rows)
 
     def rows(self, ids: Sequence[str]) -> NDArray[np.int64]:
-        """Rows (M,) of grasps by identifier; -1 for those that are not among them."""
+        """Rows (M,) of the grasps with these identifiers; -1 for unknown identifiers."""
         hashes, order = self._sorted_hashes
         wanted = np.fromiter(map(hash, ids), np.int64, len(ids))
         found = np.full(len(ids), -1, dtype=np.int64)
@@ -138,8 +138,10 @@ class Candidates:
 
     @cached_property
     def _sorted_hashes(self) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-        """Hashes of the identifiers in ascending order, and the rows that they are of: 12 bytes a
-        grasp, a tenth of what a dictionary takes."""
+        """Hashes of the identifiers in ascending order, and the row of each.
+
+        Takes 12 bytes per grasp, a tenth of what a dictionary takes.
+        """
         hashes = np.fromiter(map(hash, self.id), np.int64, len(self))
         order = np.argsort(hashes, kind="stable").astype(np.uint32)
         return hashes[order], order
@@ -150,7 +152,7 @@ class Candidates:
         return content_hash(self.grasps.X_OG, self.grasps.width, self.id)
 
     def save(self, path: Path) -> None:
-        """Writes a grasp file that `load`, and `GraspSet.load`, read back bit for bit."""
+        """Writes a grasp file that `load` and `GraspSet.load` read back bit for bit."""
         self.grasps.with_columns(instance=self.instance).save(path)
 
     @classmethod
@@ -158,7 +160,7 @@ class Candidates:
         """Reads a file written by `save`.
 
         Raises:
-            InvalidInputError: the file is something else.
+            InvalidInputError: it is not such a file.
         """
         grasps = GraspSet.load(path)
         if INSTANCE_COLUMN not in grasps.columns:
@@ -169,7 +171,7 @@ class Candidates:
 
 
 class _ChosenCandidates(Sequence[Candidate]):
-    """Some of the candidates, see `Candidates.at`."""
+    """Candidates at chosen rows, see `Candidates.at`."""
 
     def __init__(self, candidates: Candidates, rows: Sequence[int] | NDArray[np.int64]) -> None:
         self._candidates, self._rows = candidates, rows
@@ -190,7 +192,7 @@ class _ChosenCandidates(Sequence[Candidate]):
 
 
 def share_rows(count: int, shard: str) -> NDArray[np.int64]:
-    """Which of so many candidates are in a shard; all of them without one."""
+    """Rows of the candidates in a shard, out of `count`; all rows without a shard."""
     return np.array(select_share(range(count), shard), dtype=np.int64)
 
 
@@ -199,11 +201,11 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
 
     Args:
         scene: the scene.
-        grasps: grasps in the object frame by name of a free instance. Instances that are not
+        grasps: grasps in the object frame, by name of a free instance. Instances that are not
             named get none; of equal grasps on an instance the first one is kept.
 
     Raises:
-        UnknownNameError: no free instance goes by such a name.
+        UnknownNameError: there is no free instance of that name.
         InvalidInputError: a set holds grasps of another object.
     """
     require_instances(scene, grasps)
@@ -221,12 +223,12 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
 
 
 def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> None:
-    """Refuses names that no free instance goes by.
+    """Refuses names that are not free instances of a scene.
 
     Args:
-        scene: with the instances.
-        names: of the instances that grasps are given for.
-        path: of their file, for the message.
+        scene: the scene with the instances.
+        names: names of the instances that grasps are given for.
+        path: path of the grasp file, for the message.
 
     Raises:
         UnknownNameError: there is no such instance.
@@ -241,7 +243,7 @@ def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> Non
 
 
 def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
-    """Candidates from grasps by the name of their instance; provenances are kept by instance."""
+    """Candidates from grasps by instance name; provenances are kept by instance."""
     if not by_instance:
         return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
     counts = {name: len(grasps) for name, grasps in by_instance.items() if len(grasps)}
@@ -252,21 +254,21 @@ def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
 
 
 def drop_equal_grasps(grasps: GraspSet) -> GraspSet:
-    """The first one of equal grasps, in the order that there is."""
+    """Keeps the first of equal grasps, in the given order."""
     _, first = np.unique(grasps.id, return_index=True)
     return grasps if len(first) == len(grasps) else grasps.select(np.sort(first))
 
 
 @dataclass(frozen=True)
 class InstanceNames:
-    """Names of a grasp file and the instances that are meant.
+    """Mapping from the object names of a grasp file to instances of a scene.
 
     Attributes:
-        scene: has the instances.
-        path: the file, for messages.
-        given: names of the scene's objects or instances by the file's names; by the empty text for
-            whatever the file has.
-        is_file: whether it is a file, of which a user can say what its names mean.
+        scene: the scene with the instances.
+        path: path of the file, for messages.
+        given: names of the scene's objects or instances by the file's names; the key "" stands for
+            any name in the file.
+        is_file: whether the grasps come from a file, so that the user can map its names.
     """
 
     scene: Scene
@@ -275,14 +277,14 @@ class InstanceNames:
     is_file: bool = True
 
     def require_used(self, foreign: Collection[str]) -> None:
-        """Refuses names for what the file does not have.
+        """Refuses given names that the file does not have.
 
         Args:
-            foreign: names in the file.
+            foreign: object names in the file.
 
         Raises:
-            UnknownNameError: one of `given` is not among them.
-            InvalidInputError: one name is given for several.
+            UnknownNameError: a name in `given` is not among them.
+            InvalidInputError: one name is given for a file with several objects.
         """
         names = [name for name in foreign if name]
         for name in self.given:
@@ -296,10 +298,10 @@ class InstanceNames:
             ).about("objects")
 
     def instances_of(self, foreign: str) -> list[str]:
-        """The free instances that grasps of an object of the file are for.
+        """Free instances that the grasps of one of the file's objects go to.
 
         Raises:
-            InvalidInputError: the file does not name the object, and nobody else does.
+            InvalidInputError: neither the file nor `given` names the object.
             UnknownNameError: the scene has no such object.
         """
         meant = self.given.get(foreign, self.given.get(""))
@@ -323,10 +325,10 @@ class InstanceNames:
 
 
 def instances_by_name(scene: Scene, name: str) -> list[str]:
-    """All free instances of an object, or else the one of that name.
+    """All free instances of the object of that name, else the instance of that name.
 
     Raises:
-        UnknownNameError: there are none.
+        UnknownNameError: there is no such object or instance.
     """
     instances = scene.instances
     found = [key for key, instance in instances.items() if instance.object == name]
@@ -340,11 +342,12 @@ def instances_by_name(scene: Scene, name: str) -> list[str]:
 
 
 def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...]:
-    """The free instances that some names stand for, in the order of the scene; all if there are no
-    names.
+    """Free instances selected by object or instance names, in the scene's order.
+
+    Without names, all free instances.
 
     Raises:
-        UnknownNameError: a name stands for none.
+        UnknownNameError: a name is neither an object nor an instance of the scene.
     """
     names = list(only or scene.instances)
     chosen = {key for name in names for key in instances_by_name(scene, name)}
@@ -354,11 +357,11 @@ def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...
 def select_instances(
     scene: Scene, by_instance: Mapping[str, GraspSet], only: Iterable[str] | None
 ) -> Mapping[str, GraspSet]:
-    """The grasps on the instances that some names stand for; all if there are no names.
+    """Grasps on the instances selected by object or instance names; all without names.
 
     Raises:
-        UnknownNameError: a name stands for no instance of the scene.
-        InvalidInputError: there are no grasps on any of them.
+        UnknownNameError: a name is neither an object nor an instance of the scene.
+        InvalidInputError: there are no grasps on the selected instances.
     """
     names = list(only or ())
     if not names:
@@ -366,9 +369,9 @@ def select_instances(
     chosen = chosen_instances(scene, names)
     found = {name: by_instance[name] for name in chosen if len(by_instance.get(name, ()))}
     if not found:
-        there = list_names([name for name, grasps in by_instance.items() if len(grasps)])
+        known = list_names([name for name, grasps in by_instance.items() if len(grasps)])
         raise InvalidInputError(
-            f"there are no grasps of {list_names(names)}; there are some of {there}"
+            f"there are no grasps of {list_names(names)}; there are some of {known}"
         )
     return found
 
@@ -379,16 +382,16 @@ def rows_of_names(
     objects: NDArray[np.str_],
     instances: NDArray[np.str_] | None = None,
 ) -> NDArray[np.bool_]:
-    """Which grasps are of objects or instances that go by some names, (N,); all without names.
+    """Mask (N,) of the grasps whose object or instance is named; all True without names.
 
     Args:
-        only: the names.
-        where: the grasps are, for messages.
+        only: names of objects or instances.
+        where: source of the grasps, for messages.
         objects: (N,) object of each grasp.
-        instances: (N,) instance of each grasp, if it is known.
+        instances: (N,) instance of each grasp, if known.
 
     Raises:
-        UnknownNameError: no grasp is of that name.
+        UnknownNameError: there are no grasps of that name.
     """
     names = list(only or ())
     holders = [objects] if instances is None else [objects, instances]

@@ -113,34 +113,34 @@ def evaluate(
 
     Args:
         scene: as loaded, or a reference for `load_scene`; or several of them. Each is judged as it
-            is on its own, in a folder of its own, and all by the same workers.
+            is on its own, in a folder of its own, all by the same workers.
         station: likewise, for `load_station`.
         out: folder of the run; made if need be.
         grasps: the user's own grasps in the object frame; nothing is sampled then. A set goes to
             the instances that its column `instance` names, or else to all instances of its objects;
-            a mapping has sets by instance, such as those of `read_grasps`; a function gets the
-            scene, and has such a mapping. Of many scenes each gets those of its own objects.
-        settings: which grasps are sampled, and how all are judged; the usual ones if None: 100 for
+            a mapping has sets by instance, as `read_grasps` returns; a function takes the scene
+            and returns such a mapping. Of many scenes each gets the grasps of its own objects.
+        settings: which grasps are sampled, and how all are judged; if None the defaults: 100 for
             each object, as far as the station's arm can execute them.
-        workers: number of processes; as many as there are processors if None.
-        executor: who judges, in place of so many processes of this machine.
+        workers: number of processes; one per processor if None.
+        executor: executor that judges, instead of `workers` processes of this machine.
         retry_failed: try all grasps again that an earlier call could not simulate.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
-        The complete run. Its `failures` lists grasps that could not be simulated. Of several scenes
-        a `Campaign`; its `failed` has those that could not be judged.
+        The complete run. Its `failures` lists grasps that could not be simulated. For several
+        scenes a `Campaign`, whose `failed` has the scenes that could not be judged.
 
     Raises:
-        InvalidInputError: bad argument, unsound scene, a mode that needs an arm where there is
-            none or an engine without arms, an arm that stands in something, collides in its home
-            posture or does not reach the board, unwritable folder, or a folder that holds another
-            run or is being written.
-        UnknownNameError: a reference to something that does not exist.
+        InvalidInputError: bad argument, invalid scene, a mode that needs an arm while the station
+            has none or the engine supports none, an arm that overlaps the scene, collides in its
+            home posture or does not reach the board, unwritable folder, or a folder that holds
+            another run or is being written.
+        UnknownNameError: a reference does not exist.
         MissingDependencyError: Parquet, or several scenes, without pyarrow; engine mujoco without
             mujoco.
         SimulationError: the simulation of the scene cannot be built, or an executor ends before
-            all is judged.
+            all grasps are judged.
     """
     settings = settings or EvaluationSettings()
     station = as_station(station)
@@ -176,7 +176,7 @@ def _evaluate_one(
     scene = as_scene(scene)
     station, mode = request.station, request.mode
     request.describe_grasps(scene)
-    given = request.given_candidates(scene)  # refuses what does not fit before the folder is made
+    given = request.given_candidates(scene)  # refuses unfit grasps before the folder is made
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         require_sound(scene, station, mode, request.engine)
@@ -212,8 +212,8 @@ def _judge_open_grasps(
     executor: Executor,
     reporter: Reporter,
 ) -> Run:
-    """Judges what is left and keeps each verdict at once; returns the run as it is then."""
-    total = len(run.mine)
+    """Judges the open grasps, writes each verdict at once, and returns the updated run."""
+    total = len(run.assigned_ids)
     done = total - len(left)
     outcomes = run.index.count_outcomes(left)
     pace = ProgressMeter(

@@ -1,18 +1,18 @@
-"""Executors take jobs of grasps and return verdicts in any order; here on this machine.
+"""Executors take jobs of grasps and yield verdicts in any order. `LocalExecutor` uses processes.
 
-A job is what one judge can judge, such as the grasps of one scene. Workers build the judge of a job
-when they first need it, so many jobs go through the same workers.
+A job has the grasps of one judge, such as those of one scene. Workers build the judge of a job when
+they first need it, so the same workers can take many jobs.
 
-A grasp that ends its worker (a crash inside Drake, or a time limit) is tried once more, alone, in a
-fresh process. If that dies too, the outcome is `simulation_failed` and the other grasps go on. The
-verdict tells whether the last worker was ended from outside; then a later call may ask again.
+A grasp that kills its worker (a crash inside Drake, or a time limit) is tried once more, alone, in
+a fresh process. If that dies too, the outcome is `simulation_failed` and the other grasps go on.
+The verdict records whether the last worker was killed from outside; a later call may then retry.
 
-Screens are asked about many grasps at once, which costs a fraction of asking about each. Only
-grasps that pass are handed out one by one. If a worker ends while it screens, its grasps go through
-the remaining stages one by one, so that the one to blame is found.
+Screens take many grasps at once, which costs a fraction of screening each. Only grasps that pass
+are handed out one by one. If a worker dies during a screening, its grasps go through the remaining
+stages one by one, to find the grasp that kills it.
 
 A worker stays with a job while grasps wait, as its judge is built. Then it begins the next job, or
-helps with one that other workers are at.
+joins other workers on theirs.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class JobFailed:
-    """No more verdicts come for a job, and some of its grasps have none.
+    """A job that was given up while some of its grasps have no verdict.
 
     Attributes:
         job: the job.
-        error: why: its judge cannot be built, or too many grasps in a row end their workers.
+        error: the cause: its judge cannot be built, or too many grasps in a row kill their workers.
     """
 
     job: Job
@@ -73,7 +73,7 @@ class JobFailed:
 
 
 OnFailure = Callable[[JobFailed], None]
-"""Is told of a job that failed; the others go on."""
+"""Callback for a job that failed; the other jobs go on."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,10 @@ class WorkerLimits:
         cpu: CPU time for one grasp, or one screening [s]. A trial takes about a second, the slowest
             ones some tens. On a busy machine it takes longer, but not more CPU time.
         build: CPU time to build a judge [s].
-        wall: wall time for each of these [s]; ends what waits for ever.
-        hopeless: so many grasps of a job in a row that end their workers, with none judged in
-            between, end the job.
-        false_starts: so many workers in a row that die while they build the judge of a job end it.
+        wall: wall time for a grasp, screening or build [s]; ends calls that hang.
+        hopeless: number of grasps in a row that kill their workers, after which a job is given up.
+        false_starts: number of workers in a row that die while building the judge of a job, after
+            which it is given up.
     """
 
     cpu: float = 300.0
@@ -98,14 +98,14 @@ class WorkerLimits:
 
 
 Grasp = tuple[Candidate, ScreenAnswers]
-"""A grasp with the answers of the screens that have been asked."""
+"""A grasp with the answers of its screens so far."""
 
 
 def build_judge(make_judge: Callable[[], Judge]) -> Judge:
     """Builds a judge.
 
     Raises:
-        BurgError: it cannot be built.
+        BurgError: the judge cannot be built.
     """
     try:
         return make_judge()
@@ -116,7 +116,7 @@ def build_judge(make_judge: Callable[[], Judge]) -> Judge:
 
 
 def _screen_batches(judge: Judge) -> tuple[int, ...]:
-    """How many grasps to screen at a time, by screen."""
+    """Batch size of each screen."""
     return tuple(screen.batch for screen in judge.screens)
 
 
@@ -125,10 +125,10 @@ GRASPS_PER_TASK = 4
 
 
 class GraspQueue:
-    """Grasps that wait, first those that nobody has been asked about.
+    """Queue of waiting grasps; new grasps come before those with screen answers.
 
     Args:
-        fresh: those; a grasp with answers takes memory, so each is made when it is taken.
+        fresh: grasps without answers. Answers take memory, so they are made on taking a grasp.
     """
 
     def __init__(self, fresh: Sequence[Candidate] = ()) -> None:
@@ -143,7 +143,7 @@ class GraspQueue:
         self._others.append(grasp)
 
     def take(self, n: int) -> tuple[Grasp, ...]:
-        """Takes the first n grasps off, or as many as there are."""
+        """Removes and returns the first n grasps, or all if there are fewer."""
         begin, end = self._taken, min(self._taken + n, len(self._fresh))
         self._taken = end
         fresh = [(self._fresh[k], ScreenAnswers()) for k in range(begin, end)]
@@ -152,16 +152,16 @@ class GraspQueue:
 
 
 class OpenJob:
-    """The work that a job has left.
+    """The remaining work of a job.
 
     Attributes:
         job: the job.
-        session: of the workers that have its judge.
+        session: session of the workers that have its judge.
         open: grasps to be judged one by one.
         unscreened: grasps that wait for each screen.
-        batches: how many grasps to screen at a time, by screen.
-        crashes_in_a_row: grasps that ended their workers since one was judged.
-        failed: whether it is given up; what still comes of it does not count.
+        batches: batch size of each screen.
+        crashes_in_a_row: number of grasps that killed their workers since one was judged.
+        failed: whether the job is given up; later results are ignored.
     """
 
     def __init__(self, job: Job, limits: WorkerLimits) -> None:
@@ -180,22 +180,22 @@ class OpenJob:
 
     @property
     def waiting(self) -> int:
-        """Number of grasps that no worker has."""
+        """Number of grasps not handed to a worker."""
         return len(self.open) + sum(map(len, self.unscreened))
 
     def set_screens(self, batches: tuple[int, ...]) -> None:
-        """Learns of the screens, from the first worker that is ready; all grasps are open then."""
+        """Sets the screens once the first worker reports them; until then all grasps are open."""
         if not self.unscreened and batches:
             self.batches = batches
             self.unscreened = [self.open, *(GraspQueue() for _ in batches[1:])]
             self.open = GraspQueue()
 
     def next_work(self) -> tuple[tuple[Grasp, ...], bool]:
-        """Grasps to work on, and whether they are screened: all have been through the same screens.
+        """Grasps to work on next, and whether they are to be screened (all by the same screen).
 
         Grasps are screened when few are left to judge. The last screen comes first, unless too few
-        grasps have come to it. So they take turns, and the pace of judging tells how long the rest
-        takes.
+        grasps wait for it. Screening and judging thus alternate, so that the rate of verdicts
+        predicts the remaining time.
         """
         if len(self.open) < GRASPS_PER_TASK:
             for k in reversed(range(len(self.batches))):
@@ -204,10 +204,10 @@ class OpenJob:
                     return waiting.take(self.batches[k]), True
         return self.open.take(GRASPS_PER_TASK), False
 
-    def take_screen_answers(
+    def store_screen_answers(
         self, grasps: Sequence[Grasp], answers: Sequence[ScreenAnswers]
     ) -> list[tuple[Candidate, Verdict]]:
-        """Takes the answers of a screen; returns the verdicts that are among them."""
+        """Stores the answers of a screen; returns the verdicts of grasps that it rejected."""
         verdicts = []
         for (candidate, _), answer in zip(grasps, answers, strict=True):
             if answer.outcome is not None:
@@ -219,23 +219,23 @@ class OpenJob:
         return verdicts
 
     def give_up(self) -> None:
-        """Forgets what is left."""
+        """Marks the job as failed and drops its remaining grasps."""
         self.failed = True
         self.open = GraspQueue()
         self.unscreened = []
 
 
 @dataclass(eq=False)
-class GivenWork:
-    """What a worker was given in one piece.
+class AssignedWork:
+    """A piece of work assigned to a worker.
 
     Attributes:
         slot: the worker.
-        job: what it belongs to.
-        grasps: one to be judged, some to be screened, or none to build the judge.
-        screening: whether they are screened.
-        future: what becomes of it.
-        stage: the last one that began.
+        job: the job of the work.
+        grasps: one grasp to judge, several to screen, or none to build the judge.
+        screening: whether the grasps are screened.
+        future: future of the result.
+        stage: last stage that began.
     """
 
     slot: WorkerSlot
@@ -246,7 +246,7 @@ class GivenWork:
     stage: Stage = Stage.CLEAR
 
     def begin_stage(self, stage: Stage) -> None:
-        """Notes that a stage begins."""
+        """Records that a stage begins."""
         self.stage = stage
 
 
@@ -255,33 +255,32 @@ class WorkerSlot:
     """A worker.
 
     Attributes:
-        number: in the pool.
-        job: what it works on, or did last.
-        given: what it was given and has not done yet.
-        started: whether it was given anything yet.
+        number: index in the pool.
+        job: its current or last job.
+        assigned: work that it has not finished yet.
+        started: whether it was ever given work.
     """
 
     number: int
     job: OpenJob | None = None
-    given: list[GivenWork] = field(default_factory=list)
+    assigned: list[AssignedWork] = field(default_factory=list)
     started: bool = False
 
 
 Answer = tuple[Job, Candidate, Verdict]
-"""A job, a grasp of it and what became of that."""
+"""A job, one of its grasps, and the verdict."""
 
 
 class JudgePool:
     """Open work and the workers that judge.
 
     Attributes:
-        count: number of workers, at most.
-        limits: what they may take.
+        count: largest number of workers.
+        limits: their limits.
         slots: the workers.
-        jobs: those under way.
-        stopped: whether it was told to stop.
-        crashing: ids of grasps whose outcome is that they end their workers, in the order in which
-            they came up.
+        jobs: jobs in progress.
+        stopped: whether `stop` was called.
+        crashing: ids of grasps that killed their workers, in order of occurrence.
     """
 
     def __init__(self, count: int, limits: WorkerLimits) -> None:
@@ -292,7 +291,7 @@ class JudgePool:
         self.crashing: list[str] = []
         self.stopped = False
         self._workers: WorkerPool | None = None
-        self._done: SimpleQueue[GivenWork] = SimpleQueue()
+        self._done: SimpleQueue[AssignedWork] = SimpleQueue()
         self._screens: dict[str, tuple[int, ...]] = {}
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
@@ -300,46 +299,48 @@ class JudgePool:
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[Answer, None, None]:
-        """Judges all grasps of all jobs; see `Executor.judge`. Workers that are idle at
-        the end stay, for another call; whatever else ends it, ends them."""
+        """Judges all grasps of all jobs; see `Executor.judge`.
+
+        Idle workers stay for another call; an error or closing the generator ends all workers.
+        """
         self._coming, self._on_failure = iter(jobs), on_failure
         self.open()
         try:
             while not self.stopped:
                 self.assign_work()
-                if not any(slot.given for slot in self.slots):
+                if not any(slot.assigned for slot in self.slots):
                     break
-                given = self._done.get()
+                work = self._done.get()
                 if self.stopped:
                     raise SimulationError("the worker processes were stopped")
-                given.slot.given.remove(given)
-                if not given.job.failed:
-                    yield from self.take_result(given)
+                work.slot.assigned.remove(work)
+                if not work.job.failed:
+                    yield from self.handle_result(work)
         except BaseException:
             self.kill()
             raise
 
     def open(self) -> None:
-        """Makes the workers' pool if there is none; a process is started when there is work."""
+        """Creates the worker pool if there is none; processes start when there is work."""
         if self._workers is None:
             self._workers = WorkerPool(self.count)
             self._done = SimpleQueue()
             self.slots = [WorkerSlot(k) for k in range(self.count)]
 
     def assign_work(self) -> None:
-        """Gives idle workers something to do, those first that are there already."""
+        """Gives work to idle workers, first to those whose process has started."""
         for slot in sorted(self.slots, key=lambda slot: not slot.started):
-            if not slot.given and (job := self.choose_job(slot)) is not None:
+            if not slot.assigned and (job := self.choose_job(slot)) is not None:
                 self.give_work(slot, job)
         open_jobs = [job for job in self.jobs if not job.failed]
         self.jobs = [job for job in open_jobs if job.waiting or self.worker_count_of(job)]
 
     def worker_count_of(self, job: OpenJob) -> int:
-        """Number of workers that are at a job."""
-        return sum(bool(slot.given) and slot.job is job for slot in self.slots)
+        """Number of workers on a job."""
+        return sum(bool(slot.assigned) and slot.job is job for slot in self.slots)
 
     def choose_job(self, slot: WorkerSlot) -> OpenJob | None:
-        """What an idle worker is to work on."""
+        """Chooses the job for an idle worker; None if there is none."""
         built = self.judges_of(slot)
         if slot.job is not None and slot.job.waiting:
             return slot.job
@@ -358,79 +359,79 @@ class JudgePool:
         return max(share, key=share.__getitem__) if share else None
 
     def judges_of(self, slot: WorkerSlot) -> tuple[str, ...]:
-        """Keys of the judges that a worker has."""
+        """Keys of the judges that a worker has built."""
         assert self._workers is not None
         return self._workers.sessions(slot.number)
 
     def give_work(self, slot: WorkerSlot, job: OpenJob) -> None:
-        """Hands a worker work of a job, or has it build the judge first."""
+        """Gives a worker grasps of a job, or has it build the judge first."""
         slot.job, slot.started = job, True
         if job.job.key not in self.judges_of(slot) or job.job.key not in self._screens:
             build: Task[Any] = Task(_screen_batches, session=job.session)
-            self.submit(slot, [(GivenWork(slot, job, ()), build)])
+            self.submit(slot, [(AssignedWork(slot, job, ()), build)])
             return
         job.set_screens(self._screens[job.job.key])
         grasps, are_screened = job.next_work()
         limit = TimeLimit(self.limits.cpu, self.limits.wall)
         if are_screened:
-            given = GivenWork(slot, job, grasps, screening=True)
+            work = AssignedWork(slot, job, grasps, screening=True)
             task: Task[Any] = Task(screen_grasps, (grasps,), {}, job.session, limit, retries=0)
-            self.submit(slot, [(given, task)])
+            self.submit(slot, [(work, task)])
             return
-        each = [GivenWork(slot, job, (grasp,)) for grasp in grasps]
+        each = [AssignedWork(slot, job, (grasp,)) for grasp in grasps]
         tasks = [
             Task(judge_grasp, one.grasps[0], {}, job.session, limit, one.begin_stage)
             for one in each
         ]
         self.submit(slot, list(zip(each, tasks, strict=True)))
 
-    def submit(self, slot: WorkerSlot, work: list[tuple[GivenWork, Task[Any]]]) -> None:
-        """Sends a worker tasks; what becomes of each comes to `run`."""
+    def submit(self, slot: WorkerSlot, tasks: list[tuple[AssignedWork, Task[Any]]]) -> None:
+        """Sends tasks to a worker; `run` receives each result."""
         if self.stopped or self._workers is None:
             raise SimulationError("the worker processes were stopped")
-        futures = self._workers.submit_tasks([task for _, task in work], slot.number)
-        for (given, _), future in zip(work, futures, strict=True):
-            given.future = future
-            slot.given.append(given)
-        for (given, _), future in zip(work, futures, strict=True):
-            future.add_done_callback(partial(self._note_done, given))
+        futures = self._workers.submit_tasks([task for _, task in tasks], slot.number)
+        for (work, _), future in zip(tasks, futures, strict=True):
+            work.future = future
+            slot.assigned.append(work)
+        for (work, _), future in zip(tasks, futures, strict=True):
+            future.add_done_callback(partial(self._note_done, work))
 
-    def _note_done(self, given: GivenWork, future: object) -> None:
-        self._done.put(given)
+    def _note_done(self, work: AssignedWork, future: object) -> None:
+        self._done.put(work)
 
-    def take_result(self, given: GivenWork) -> Iterator[Answer]:
-        """Deals with what became of work."""
-        job, future = given.job, given.future
+    def handle_result(self, work: AssignedWork) -> Iterator[Answer]:
+        """Handles the result of a piece of work; yields the verdicts in it."""
+        job, future = work.job, work.future
         assert future is not None
         error = future.exception()
         if error is not None and error is job.session.error:
             self.fail_job(job, _build_error(error))
-        elif not given.grasps:
+        elif not work.grasps:
             if error is None:
                 self._screens[job.job.key] = future.result()
                 job.set_screens(future.result())
-        elif given.screening:
-            if error is not None:  # each goes through the rest, so that the one to blame is found
-                for grasp in given.grasps:
+        elif work.screening:
+            if error is not None:  # judged one by one, to find the grasp that kills the worker
+                for grasp in work.grasps:
                     job.open.append(grasp)
                 return
-            for candidate, verdict in job.take_screen_answers(given.grasps, future.result()):
+            for candidate, verdict in job.store_screen_answers(work.grasps, future.result()):
                 yield job.job, candidate, verdict
         elif error is None:
             job.crashes_in_a_row = 0
-            yield job.job, given.grasps[0][0], future.result()
+            yield job.job, work.grasps[0][0], future.result()
         else:
-            yield from self.take_crash(given, error)
+            yield from self.handle_crash(work, error)
 
-    def take_crash(self, given: GivenWork, error: BaseException) -> Iterator[Answer]:
-        """Deals with a grasp that has ended its workers."""
-        job, candidate = given.job, given.grasps[0][0]
+    def handle_crash(self, work: AssignedWork, error: BaseException) -> Iterator[Answer]:
+        """Handles a grasp that has killed its workers."""
+        job, candidate = work.job, work.grasps[0][0]
         reason, interrupted = one_line(error), False
         if isinstance(error, WorkerDied):
             reason, interrupted = str(error), error.from_outside
         self.crashing.append(candidate.id)
         failed = Outcome.SIMULATION_FAILED
-        verdict = Verdict(failed, given.stage, reason=reason, interrupted=interrupted)
+        verdict = Verdict(failed, work.stage, reason=reason, interrupted=interrupted)
         yield job.job, candidate, verdict
         job.crashes_in_a_row += 1
         if job.crashes_in_a_row >= self.limits.hopeless:
@@ -441,31 +442,31 @@ class JudgePool:
             self.fail_job(job, SimulationError(why))
 
     def fail_job(self, job: OpenJob, error: BurgError) -> None:
-        """Gives a job up, and tells of it once."""
+        """Gives a job up, and reports it once."""
         if job.failed:
             return
         job.give_up()
-        for given in [given for slot in self.slots for given in slot.given if given.job is job]:
-            if given.future is not None:
-                given.future.interrupt()
+        for work in [work for slot in self.slots for work in slot.assigned if work.job is job]:
+            if work.future is not None:
+                work.future.interrupt()
         if self._on_failure is None:
             raise error
         self._on_failure(JobFailed(job.job, error))
 
     def release(self) -> None:
-        """Lets idle workers end by themselves, and ends those that are at work."""
-        if self._workers is not None and not any(slot.given for slot in self.slots):
+        """Shuts down idle workers and kills busy ones."""
+        if self._workers is not None and not any(slot.assigned for slot in self.slots):
             self._workers.shutdown()
         self.kill()
 
     def stop(self) -> None:
-        """Ends all workers, and with them `run` in another thread."""
+        """Kills all workers, which ends `run` in another thread."""
         self.stopped = True
         if self._workers is not None:
             self._workers.kill_workers()
 
     def kill(self) -> None:
-        """Ends all workers at once."""
+        """Kills all workers at once."""
         workers, self._workers = self._workers, None
         if workers is not None:
             workers.kill_workers()
@@ -481,11 +482,11 @@ def _build_error(error: BaseException) -> BurgError:
 
 
 class Executor(Protocol):
-    """Judges jobs."""
+    """Judges the grasps of jobs, in any order."""
 
     @property
     def workers(self) -> int:
-        """Number of processes that judge."""
+        """Number of worker processes."""
 
     def judge(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
@@ -493,10 +494,10 @@ class Executor(Protocol):
         """Judges all grasps of all jobs.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work. None says that no
-                job is ready yet, and that there are others to work on meanwhile.
-            on_failure: told of a job that cannot be done, such as one whose judge cannot be built;
-                no more verdicts come for it, and the other jobs go on. If None, its error is
+            jobs: taken one after the other, when workers run out of work. None means that no job
+                is ready yet, and that workers have others to work on meanwhile.
+            on_failure: called with a job that cannot be done, such as one whose judge cannot be
+                built; it gets no more verdicts, and the other jobs go on. If None, its error is
                 raised.
 
         Yields:
@@ -510,11 +511,11 @@ class Executor(Protocol):
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Worker processes of this machine.
+    """Judges in worker processes of this machine.
 
     Attributes:
-        workers: their number.
-        limits: what they may take.
+        workers: number of processes.
+        limits: their limits.
     """
 
     workers: int
@@ -527,7 +528,7 @@ class LocalExecutor:
     def of_this_machine(
         cls, workers: int | None = None, limits: WorkerLimits | None = None
     ) -> LocalExecutor:
-        """So many processes, one a processor if None; the usual limits if None.
+        """Executor with this number of processes (None: one per processor) and limits.
 
         Raises:
             InvalidInputError: workers is below 1.
@@ -556,8 +557,8 @@ def judge_all(
         candidates: the grasps.
         make_judge: builds the judge, called once in each worker; pickled by reference, hence an
             instance of an importable class or an importable function.
-        workers: number of processes; as many as there are processors if None.
-        limits: what they may take; the usual ones if None.
+        workers: number of processes; one per processor if None.
+        limits: limits of the workers; the defaults if None.
 
     Yields:
         Each candidate with its verdict, in the order of completion. Closing the iterator ends the

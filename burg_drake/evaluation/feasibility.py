@@ -1,4 +1,4 @@
-"""Which grasps the arm can execute in a scene, what hinders it, and the folder of its plans."""
+"""Feasibility of grasps for the arm in a scene (`reach`), and folders of arm plans."""
 
 from __future__ import annotations
 
@@ -71,17 +71,16 @@ PLANS_FILE = "plans.yaml"
 
 @dataclass(frozen=True)
 class PlanOutput:
-    """Where the plans of `reach` go, and how.
+    """Output folder and format of the plans of `reach`.
 
     Attributes:
         folder: gets the timed motion of each grasp that the arm can execute, as
-            `INSTANCE-GRASP.json`, see `Plan.to_json`: a new or empty one, or that of an
-            interrupted call, which the same call goes on with. What is finished is kept, and
-            grasps are tried again whose worker process was ended from outside or whose plan is
-            missing.
-        format: `csv` for tables, with what their columns are beside them; see `Plan.to_csv`.
-            `load_plan` reads both.
-        retry_failed: try all grasps again that an earlier call with this folder could not judge.
+            `INSTANCE-GRASP.json`, see `Plan.to_json`. It is new, empty, or left by an interrupted
+            call, which the same call continues: finished grasps are kept, except those whose
+            worker process was killed from outside or whose plan is missing.
+        format: `csv` for tables, each with a description of its columns in a file beside it; see
+            `Plan.to_csv`. `load_plan` reads both.
+        retry_failed: retry all grasps that an earlier call with this folder could not judge.
     """
 
     folder: str | Path
@@ -117,46 +116,46 @@ class PlansDocument:
 
 @dataclass(frozen=True)
 class PlanFolder:
-    """A folder for plans.
+    """A folder of plans.
 
     Attributes:
         path: its path.
-        document: what is asked.
+        document: inputs and settings of the plans.
     """
 
     path: Path
     document: PlansDocument
 
-    def plan(self, id: str) -> Path:
-        """The file for the plan of a grasp."""
+    def plan_path(self, id: str) -> Path:
+        """Path of the plan of a grasp."""
         return self.path / f"{id}.{self.document.format}"
 
     @contextmanager
     def opened(self) -> Iterator[Journal]:
-        """Makes the folder, or goes on with it; one call at a time can.
+        """Creates or reopens the folder, and locks it while the context is open.
 
         Raises:
-            InvalidInputError: it cannot be written, holds something else, or plans of something
-                else; or another process is at it.
+            InvalidInputError: the folder cannot be written, holds other files or plans of other
+                inputs, or another process is writing it.
         """
         header = "Record of the plans in this folder; written by the program."
-        self._require_plans()
+        self._require_only_plans()
         ensure_writable_folder(self.path)
         with Journal(self.path / JOURNAL_FILE) as journal:
             document = self.path / PLANS_FILE
             if document.exists():
-                self._require_same(load_document(document, PlansDocument))
+                self._require_same_inputs(load_document(document, PlansDocument))
             else:
                 save_document(self.document, document, header)
             remove_unfinished(self.path)
             yield journal
 
     def verdicts(self) -> dict[str, Verdict]:
-        """What the journal holds, by grasp id."""
+        """Verdicts in the journal, by grasp id."""
         return read_journal(self.path / JOURNAL_FILE)
 
     def finished(self, *, retry_failed: bool = False) -> dict[str, Verdict]:
-        """Verdicts that stand: the plan of what is reachable is there.
+        """Final verdicts by grasp id; a reachable grasp also needs its plan in the folder.
 
         Args:
             retry_failed: see `Verdict.is_open`.
@@ -165,11 +164,11 @@ class PlanFolder:
             id: verdict
             for id, verdict in self.verdicts().items()
             if not verdict.is_open(retry_failed=retry_failed)
-            and (verdict.outcome is not Outcome.REACHABLE or self.plan(id).is_file())
+            and (verdict.outcome is not Outcome.REACHABLE or self.plan_path(id).is_file())
         }
 
-    def _require_plans(self) -> None:
-        """Refuses a folder with anything but plans: they are not to be mixed up with others."""
+    def _require_only_plans(self) -> None:
+        """Refuses a folder with other files, to keep plans apart from them."""
         if not self.path.is_dir() or (self.path / PLANS_FILE).exists():
             return
         held = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
@@ -181,7 +180,7 @@ class PlanFolder:
                 " need a folder of their own: choose another one, or empty it"
             )
 
-    def _require_same(self, there: PlansDocument) -> None:
+    def _require_same_inputs(self, there: PlansDocument) -> None:
         here = self.document
         counts = f"grasps are {there.grasps} there, {here.grasps} here"
         same = there.grasps == here.grasps
@@ -210,7 +209,7 @@ def plans_document(
     exact: bool,
     format: PlanFormat,
 ) -> PlansDocument:
-    """What a call asks for, with the versions that are installed."""
+    """Document of a call's inputs and settings, with the installed versions."""
     return PlansDocument(
         scene=scene,
         station=station,
@@ -224,7 +223,7 @@ def plans_document(
 
 
 def _plans_identity(document: PlansDocument) -> dict[str, str]:
-    """What two calls must have in common to work on the same plans, in words, by topic."""
+    """Properties that two calls must share to work on the same plans, as texts by topic."""
     return {
         "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
@@ -239,7 +238,7 @@ def _plans_identity(document: PlansDocument) -> dict[str, str]:
 
 
 def _other_arm_settings(document: PlansDocument) -> dict[str, float]:
-    """Settings of the arm that are no topics of their own."""
+    """Settings of the arm that have no topic of their own in `_plans_identity`."""
     return without_motion({k: v for k, v in document.arm.items() if k != "exact"})
 
 
@@ -248,7 +247,7 @@ REACH_MARGIN_COLUMNS = (
     *(name for name in MarginNames.arm_screen if name != MarginNames.lift_height),
     MarginNames.lift_height,
 )
-"""Margins of a verdict that become columns; NaN where they are not defined."""
+"""Margins of a verdict that become columns; NaN where undefined."""
 
 
 def reach(
@@ -262,11 +261,11 @@ def reach(
     workers: int | None = None,
     progress: bool | Listener = False,
 ) -> GraspSet:
-    """Asks of every grasp whether the arm can execute it, without a trial.
+    """Checks for every grasp whether the arm can execute it, without a trial.
 
-    That is: the open hand is clear, also on the straight approach, and with the target in it on the
-    straight retreat and lift; the arm can follow them; and it finds a way from home to where they
-    begin.
+    A grasp is reachable if the open hand is free of collisions at the grasp and on the straight
+    approach, and the hand with the target on the straight retreat and lift; if the arm can follow
+    these lines; and if a path leads from the arm's home posture to the pregrasp.
 
     Example::
 
@@ -278,30 +277,30 @@ def reach(
         scene, station: as loaded, or references for `load_scene` and `load_station`.
         grasps: in the frames of their objects. A set goes to the instances that its column
             `instance` names, or else to all instances of its objects; a mapping has sets by
-            instance, such as those of `read_grasps`.
-        motion: how the hand goes to a grasp and away from it; as the station says if None.
-        exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
-            screening, several times faster.
-        plans: folder that gets the timed motion of each grasp that the arm can execute, which the
-            same call goes on with if it was interrupted; and more of it, see `PlanOutput`.
-        workers: number of processes; as many as there are processors if None.
+            instance, as `read_grasps` returns.
+        motion: approach, retreat and lift of the hand; the station's if None.
+        exact: whether Drake's `CollisionChecker` confirms each reachable grasp; otherwise the
+            answers are those of a screening, which is several times faster.
+        plans: folder that gets the timed motion of each grasp that the arm can execute; the same
+            call continues an interrupted one. `PlanOutput` has more options.
+        workers: number of processes; one per processor if None.
         progress: True shows a bar on standard error; a function gets the events.
 
     Returns:
-        The grasps by instance in the scene's order, each one once on its instance, with columns:
-        `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
-        is no outcome, or no plan of what is reachable, should a computation fail; `clearance`
-        of the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
-        `Margins`; `lift_height` [m], as asked or as far as there is room;
-        `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there [rad], NaN where there is
-        none; and `cpu` [s]. Answers do not depend on the batch, the order or the number of workers.
-        The provenance tells documents, versions and settings.
+        The grasps by instance in the scene's order, without duplicates, with columns: `instance`;
+        `outcome`, `reachable` or the obstacle for the arm; `blocker`; `reason`, the error if a
+        computation of the outcome or of the plan failed; `clearance` of the open hand at the grasp
+        [m]; `arm_clearance` [m] and `joint_excess` [rad], see `Margins`; `lift_height` [m], the
+        asked one or as far as there is room; `q_grasp_1` and so on, `q_pregrasp_1` and so on: the
+        arm's configuration at grasp and pregrasp [rad], NaN if there is none; and `cpu` [s].
+        Results do not depend on batch, order or number of workers. The provenance records
+        documents, versions and settings.
 
     Raises:
-        InvalidInputError: the station has no arm, or one that stands in something, collides in
-            its home posture, or does not reach the board; a set does not fit the scene; the folder
-            cannot be written, or holds something else, or plans of something else.
-        UnknownNameError: a reference, instance or object that does not exist.
+        InvalidInputError: the station has no arm, or one that overlaps the scene, collides in its
+            home posture, or does not reach the board; a set does not fit the scene; the folder
+            cannot be written, or holds other files or plans of other inputs.
+        UnknownNameError: a reference, instance or object does not exist.
         SimulationError: the worker processes die.
     """
     from burg_drake.motion import require_usable_arm
@@ -330,9 +329,13 @@ def reach(
             )
             folder = PlanFolder(Path(output.folder), document)
             factory = ReachJudgeFactory(scene, station, motion, exact, folder)
-            again = output.retry_failed
             verdicts = plan_into_folder(
-                folder, candidates, factory, workers, reporter, retry_failed=again
+                folder,
+                candidates,
+                factory,
+                workers,
+                reporter,
+                retry_failed=output.retry_failed,
             )
     rows = [verdicts[id] for id in candidates.id]
     return _add_columns(candidates, rows, scene, station, settings)
@@ -347,21 +350,21 @@ def plan_into_folder(
     *,
     retry_failed: bool = False,
 ) -> dict[str, Verdict]:
-    """Plans what a folder lacks.
+    """Judges the grasps that a folder of plans lacks, and writes their plans.
 
     Args:
-        folder: of the plans.
+        folder: the folder.
         candidates: the grasps of the folder.
         factory: builds the judge that writes into it.
-        workers: number of processes; as many as there are processors if None.
+        workers: number of processes; one per processor if None.
         reporter: shows the progress.
-        retry_failed: also what an earlier call could not judge.
+        retry_failed: also retry grasps that an earlier call could not judge.
 
     Returns:
-        Verdicts by grasp id, with the digits that a later call will find.
+        Verdicts by grasp id, as a later call will read them from the journal.
 
     Raises:
-        InvalidInputError: the folder cannot be written, or has plans of something else.
+        InvalidInputError: the folder cannot be written, or has plans of other inputs.
         SimulationError: the worker processes die.
     """
     with folder.opened() as journal:
@@ -378,7 +381,11 @@ def _judge_grasps(
     known: Mapping[str, Verdict] = MappingProxyType({}),
     journal: Journal | None = None,
 ) -> dict[str, Verdict]:
-    """Verdicts by grasp id; each that is not known is written to the journal at once."""
+    """Judges the grasps without a known verdict, and writes each new one to the journal at once.
+
+    Returns:
+        All verdicts by grasp id.
+    """
     verdicts = dict(known)
     left = [candidate for candidate in candidates if candidate.id not in verdicts]
     outcomes = Counter(v.outcome for v in verdicts.values())
@@ -397,7 +404,7 @@ def _judge_grasps(
 
 
 class ReachJudge:
-    """Asks whether the arm can execute a grasp.
+    """Judges whether the arm can execute a grasp.
 
     Attributes:
         screens, stages: see `Judge`.
@@ -409,11 +416,11 @@ class ReachJudge:
         scene, station = factory.scene, factory.station
         hand, X_WO = hand_alone(scene, station)
         arm = arm_reach(scene, station, factory.motion, exact=factory.exact)
-        wanted = factory.plans is not None
-        self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=wanted))
+        with_plans = factory.plans is not None
+        self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=with_plans))
         self.stages: tuple[tuple[Stage, Decide], ...] = ((Stage.PLANNED, self._plan),)
         self._plans = factory.plans
-        self._planner = Planner(arm) if wanted else None
+        self._planner = Planner(arm) if with_plans else None
 
     def _plan(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         if self._planner is None or self._plans is None:
@@ -422,21 +429,21 @@ class ReachJudge:
         try:
             plan = self._planner.time(grasp.instance, motion, grasp.width)
             require_name(grasp.id)
-            path = self._plans.plan(grasp.id)
+            path = self._plans.plan_path(grasp.id)
             (plan.to_csv if path.suffix == ".csv" else plan.to_json)(path)
-        except Exception as error:  # the grasp is reachable, whatever becomes of its plan
+        except Exception as error:  # the grasp is reachable even if its plan fails
             return Decision(Outcome.REACHABLE, reason=f"no plan: {one_line(error)}")
         return Decision(Outcome.REACHABLE, margins={"duration": plan.duration})
 
 
 @dataclass(frozen=True)
 class ReachJudgeFactory:
-    """What a worker process needs to build its `ReachJudge`.
+    """Builds the `ReachJudge` of a worker process.
 
     Attributes:
-        scene, station: where the grasps are.
+        scene, station: scene and station of the grasps.
         motion, exact: as in `reach`.
-        plans: where plans go, if they are wanted.
+        plans: folder of the plans; None for no plans.
     """
 
     scene: Scene
@@ -484,7 +491,7 @@ def _add_columns(
 
 
 def reach_columns(grasps: GraspSet) -> Columns:
-    """What `reach` returns as a table: ids as in runs, poses as quaternions, all its columns."""
+    """Table of the grasps that `reach` returned: ids as in runs, quaternions, all its columns."""
     return {
         "id": np.array(Candidates(grasps, grasps.column(INSTANCE_COLUMN)).id, dtype=np.str_),
         INSTANCE_COLUMN: grasps.column(INSTANCE_COLUMN),

@@ -1,4 +1,4 @@
-"""The journal of a run: one line of JSON for each judged grasp; and the lock of its writer.
+"""Journal of a run, one line of JSON per judged grasp, and the lock of its writer.
 
 A line is written by a single call, so a killed run leaves whole lines and at most one torn line at
 the end, which is cut off when the run goes on. The operating system drops a lock when its process
@@ -35,18 +35,18 @@ from burg_drake.core import (
 
 
 def _open_locked(path: Path, flags: int = 0) -> int:
-    """Opens a file for writing, made if need be, and locks it.
+    """Opens a file for writing, creates it if necessary, and locks it.
 
     Raises:
-        InvalidInputError: it cannot be written, another process has it, or its file system has no
-            locks.
+        InvalidInputError: the file cannot be written, another process has locked it, or its file
+            system has no locks.
     """
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
     try:
-        for wait in (0.02, 0.02, 0.02, 0.02, 0.0):  # a look at a folder holds the lock briefly
+        for wait in (0.02, 0.02, 0.02, 0.02, 0.0):  # `is_locked` holds the lock briefly
             if try_lock(file):
                 return file
             time.sleep(wait)
@@ -58,7 +58,7 @@ def _open_locked(path: Path, flags: int = 0) -> int:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds the lock of a file; none does where the file system has no locks."""
+    """Whether a process holds the lock of a file; False if the file system has no locks."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
@@ -73,15 +73,15 @@ def is_locked(path: Path) -> bool:
 
 @contextmanager
 def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
-    """Keeps others from writing the folder that a file stands for; they may read it.
+    """Keeps other processes from writing the folder whose lock file this is; they may read it.
 
     Args:
-        path: the file. Where there is none nothing is locked; nor on a file system without locks,
-            where nothing writes.
-        make: make it if need be and possible.
+        path: the lock file. Nothing is locked if it does not exist, or on a file system without
+            locks, where nothing writes.
+        make: create the file if necessary and possible.
 
     Raises:
-        InvalidInputError: another process is writing it.
+        InvalidInputError: another process is writing the folder.
     """
     file = _open_to_read(path, make)
     if file is None:
@@ -100,28 +100,28 @@ def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
 
 
 def _open_to_read(path: Path, make: bool) -> int | None:
-    for flags in (os.O_CREAT, 0) if make else (0,):  # the folder may be one that cannot be written
+    for flags in (os.O_CREAT, 0) if make else (0,):  # the folder may be read-only
         with suppress(OSError):
             return os.open(path, os.O_RDONLY | os.O_NONBLOCK | flags, 0o666)
     return None
 
 
 def folder_in_use_error(folder: Path) -> InvalidInputError:
-    """The error about a folder that another process has."""
+    """Error about a folder that another process is writing."""
     return InvalidInputError(
         f"{folder} is being written by another process; wait for it, or choose another folder"
     )
 
 
 class WriterLock:
-    """A file that stands for its folder, locked."""
+    """Lock of a folder for its writer, held on a file in it."""
 
     def __init__(self, path: Path) -> None:
-        """Makes the file if need be, and locks it.
+        """Creates the file if necessary, and locks it.
 
         Raises:
-            InvalidInputError: it cannot be written, another process has it, or its file system has
-                no locks.
+            InvalidInputError: the file cannot be written, another process has locked it, or its
+                file system has no locks.
         """
         self._file = _open_locked(path)
 
@@ -138,7 +138,7 @@ ORIGINAL_FIELDS = frozenset(
 )
 """Fields that all releases have written; others are empty in lines that lack them."""
 MAX_JOURNAL_LINE = 1 << 20
-"""Bytes; `encode_verdict` writes lines of some hundred."""
+"""Bytes; `encode_verdict` writes lines of a few hundred."""
 
 
 class Journal:
@@ -181,7 +181,7 @@ class Journal:
             ) from error
 
     def close(self) -> None:
-        """Closes the file and lets others write it."""
+        """Closes the file and releases its lock."""
         os.close(self._file)
 
     def __enter__(self) -> Journal:
@@ -192,14 +192,14 @@ class Journal:
 
 
 def read_journal(path: Path, begin: int = 0, end: int | None = None) -> dict[str, Verdict]:
-    """The last verdict about each grasp by id; lines that cannot be read count as not judged.
+    """Reads the last verdict of each grasp, by id; unreadable lines are skipped.
 
     Args:
-        path: of the journal; one that does not exist has none.
-        begin, end: bytes to read, if not all; each at the end of a line.
+        path: path of the journal; a missing file has no verdicts.
+        begin, end: range of bytes to read, each at the end of a line; all if not given.
 
     Raises:
-        InvalidInputError: it is a folder, for example.
+        InvalidInputError: it is not a regular file.
     """
     return {id: verdict for _, id, verdict in journal_lines(path, begin, end)}
 
@@ -207,10 +207,10 @@ def read_journal(path: Path, begin: int = 0, end: int | None = None) -> dict[str
 def journal_lines(
     path: Path, begin: int = 0, end: int | None = None
 ) -> Iterator[tuple[int, str, Verdict]]:
-    """The verdicts of a journal, in its order, one at a time; see `read_journal`.
+    """Reads the verdicts of a journal one at a time, in its order; see `read_journal`.
 
     Yields:
-        Where its line begins, the id of the grasp, and the verdict.
+        The byte at which the line begins, the id of the grasp, and the verdict.
     """
     if not path.exists():
         return
@@ -234,11 +234,11 @@ JUDGED = 3  # Highest value of `JournalIndex.rank`.
 
 @dataclass(frozen=True, eq=False)
 class JournalIndex:
-    """Where a journal has the last verdict about each of N grasps, in 11 bytes a grasp.
+    """Position and outcome of the last verdict of each of N grasps, in 11 bytes per grasp.
 
     Attributes:
-        place: (N,) byte at which its line begins; -1 of grasps without a verdict.
-        outcome: (N,) place in `Outcome`; -1 likewise.
+        place: (N,) byte of the journal at which the line begins; -1 for grasps without a verdict.
+        outcome: (N,) index in `Outcome`; -1 for grasps without a verdict.
         interrupted, judged_again: (N,) see `Verdict`.
     """
 
@@ -249,41 +249,44 @@ class JournalIndex:
 
     @property
     def judged(self) -> NDArray[np.bool_]:
-        """(N,) which grasps have a verdict."""
+        """(N,) whether each grasp has a verdict."""
         return self.outcome >= 0
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """(N,) which grasps could not be simulated."""
+        """(N,) whether each grasp could not be simulated."""
         failed: NDArray[np.bool_] = self.outcome == list(Outcome).index(Outcome.SIMULATION_FAILED)
         return failed
 
     @property
     def rank(self) -> NDArray[np.int8]:
-        """(N,) the higher the more a verdict says: `JUDGED` if the trial came to an end, less if it
-        failed, less if its worker was ended from outside, 0 if there is none."""
+        """(N,) rank for the choice between verdicts of a grasp; the higher one is taken.
+
+        `JUDGED` if the trial came to an end, `JUDGED - 1` if it failed, `JUDGED - 2` if its worker
+        was killed from outside, 0 without a verdict.
+        """
         return np.where(
             self.judged, JUDGED - self.failed - (self.failed & self.interrupted), 0
         ).astype(np.int8)
 
     def select(self, rows: NDArray[np.int64]) -> JournalIndex:
-        """The same of some grasps."""
+        """Index of the grasps in the given rows."""
         return JournalIndex(*(values[rows] for values in vars(self).values()))
 
     def replace_rows(self, chosen: NDArray[np.bool_], other: JournalIndex) -> None:
-        """Takes some grasps (N,) from another index of the same."""
+        """Copies the chosen (N,) grasps from another index of the same grasps."""
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             mine[chosen] = theirs[chosen]
 
     def count_outcomes(self, without: NDArray[np.int64]) -> Counter[Outcome]:
-        """Numbers of grasps by outcome, but for some rows."""
+        """Number of grasps by outcome, without the given rows."""
         outcome = self.outcome.copy()
         outcome[without] = -1
         counts = np.bincount(outcome[outcome >= 0], minlength=len(Outcome)).tolist()
         return +Counter(dict(zip(Outcome, counts, strict=True)))
 
     def open(self, *, retry_failed: bool) -> NDArray[np.bool_]:
-        """(N,) grasps without a verdict, and those to be tried again; see `Verdict.is_open`."""
+        """(N,) whether each grasp has no verdict or is to be retried; see `Verdict.is_open`."""
         again = self.interrupted | self.failed if retry_failed else self.interrupted
         return ~self.judged | again
 
@@ -291,12 +294,12 @@ class JournalIndex:
 def index_journal(
     path: Path, count: int, rows_of: Callable[[Sequence[str]], NDArray[np.int64]]
 ) -> JournalIndex:
-    """Reads where the verdicts about grasps are.
+    """Reads a journal into an index of N grasps.
 
     Args:
-        path: of the journal; see `read_journal`.
+        path: path of the journal; see `read_journal`.
         count: N, number of grasps.
-        rows_of: tells the places of grasps by their ids; negative ones are left out.
+        rows_of: returns the rows of grasps with given ids; negative rows are left out.
     """
     index = JournalIndex(
         np.full(count, -1, dtype=np.int64),
@@ -317,7 +320,7 @@ def index_journal(
 
 
 def read_verdicts(path: Path, places: Sequence[int]) -> list[Verdict]:
-    """The verdicts of the lines of a journal that begin at some bytes."""
+    """Reads the verdicts in the lines of a journal that begin at the given bytes."""
     verdicts: list[Verdict] = []
     if not places:
         return verdicts
@@ -329,7 +332,7 @@ def read_verdicts(path: Path, places: Sequence[int]) -> list[Verdict]:
 
 
 def encode_verdict(id: str, verdict: Verdict) -> bytes:
-    """One line for one grasp; numbers that are not finite become null."""
+    """Encodes a verdict as a journal line; numbers that are not finite become null."""
     record: dict[str, Any] = {"id": id}
     record |= {one.name: one.to_json(getattr(verdict, one.name)) for one in RecordedFields.verdict}
     if verdict.interrupted:
@@ -338,7 +341,7 @@ def encode_verdict(id: str, verdict: Verdict) -> bytes:
 
 
 def decode_verdict(line: bytes) -> tuple[str, Verdict]:
-    """Reads a line.
+    """Decodes a journal line into the id of the grasp and its verdict.
 
     Raises:
         ValueError, KeyError, TypeError, AttributeError: it was not written by `encode_verdict`.

@@ -1,9 +1,8 @@
-"""How one grasp is judged: stage by stage, until one of them decides.
+"""Judges, which send a grasp through their stages until one of them decides.
 
-Each stage answers for one grasp with an outcome, or passes it on. The first stages are screens,
-which are asked about many grasps at once. A station has these stages, by the mode of the run:
-clearance of the open hand, feasibility for the arm, and a trial in simulation, of the hand alone or
-of the arm.
+Each stage returns an outcome for a grasp, or passes it on. The first stages are screens, which
+take many grasps at once. The stages on a station, depending on the mode of the run: clearance of
+the open hand, feasibility for the arm, and a trial in simulation, of the hand alone or of the arm.
 """
 
 from __future__ import annotations
@@ -42,11 +41,11 @@ if TYPE_CHECKING:
 
 
 def mode_for(station: Station, asked: Mode | None = None) -> Mode:
-    """The mode of a run.
+    """Mode of a run on a station.
 
     Args:
-        station: where it takes place.
-        asked: what the user wants; None for `reach` where there is an arm, else `hand`.
+        station: the station.
+        asked: mode that the user asks for; None for `reach` if there is an arm, else `hand`.
 
     Raises:
         InvalidInputError: there is no such mode, or it needs an arm that the station lacks.
@@ -67,8 +66,8 @@ def require_engine_for(engine: Engine, mode: Mode) -> None:
     """Refuses an engine that cannot run the trials of a mode.
 
     Raises:
-        InvalidInputError: it has no arm.
-        MissingDependencyError: it is not installed.
+        InvalidInputError: the engine does not support arms.
+        MissingDependencyError: the engine is not installed.
     """
     if engine.simulator == "drake":
         return
@@ -84,7 +83,7 @@ def require_engine_for(engine: Engine, mode: Mode) -> None:
 
 
 def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
-    """Refuses objects and hands that an engine cannot have.
+    """Refuses objects and hands that an engine cannot simulate.
 
     Raises:
         InvalidInputError: an object has no convex pieces, or the hand's pads are not flat; see
@@ -98,10 +97,10 @@ def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
 
 @dataclass(frozen=True)
 class Decision(Findings):
-    """The answer of one stage.
+    """Result of one stage for a grasp.
 
     Attributes:
-        outcome: how the grasp ends here; None passes it on to the next stage.
+        outcome: final outcome of the grasp; None passes it on to the next stage.
         motion: the arm's motion, if later stages need it.
     """
 
@@ -110,12 +109,12 @@ class Decision(Findings):
 
 
 class Screen(NamedTuple):
-    """A stage that is asked about many grasps at once; its answers do not depend on the batch.
+    """A stage that takes many grasps at once; its decisions do not depend on the batch.
 
     Attributes:
         stage: its name.
-        ask: gives an answer for each grasp.
-        batch: how many grasps to ask about at a time, so that more would hardly be cheaper each.
+        ask: returns the decision for each grasp.
+        batch: batch size beyond which the cost per grasp hardly falls.
     """
 
     stage: Stage
@@ -124,7 +123,7 @@ class Screen(NamedTuple):
 
 
 Decide = Callable[[Candidate, "ArmPath | Plan | None"], Decision]
-"""A stage that is asked about one grasp, with the motion that an earlier stage has found for it."""
+"""A stage that takes one grasp, with the arm's motion if an earlier stage has found one."""
 
 
 class Judge(Protocol):
@@ -141,11 +140,11 @@ class Judge(Protocol):
 
 @dataclass(frozen=True)
 class ScreenAnswers:
-    """The answers of the first screens of a judge; all but the last one pass the grasp on.
+    """Decisions of a judge's stages so far on a grasp; all but the last pass the grasp on.
 
     Attributes:
-        decisions: the answers.
-        cpu: CPU time that they took by stage; an equal share, if grasps were screened together [s].
+        decisions: the decisions.
+        cpu: their CPU time by stage; an equal share if grasps were screened together [s].
     """
 
     decisions: tuple[Decision, ...] = ()
@@ -153,30 +152,30 @@ class ScreenAnswers:
 
     @property
     def outcome(self) -> Outcome | None:
-        """How the grasp ends; None if it is passed on."""
+        """Outcome of the grasp; None if it is passed on."""
         return self.decisions[-1].outcome if self.decisions else None
 
     def verdict(self) -> Verdict:
-        """The verdict, where the last answer decides."""
+        """The verdict; only valid if the last decision has an outcome."""
         return _make_verdict(self.decisions, list(self.cpu)[-1], self.cpu)
 
-    def then(self, stage: Stage, decision: Decision, cpu: float) -> ScreenAnswers:
-        """With one more answer."""
+    def with_decision(self, stage: Stage, decision: Decision, cpu: float) -> ScreenAnswers:
+        """Copy with one more decision."""
         return ScreenAnswers((*self.decisions, decision), {**self.cpu, stage: cpu})
 
 
 def screen_grasps(
     judge: Judge, grasps: Sequence[tuple[Candidate, ScreenAnswers]]
 ) -> list[ScreenAnswers]:
-    """Asks the next screen about many grasps at once.
+    """Sends many grasps through their next screen at once.
 
     Args:
         judge: the stages.
-        grasps: with the answers of the screens before; the same ones for all grasps.
+        grasps: grasps with their answers so far; all have been through the same screens.
 
     Returns:
-        All answers. Where an error comes up, each grasp is asked about alone, and the error is the
-        answer of those that have it.
+        Answers of each grasp with the new one. On an error each grasp is screened alone, and those
+        that cause it end in `simulation_failed`.
     """
     if not grasps:
         return []
@@ -186,11 +185,11 @@ def screen_grasps(
         decisions = screen.ask([candidate for candidate, _ in grasps])
     except Exception as error:
         if len(grasps) > 1:
-            return [screened for grasp in grasps for screened in screen_grasps(judge, [grasp])]
+            return [answers for grasp in grasps for answers in screen_grasps(judge, [grasp])]
         decisions = [Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))]
     share = (time.process_time() - start) / len(grasps)
     return [
-        before.then(screen.stage, decision, share)
+        before.with_decision(screen.stage, decision, share)
         for (_, before), decision in zip(grasps, decisions, strict=True)
     ]
 
@@ -206,8 +205,8 @@ def judge_grasp(
     Args:
         judge: the stages.
         candidate: the grasp.
-        screened: answers of screens that are known already.
-        announce: called with each stage before it begins; a worker tells who waits for it.
+        screened: answers of screens that have been asked already.
+        announce: called with each stage before it begins; a worker reports it as progress.
 
     Returns:
         The verdict. An error inside a stage ends in `simulation_failed` with its message.
@@ -225,17 +224,16 @@ def judge_grasp(
         start = time.process_time()
         try:
             decision = decide(_with_found_lift(candidate, answers.decisions), motion)
-        except Exception as error:  # whatever Drake throws becomes this one grasp's outcome
+        except Exception as error:  # any error of Drake becomes the outcome of this grasp
             decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
-        answers = answers.then(stage, decision, time.process_time() - start)
+        answers = answers.with_decision(stage, decision, time.process_time() - start)
     if answers.outcome is None:
         raise ValueError("the last stage of a judge has to decide")
     return answers.verdict()
 
 
 def _with_found_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
-    """A grasp with the length of the lift for which an earlier stage has found room, unless it
-    comes with one."""
+    """Sets the lift of a grasp to the length that an earlier stage has found, unless it has one."""
     if candidate.lift is not None:
         return candidate
     name = MarginNames.lift_height
@@ -253,24 +251,24 @@ def _make_verdict(
 
 
 def trial_decision(result: TrialResult) -> Decision:
-    """The answer of an executed trial, of the hand alone or of the arm."""
+    """Decision of an executed trial, of the hand alone or of the arm."""
     return Decision(result.outcome, **result.of_trial() | {"margins": result.margins.of_trial()})
 
 
 def trial_verdict(result: TrialResult) -> Verdict:
-    """The verdict of a trial that went through no other stage."""
+    """Verdict of a trial that went through no other stage."""
     return _make_verdict([trial_decision(result)], Stage.EXECUTED, {})
 
 
 class LiftRoom:
-    """How far the hand alone can lift, where a motion allows less than the whole lift.
+    """Free lift lengths of the hand alone, for motions that allow less than the whole lift.
 
-    It looks at what the hand sweeps in a scene: geometry, no arm, no time steps.
+    Checks the swept volume of the hand in a scene: geometry only, no arm, no time steps.
 
     Args:
-        scene: what stands there.
-        station: whose hand it is.
-        motion: of the hand.
+        scene: the scene.
+        station: the station with the hand.
+        motion: motion of the hand.
     """
 
     def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
@@ -280,19 +278,18 @@ class LiftRoom:
         self._heights = lift_heights(motion.shortest, motion.lift_height)
 
     def length(self, instance: str, X_WG: Array, width: Array) -> Array:
-        """(N,) lengths of lifts on which the hand meets nothing, with the target in it [m].
+        """(N,) lengths of lifts without a collision of the hand holding the target [m].
 
-        The least one that is allowed is given where even that one is not free: the trial tells what
-        comes of it.
+        The shortest allowed lift if even that one is not free; the trial then finds the collision.
 
         Args:
             instance: the target.
             X_WG: (N, 4, 4) grasps in the world.
-            width: (N,) distance between the pads [m]; NaN where the hand is open.
+            width: (N,) distance between the pads [m]; NaN for an open hand.
         """
         low = np.zeros(len(X_WG), dtype=int)
         high = np.full(len(X_WG), len(self._heights))
-        level = high - 1  # most often there is room for all of it
+        level = high - 1  # most often there is room for the whole lift
         while (high - low > 1).any():
             for k in np.unique(level[high - low > 1]):
                 rows = np.flatnonzero((level == k) & (high - low > 1))
@@ -305,20 +302,20 @@ class LiftRoom:
 def hand_screen(
     clearance: HandClearance, X_WO: Mapping[str, Array], room: LiftRoom | None = None
 ) -> Screen:
-    """The stage `clear`.
+    """Screen of the stage `clear`.
 
     Args:
-        clearance: of the open hand in the scene.
+        clearance: clearance of the open hand in the scene.
         X_WO: (4, 4) poses of the free instances by name.
-        room: says how far clear hands can lift, if no later stage does.
+        room: finds the lift lengths of clear hands, if no later stage does.
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
-        places: dict[str, list[int]] = {}
-        for place, grasp in enumerate(grasps):
-            places.setdefault(grasp.instance, []).append(place)
+        by_instance: dict[str, list[int]] = {}
+        for k, grasp in enumerate(grasps):
+            by_instance.setdefault(grasp.instance, []).append(k)
         decisions = [Decision()] * len(grasps)
-        for instance, chosen in places.items():
+        for instance, chosen in by_instance.items():
             X_WG = grasps_in_world([grasps[k] for k in chosen], X_WO)
             found = clearance.check_all(instance, X_WG)
             lifts = np.full(len(chosen), np.nan)
@@ -337,12 +334,12 @@ def hand_screen(
 
 
 def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = False) -> Screen:
-    """The stages `reachable` and `planned`, which are asked about together.
+    """Screen of the stages `reachable` and `planned` together.
 
     Args:
         reach: the arm in the scene.
         X_WO: (4, 4) poses of the free instances by name.
-        motions: whether later stages need the motions that are found.
+        motions: whether later stages need the arm's motions.
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
@@ -357,9 +354,9 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
 
 
 def grasps_in_world(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
-    """(N, 4, 4) grasps in the world.
+    """(N, 4, 4) grasps in the world frame.
 
-    One by one: products of stacked matrices may differ from single ones in the last bit.
+    Multiplied one by one: products of stacked matrices may differ in the last bit.
     """
     return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
 
@@ -381,7 +378,7 @@ def _reach_decision(answer: Reach, motions: bool) -> Decision:
 
 
 def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
-    """What `hand_screen` takes, where there is no trial of the hand that has it."""
+    """Arguments of `hand_screen`, for judges without a trial of the hand to take them from."""
     from burg_drake.grasping import HandClearance
     from burg_drake.station import build_station_diagram
 
@@ -392,11 +389,11 @@ def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str,
 def arm_reach(
     scene: Scene, station: Station, motion: GraspMotion, *, exact: bool = True
 ) -> ArmReach:
-    """The arm in the scene.
+    """Reachability checks of the arm in the scene.
 
     Args:
-        scene, station: where.
-        motion: of the hand, as in a trial.
+        scene, station: scene, and station with the arm.
+        motion: motion of the hand, as in a trial.
         exact: see `ReachSettings`.
     """
     from burg_drake.motion import ArmReach
@@ -405,7 +402,7 @@ def arm_reach(
 
 
 def arm_settings(motion: GraspMotion, *, exact: bool = True) -> ReachSettings:
-    """How the arm is asked before a trial; see `arm_reach`."""
+    """Settings of `arm_reach`."""
     from burg_drake.motion import ReachSettings
 
     return ReachSettings(motion=motion, exact=exact)
@@ -416,7 +413,7 @@ class StationJudge:
 
     Attributes:
         screens, stages: see `Judge`.
-        plan: the one that the arm has executed last, if it has executed any.
+        plan: last plan that the arm has executed; None if there is none.
     """
 
     def __init__(self, screens: list[Screen], stages: list[tuple[Stage, Decide]]) -> None:
@@ -426,7 +423,7 @@ class StationJudge:
 
 
 class HandJudge(StationJudge):
-    """Has the hand alone execute grasps; in mode `reach` those that the arm can execute."""
+    """Executes grasps with the hand alone; in mode `reach` only grasps that the arm can execute."""
 
     def __init__(
         self,
@@ -461,7 +458,7 @@ class HandJudge(StationJudge):
 
 
 class ArmJudge(StationJudge):
-    """Plans the arm's motions, and has the whole arm execute them."""
+    """Plans the arm's motions, and executes them with the whole arm."""
 
     def __init__(
         self, scene: Scene, station: Station, *, engine: Engine, settings: TrialSettings
@@ -476,10 +473,10 @@ class ArmJudge(StationJudge):
         self._planner = Planner(reach)
         super().__init__(
             [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)],
-            [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute)],
+            [(Stage.PLANNED, self._time_plan), (Stage.EXECUTED, self._execute)],
         )
 
-    def _time(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
+    def _time_plan(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         assert isinstance(motion, ArmPath)
         plan = self._planner.time(grasp.instance, motion, grasp.width)
         return Decision(margins={"duration": plan.duration}, motion=plan)
@@ -504,15 +501,15 @@ def build_judge(
     """Builds the judge of a mode, and the diagrams that all grasps share.
 
     Args:
-        scene, station: what to build.
-        engine: how the trial is stepped.
-        mode: what to ask; but for `hand` the station needs an arm.
-        settings: phases of the trial, if not the usual ones; where they have no motion, it is the
-            station's.
+        scene, station: scene and station to build.
+        engine: physics engine of the trials.
+        mode: mode of the run; all but `hand` need a station with an arm.
+        settings: settings of the trial's phases; defaults if None. Without a motion in them, the
+            station's is used.
 
     Raises:
-        InvalidInputError: the engine has no arm, or cannot have an object or the hand.
-        MissingDependencyError: it is not installed.
+        InvalidInputError: the engine does not support arms, an object or the hand.
+        MissingDependencyError: the engine is not installed.
     """
     from burg_drake.simulation import TrialSettings
 
@@ -525,7 +522,7 @@ def build_judge(
 
 @dataclass(frozen=True)
 class StationJudgeFactory:
-    """What a worker process needs to build its `StationJudge`; see `build_judge`."""
+    """Builds the `StationJudge` of a worker process; see `build_judge`."""
 
     scene: Scene
     station: Station

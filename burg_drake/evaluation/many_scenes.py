@@ -1,4 +1,4 @@
-"""Judges many scenes with the same workers: while one is judged, the next ones are prepared."""
+"""Judges many scenes with the same workers; prepares the next scenes while one is judged."""
 
 from __future__ import annotations
 
@@ -80,11 +80,11 @@ from burg_drake.scene import Scene, SceneLike, load_scene
 
 @dataclass(frozen=True, eq=False)
 class SceneList:
-    """What was given.
+    """Scenes that a call was given.
 
     Attributes:
-        entries: a scene each, in order.
-        given: by name: the scene as loaded, or its file.
+        entries: one entry per scene, in order.
+        given: loaded scene or its file, by the name of the entry.
         libraries: hash of all objects of each library, by folder.
     """
 
@@ -96,19 +96,21 @@ class SceneList:
 def read_scenes(
     references: Sequence[SceneLike], known: CampaignDocument | None = None
 ) -> SceneList:
-    """Looks at all scenes before any work is spent on one.
+    """Reads and checks all scenes before any is judged.
 
     Args:
-        references: scenes as loaded, or references for `load_scene`.
-        known: what a run has recorded of them: a file that has not changed since is not read again.
+        references: loaded scenes, or references for `load_scene`.
+        known: document of an earlier run; scene files that have not changed since are not read
+            again.
 
     Raises:
-        InvalidInputError: there are none, two are the same, or some cannot be read; all are named.
+        InvalidInputError: there are no scenes, two are the same, or some cannot be read; the
+            message names them.
     """
     max_problems = 5  # Scenes that cannot be read are named up to this number.
     if not references:
         raise InvalidInputError("no scenes are given; give one or more")
-    reader = _Reader(known)
+    reader = _SceneReader(known)
     entries: list[SceneEntry] = []
     given: list[Scene | Path] = []
     problems: list[str] = []
@@ -138,7 +140,7 @@ def read_scenes(
 
 
 def require_used_names(entries: Iterable[SceneEntry], request: RunRequest) -> None:
-    """Refuses names and grasps that are for none of the scenes.
+    """Refuses names and grasps that belong to none of the scenes.
 
     Raises:
         UnknownNameError: an object or instance is in no scene.
@@ -161,8 +163,8 @@ def require_used_names(entries: Iterable[SceneEntry], request: RunRequest) -> No
                 )
 
 
-class _Reader:
-    """Reads scenes, and each library once."""
+class _SceneReader:
+    """Reads scenes; loads each library only once."""
 
     def __init__(self, known: CampaignDocument | None) -> None:
         self._known = {} if known is None else {(e.path, e.file): e for e in known.scenes}
@@ -171,7 +173,7 @@ class _Reader:
         self.hashes: dict[str, str] = {}
 
     def entry(self, scene: Scene | Path) -> SceneEntry:
-        """The entry of a scene, under its own name."""
+        """Entry of a scene, under its own name."""
         if isinstance(scene, Scene):
             return self._entry(scene, "")
         path = input_reference(scene, "scenes")
@@ -210,7 +212,7 @@ class _Reader:
 
 
 def _require_different(entries: Sequence[SceneEntry]) -> None:
-    """Refuses a scene that is given twice: its grasps would count twice."""
+    """Refuses a scene that is given twice, as its grasps would count twice."""
     seen: dict[str, SceneEntry] = {}
     for entry in entries:
         first = seen.setdefault(entry.content, entry)
@@ -223,14 +225,13 @@ def _require_different(entries: Sequence[SceneEntry]) -> None:
 
 
 def _distinct_names(entries: Sequence[SceneEntry]) -> list[SceneEntry]:
-    """Entries with names that differ, also where the case of letters does not count: the second
-    scene of a name gets `_2`."""
-    own = Counter(entry.name.casefold() for entry in entries)
-    taken = {name for name, count in own.items() if count == 1}
+    """Makes the names of entries unique, ignoring case; the second scene of a name gets `_2`."""
+    counts = Counter(entry.name.casefold() for entry in entries)
+    taken = {name for name, count in counts.items() if count == 1}
     found = []
     for entry in entries:
         name, number = entry.name, 1
-        while own[entry.name.casefold()] > 1 and name.casefold() in taken:
+        while counts[entry.name.casefold()] > 1 and name.casefold() in taken:
             number += 1
             name = f"{entry.name[: MAX_NAME_BYTES - 8]}_{number}"
         taken.add(name.casefold())
@@ -249,9 +250,9 @@ def evaluate_scenes(
 
     Args:
         references: the scenes.
-        request: what is asked about each.
-        folder: of the run.
-        executor: who judges.
+        request: the request for each scene.
+        folder: folder of the run.
+        executor: judges the grasps.
         progress: see `evaluate`.
     """
     require_arrow("a run over many scenes")
@@ -265,7 +266,7 @@ def evaluate_scenes(
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, WriterLock(folder / CAMPAIGN_LOCK_FILE):
         remove_unfinished(folder)
-        if is_campaign(folder):  # as it is now that nobody else has it
+        if is_campaign(folder):  # read again, now that no other process can write it
             there = load_campaign(folder).document
             require_same_run(folder, there, document)
             document = replace(
@@ -285,6 +286,7 @@ def evaluate_scenes(
 
 
 def campaign_document(scenes: SceneList, request: RunRequest) -> CampaignDocument:
+    """Document of a new run over many scenes."""
     arm = request.station.document.arm if request.mode != "hand" else None
     document = CampaignDocument(
         **request.document_fields(),
@@ -314,36 +316,37 @@ class _CampaignCall:
         self.folder = self.campaign.path
         self.ledger = SceneStates(self.folder)
         self.judging: dict[str, SceneJudging] = {}
-        # a scene whose grasps are shared out knows its share
-        self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
+        # the shard of the grasps of each scene, not of the scenes
+        self.scene_request = replace(self.request, shard=self.campaign.document.shard_of_grasps)
         self.judged = 0
         asked = self.request.settings.scene_reports
         self.reports = self.campaign.document.has_few_scenes if asked is None else asked
 
     def run(self) -> Campaign:
-        """Judges what is left."""
+        """Judges all unfinished scenes; returns the updated run."""
         left = [name for name in self.campaign.names if not self._is_done(name)]
         campaign = Campaign(self.folder, self.campaign.document)
         outputs = SceneOutputs(campaign, self.request.settings.table, self.reports)
-        with SceneProcesses(Preparer(self.each), outputs, self.executor.workers) as processes:
+        preparer = Preparer(self.scene_request)
+        with SceneProcesses(preparer, outputs, self.executor.workers) as processes:
             if left:
-                self._judge(left, processes)
+                self._judge_scenes(left, processes)
             processes.close()
         return load_campaign(self.folder)
 
-    def _judge(self, left: list[str], processes: SceneProcesses) -> None:
+    def _judge_scenes(self, left: list[str], processes: SceneProcesses) -> None:
         document = self.campaign.document
         self.expected = self.campaign.expected_by_scene
-        there = sum(n for name, n in self.expected.items() if name not in left)
-        found = self._known_outcomes()
-        event = Progress(STARTING_PHASE, there, sum(self.expected.values()), outcomes=found)
+        done = sum(n for name, n in self.expected.items() if name not in left)
+        known = self._known_outcomes()
+        event = Progress(STARTING_PHASE, done, sum(self.expected.values()), outcomes=known)
         self.pace = ProgressMeter(self.reporter.show, event, "judging")
-        session = begin_session(self.executor.workers, found.total())
+        session = begin_session(self.executor.workers, known.total())
         save_campaign(Campaign(self.folder, add_session(document, session)))
         begun = time.monotonic()
         try:
-            jobs = cast(Iterable[Job], self._jobs(left, processes))  # None only where it is polled
-            with closing(self.executor.judge(jobs, self._give_up)) as answers:
+            jobs = cast(Iterable[Job], self._jobs(left, processes))  # also yields None, see `judge`
+            with closing(self.executor.judge(jobs, self._note_failed_job)) as answers:
                 for job, candidate, verdict in answers:
                     self._take_verdict(job, candidate.id, verdict, processes)
         finally:
@@ -355,8 +358,10 @@ class _CampaignCall:
     def _jobs(
         self, left: list[str], processes: SceneProcesses
     ) -> Generator[Job | None, None, None]:
-        """Scenes that are prepared, one after the other; None while workers have others to judge
-        and the next one is not ready."""
+        """Yields the jobs of prepared scenes.
+
+        Yields None while the next scene is not ready and workers have others to judge.
+        """
         processes.prepare(
             PrepareTask(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
         )
@@ -364,7 +369,7 @@ class _CampaignCall:
             if self.judging and not processes.ready():
                 yield None
                 continue
-            prepared = processes.prepared()
+            prepared = processes.next_prepared()
             if prepared is None:
                 return
             job = self._begin_scene(*prepared, processes)
@@ -374,24 +379,24 @@ class _CampaignCall:
     def _begin_scene(
         self, item: PrepareTask, scene: Scene | BaseException | None, processes: SceneProcesses
     ) -> Job | None:
-        """What is to be judged of a scene that is prepared, if anything."""
+        """Records that a scene is prepared; returns its job, or None if no grasps are open."""
         if scene is None:
             self.ledger.note(SceneState(scene=item.name, state="empty"))
-            self._expect(item.name, 0)
+            self._set_expected(item.name, 0)
             return None
         if isinstance(scene, BaseException):
             self._note_failure(item.name, scene)
             return None
-        judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
+        judging = SceneJudging(item.name, item.folder, self.scene_request, self.executor.workers)
         self.ledger.note(judging.state("open"))
         if not judging.left:
-            self._finish(judging, processes)
+            self._finish_scene(judging, processes)
             return None
         judging.begin()
-        self._expect(item.name, judging.mine)
+        self._set_expected(item.name, judging.assigned_count)
         self.judging[item.name] = judging
-        if judging.known:
-            self.pace.skip(judging.known, note=self._progress_note())
+        if judging.known_count:
+            self.pace.skip(judging.known_count, note=self._progress_note())
         request = self.request
         factory = StationJudgeFactory(
             scene, request.station, request.engine, request.mode, request.phases
@@ -405,33 +410,33 @@ class _CampaignCall:
         self.pace.step(outcome=verdict.outcome, note=self._progress_note())
         if judging.is_done:
             del self.judging[job.key]
-            self._finish(judging, processes)
+            self._finish_scene(judging, processes)
         elif judging.is_part_due():
             processes.write_rows(job.key)
 
-    def _give_up(self, failed: JobFailed) -> None:
-        """A scene whose judge cannot be built, for example."""
+    def _note_failed_job(self, failed: JobFailed) -> None:
+        """Records a scene whose job failed, for example as its judge cannot be built."""
         self.judging.pop(failed.job.key).close()
         self._note_failure(failed.job.key, failed.error)
 
-    def _finish(self, judging: SceneJudging, processes: SceneProcesses) -> None:
+    def _finish_scene(self, judging: SceneJudging, processes: SceneProcesses) -> None:
         self.ledger.note(judging.state("done"))
         processes.finish(judging.name)
 
     def _note_failure(self, name: str, error: BaseException) -> None:
         why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"
         self.ledger.note(SceneState(scene=name, state="failed", why=why))
-        self._expect(name, 0)
+        self._set_expected(name, 0)
 
     def _known_outcomes(self) -> Counter[Outcome]:
-        """Grasps that were judged before, by outcome."""
+        """Number of grasps that were judged before, by outcome."""
         if not (self.folder / SCENES_FOLDER).exists():
             return Counter()
         codes, texts = self.campaign.rows(["outcome"]).codes("outcome")
         counts = np.bincount(codes, minlength=len(texts)).tolist()
         return Counter({Outcome(text): n for text, n in zip(texts, counts, strict=True)})
 
-    def _expect(self, name: str, grasps: int) -> None:
+    def _set_expected(self, name: str, grasps: int) -> None:
         self.expected[name] = grasps
         self.pace.expect(sum(self.expected.values()))
 
@@ -440,7 +445,7 @@ class _CampaignCall:
         return f"{done:,} of {len(self.campaign.names):,} scenes"
 
     def _is_done(self, name: str) -> bool:
-        """Whether nothing is left to do about a scene, from a glance at its folder."""
+        """Whether a scene is finished, from its recorded state and its files."""
         state = self.ledger.states.get(name)
         if state is None or state.state != "done" or state.interrupted:
             return False

@@ -1,4 +1,4 @@
-"""Journal and documents of the run that several runs of the same grasps are merged into."""
+"""Merges runs of one scene: chooses verdicts, and writes the merged journal and documents."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ from burg_drake.station import StationDocument
 
 @dataclass(frozen=True, eq=False)
 class JournalChoice:
-    """Which journal has the verdict that is taken for each of N grasps.
+    """Choice of a verdict for each of N grasps from several journals.
 
     Attributes:
-        index: of the verdicts that are taken.
-        source: (N,) which journal each is in.
+        index: index of the chosen verdicts.
+        source: (N,) number of the journal that each is in.
     """
 
     index: JournalIndex
@@ -65,39 +65,38 @@ class JournalChoice:
 def choose_verdicts(
     journals: Sequence[Path], candidates: Candidates, chosen: NDArray[np.int64]
 ) -> JournalChoice:
-    """Chooses a verdict for each grasp: one of a trial goes before one that failed, and that before
-    one whose worker was ended from outside; of equal ones the first is taken.
+    """Chooses a verdict for each grasp: the first of those with the highest `JournalIndex.rank`.
 
     Args:
-        journals: of the runs; in each the last verdict about a grasp counts.
-        candidates: their grasps.
-        chosen: (N,) rows of those that are merged.
+        journals: journals of the runs; in each the last verdict on a grasp counts.
+        candidates: grasps of the runs.
+        chosen: (N,) rows of the grasps that are merged.
 
     Raises:
-        InvalidInputError: two runs have judged a grasp and disagree, other than in time.
+        InvalidInputError: two runs have different verdicts on a grasp, other than in CPU time.
     """
     taken: JournalIndex | None = None
     source = np.zeros(len(chosen), np.int32)
     for number, journal in enumerate(journals):
-        own = index_journal(journal, len(candidates), candidates.rows).select(chosen)
+        index = index_journal(journal, len(candidates), candidates.rows).select(chosen)
         if taken is None:
-            taken = own
+            taken = index
             continue
-        both = (own.rank == JUDGED) & (taken.rank == JUDGED)
+        both = (index.rank == JUDGED) & (taken.rank == JUDGED)
         for known in np.unique(source[both]).tolist():
             rows = np.flatnonzero(both & (source == known))
             ids = [candidates.id[row] for row in chosen[rows].tolist()]
-            there = (journals[known], taken.place[rows].tolist())
-            _require_same_verdicts(ids, there, (journal, own.place[rows].tolist()))
-        better = own.rank > taken.rank
+            first = (journals[known], taken.place[rows].tolist())
+            _require_same_verdicts(ids, first, (journal, index.place[rows].tolist()))
+        better = index.rank > taken.rank
         source[better] = number
-        taken.replace_rows(better, own)
+        taken.replace_rows(better, index)
     assert taken is not None
     return JournalChoice(taken, source)
 
 
 def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[bytes]:
-    """The lines that were chosen, in the order of the grasps."""
+    """Reads the journal lines of the chosen verdicts, in the order of the grasps."""
     with ExitStack() as stack:
         streams = [stack.enter_context(open_regular(j)) if j.exists() else None for j in journals]
         for k in np.flatnonzero(choice.index.judged).tolist():
@@ -110,14 +109,14 @@ def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[by
 def _require_same_verdicts(
     ids: Sequence[str], first: tuple[Path, list[int]], second: tuple[Path, list[int]]
 ) -> None:
-    """Refuses lines of two journals that say other things about a grasp, but for the time.
+    """Refuses two journals with different verdicts on a grasp, other than in CPU time.
 
     Args:
-        ids: (N,) of the grasps.
-        first, second: journals, and where the N lines begin in each.
+        ids: (N,) ids of the grasps.
+        first, second: journal, and the bytes at which its N lines begin.
 
     Raises:
-        InvalidInputError: names the first such grasp, and how it ended.
+        InvalidInputError: two verdicts differ; the message names the first such grasp.
     """
     step = 4096  # Lines that are read at a time.
     for begin in range(0, len(ids), step):
@@ -146,19 +145,19 @@ def _conflict_error(
 def write_merged(
     runs: Sequence[Run], staging: Path, folder: Path, shard: str | None = None
 ) -> JournalChoice:
-    """Writes a merged run, but for what is made from its journal.
+    """Writes journal, grasps and documents of a merged run, but not its table and report.
 
     Args:
-        runs: of one scene.
-        staging: an empty folder to write it to.
-        folder: where it is to be, which references have to fit.
-        shard: that the merged run is; what all of them are if None.
+        runs: runs of one scene.
+        staging: empty folder to write it to.
+        folder: final folder, for which references are made.
+        shard: shard of the merged run; the common shard of the runs if None.
 
     Returns:
-        Which verdicts were taken.
+        The chosen verdicts.
 
     Raises:
-        InvalidInputError: the runs are not of the same, or disagree.
+        InvalidInputError: the runs have different inputs or settings, or disagree about a grasp.
     """
     first = runs[0]
     for run in runs[1:]:
@@ -187,7 +186,7 @@ def require_mergeable(
     """Refuses to merge runs that differ.
 
     Raises:
-        InvalidInputError: names every difference.
+        InvalidInputError: there are differences; the message names them all.
     """
     if differences:
         raise InvalidInputError(
@@ -197,7 +196,7 @@ def require_mergeable(
 
 
 def merge_documents(documents: Sequence[OneRunDocument], shard: str) -> OneRunDocument:
-    """The first document with all sessions, by their beginning, and the first hints of any."""
+    """First document with the sessions of all, sorted by start, and the first hints found."""
     sessions = dict.fromkeys(session for one in documents for session in one.stretches)
     return replace(
         documents[0],
@@ -208,12 +207,12 @@ def merge_documents(documents: Sequence[OneRunDocument], shard: str) -> OneRunDo
 
 
 def copy_documents(run: Run, staging: Path, folder: Path) -> None:
-    """Copies scene and station of a run, with references that hold in another folder."""
+    """Copies scene and station of a run, with references that are valid in another folder."""
     for name in (SCENE_FILE, STATION_FILE):
         shutil.copyfile(run.path / name, staging / name)
     scene = load_document(run.path / SCENE_FILE, SceneDocument)
     if not scene.library.startswith(PACKAGE_URI):
-        with suppress(BurgError):  # it is gone: the run's document knows where it was
+        with suppress(BurgError):  # if the library is gone, run.yaml still records its path
             root = resolve_reference(scene.library, "models", run.path)
             library = portable_reference(root, folder)
             save_scene(replace(scene, library=library), staging / SCENE_FILE)
@@ -226,13 +225,13 @@ def copy_documents(run: Run, staging: Path, folder: Path) -> None:
 
 
 def common_shard(runs: Sequence[Run | Campaign]) -> str:
-    """The shard that all of them are; empty if they are several, or none."""
+    """Common shard of all runs; empty if they differ, or are not shards."""
     shards = {run.document.shard for run in runs}
     return shards.pop() if len(shards) == 1 else ""
 
 
 def missing_shards(runs: Sequence[Run | Campaign]) -> tuple[str, ...]:
-    """Shards of the same number that are not among runs; none if one of them is of everything."""
+    """Shards that are missing among runs; empty if a run has all grasps or the counts differ."""
     shards = [run.document.shard for run in runs]
     if not all(shards):
         return ()

@@ -25,31 +25,31 @@ from burg_drake.evaluation.results_table import Columns, TextValues
 
 
 def member_codes(values: TextValues, members: Sequence[str]) -> NDArray[np.int8]:
-    """Place of each value (N,) among the members.
+    """Index (N,) of each value among the members.
 
     Args:
         values: (N,) texts.
-        members: what they can be, at most 127.
+        members: allowed texts, at most 127.
 
     Raises:
-        InvalidInputError: a value is none of them.
+        InvalidInputError: a value is not a member.
     """
-    places = {str(member): place for place, member in enumerate(members)}
-    if strange := sorted({*values.names} - {*places}):
-        raise InvalidInputError(f"{list_names(strange)}: expected one of {list_names([*places])}")
-    codes: NDArray[np.int8] = np.array([places[n] for n in values.names], dtype=np.int8)
+    index = {str(member): k for k, member in enumerate(members)}
+    if unknown := sorted({*values.names} - {*index}):
+        raise InvalidInputError(f"{list_names(unknown)}: expected one of {list_names([*index])}")
+    codes: NDArray[np.int8] = np.array([index[n] for n in values.names], dtype=np.int8)
     return codes.take(values.codes)
 
 
 @dataclass(frozen=True)
 class ShortLifts:
-    """Grasps with room for a part of the lift.
+    """Grasps with room for only a part of the lift.
 
     Attributes:
-        grasps: how many have room for any of the lifts that were allowed.
-        short: how many of them for less than the whole one.
-        whole: its length [m].
-        median, least: of the short ones [m].
+        grasps: number of grasps with room for at least the shortest allowed lift.
+        short: number of these without room for the whole lift.
+        whole: length of the whole lift [m].
+        median, least: median and smallest length of the shortened lifts [m].
     """
 
     grasps: int
@@ -70,11 +70,11 @@ class ShortLifts:
 
 
 def count_short_lifts(lift_height: Array, whole: float) -> ShortLifts | None:
-    """Counts them.
+    """Counts grasps whose lift was shortened for lack of room.
 
     Args:
-        lift_height: (N,) column of a table, NaN where there is no lift [m].
-        whole: length of the lift that was asked for [m].
+        lift_height: (N,) column of a table, NaN for no lift [m].
+        whole: length of the whole lift [m].
 
     Returns:
         None if no lift is short.
@@ -93,7 +93,7 @@ STAGES_BY_MODE: dict[Mode, tuple[Stage, ...]] = {
 }
 """Stages whose CPU time is known; `reachable` includes the search for motions."""
 MIN_PUSH = 0.001
-"""Metres; objects that the approach moved by more were pushed."""
+"""Metres; an object that the approach moves farther counts as pushed."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,8 @@ class OutcomeCounts:
         outcomes: number of grasps by outcome.
         decided: number of grasps by the stage that decided.
         failed: number of `simulation_failed` by the stage that failed.
-        contested: number of executed grasps whose verdict is contested ...
-        contested_lifts: ... and how many of these are lifted so far.
+        contested: number of executed grasps whose verdict is contested.
+        contested_lifts: number of contested grasps whose outcome is `lifted`.
         settled: number of grasps that another engine has judged again.
     """
 
@@ -122,53 +122,53 @@ class OutcomeCounts:
 
     @property
     def clear(self) -> int:
-        """Grasps that passed the screen of the hand."""
+        """Number of grasps that passed the screen of the hand."""
         return self.judged - self.decided[Stage.CLEAR]
 
     @property
     def reachable(self) -> int:
-        """Those where the arm can be, too; the same as `clear` where it was not asked."""
+        """Number of clear grasps that the arm can reach; `clear` if no arm was checked."""
         return self.clear - self.decided[Stage.REACHABLE]
 
     @property
     def planned(self) -> int:
-        """Those to which the arm can move, too, and from there up; likewise."""
+        """Number of reachable grasps with an arm path; `reachable` if no arm was checked."""
         return self.reachable - self.decided[Stage.PLANNED]
 
     @property
     def executed(self) -> int:
-        """Those whose trial came to an end."""
+        """Number of grasps whose trial came to an end."""
         return self.planned - self.failed[Stage.EXECUTED]
 
     @property
     def held(self) -> int:
-        """Those whose target was held to the end."""
+        """Number of grasps whose target was held to the end."""
         return sum(count for outcome, count in self.outcomes.items() if outcome.held)
 
     @property
     def lifted(self) -> int:
-        """Those that succeeded: held, and nothing else was disturbed."""
+        """Number of successful grasps: held, and nothing else was disturbed."""
         return self.outcomes[Outcome.LIFTED]
 
     @property
     def surely_lifted(self) -> int:
-        """Those that succeeded, and are not contested."""
+        """Number of successful grasps that are not contested."""
         return self.lifted - self.contested_lifts
 
     @property
     def surely_lost(self) -> int:
-        """Executed grasps that did not succeed, and are not contested."""
+        """Number of executed grasps that failed and are not contested."""
         return self.executed - self.lifted - (self.contested - self.contested_lifts)
 
     @property
     def funnel(self) -> dict[str, int]:
-        """Counts from the first stage to success; none is larger than the one before."""
+        """Counts from the first stage to success, in descending order."""
         later = ("clear", "reachable", "planned", "executed", "held", "lifted")
         return {"candidates": self.judged, **{name: getattr(self, name) for name in later}}
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the share of executed grasps that are lifted."""
+        """95 % confidence interval of the share of executed grasps that are lifted."""
         return wilson_interval(self.lifted, self.executed)
 
 
@@ -177,10 +177,10 @@ class StageCost:
     """CPU time of a stage.
 
     Attributes:
-        name: of the stage.
-        grasps: how many it looked at.
-        seconds: CPU time in all [s].
-        median: CPU time of the median grasp [s]; NaN where it is not known.
+        name: name of the stage.
+        grasps: number of grasps that went through it.
+        seconds: total CPU time [s].
+        median: median CPU time per grasp [s]; NaN if unknown.
     """
 
     name: str
@@ -190,19 +190,20 @@ class StageCost:
 
     @property
     def rate(self) -> float:
-        """Grasps a second of CPU time."""
+        """Grasps per second of CPU time."""
         return self.grasps / self.seconds if self.seconds > 0.0 else math.nan
 
 
 @dataclass(frozen=True)
 class Pushes:
-    """What arm or hand moved before the hand closed.
+    """Objects that arm or hand moved before the hand closed.
 
     Attributes:
-        trials: in which it went to the grasp.
-        pushed: those in which it moved any free object, the target too, by more than `MIN_PUSH`.
-        largest: displacement of any of them [m].
-        target_pushed, target_largest: the same of the target alone.
+        trials: number of trials with a simulated approach.
+        pushed: number of these in which any free object, also the target, moved by more than
+            `MIN_PUSH`.
+        largest: largest displacement of an object [m].
+        target_pushed, target_largest: the same for the target alone.
     """
 
     trials: int
@@ -224,20 +225,20 @@ class Pushes:
 
 @dataclass(frozen=True)
 class Summary:
-    """A run in numbers.
+    """Key figures of a run.
 
     Attributes:
-        objects: by object, in the order of the scene.
-        total: all together.
-        costs: by stage, sampling first.
-        mode: what was asked about each grasp.
-        pushes: what the approaches pushed; None where none were simulated.
-        lifts: where there is no room for the whole lift; None if there is wherever there is any.
-        notes: what is missing, and why, one sentence each; see `run_notes`.
-        scenes: by scene, in a run over many, in their order.
+        objects: counts by object, in the order of the scene.
+        total: counts of all grasps.
+        costs: CPU time by stage, sampling first.
+        mode: mode of the run.
+        pushes: objects pushed by the approach; None if no approach was simulated.
+        lifts: grasps without room for the whole lift; None if there are none.
+        notes: notes on missing or failed grasps, one sentence each; see `run_notes`.
+        scenes: counts by scene of a run over many, in their order.
         knows_confidence: whether verdicts have a confidence; those of earlier releases, and of
-            engines with settings of their own, have none.
-        settled_by: the engines that have judged grasps again.
+            engines with custom settings, have none.
+        settled_by: engines that have judged grasps again.
     """
 
     objects: tuple[OutcomeCounts, ...]
@@ -253,8 +254,10 @@ class Summary:
 
     @property
     def steps(self) -> list[str]:
-        """Names of the funnel's counts that the mode has, first to last. With the hand alone, the
-        pregrasp is the part of what can be reached that may be in a collision."""
+        """Names of the funnel's counts that apply to the mode, first to last.
+
+        With the hand alone, `reachable` is included only if hands collide at the pregrasp.
+        """
         absent = {"reachable", "planned"} if self.mode == "hand" else set()
         if self.total.reachable < self.total.clear:
             absent.discard("reachable")
@@ -262,21 +265,21 @@ class Summary:
 
 
 def count_pushes(columns: Columns) -> Pushes | None:
-    """What approaches pushed in the trials of a table; None if none were simulated."""
+    """Counts the pushes of approaches in the trials of a table; None if none were simulated."""
     if "pushed" not in columns:
         return None
-    went = np.isfinite(columns["pushed"])
-    if not went.any():
+    approached = np.isfinite(columns["pushed"])
+    if not approached.any():
         return None
-    anything, instance = columns["pushed"][went], columns["instance"][went]
-    target = np.zeros(len(anything))
+    pushed, instance = columns["pushed"][approached], columns["instance"][approached]
+    target = np.zeros(len(pushed))
     for name in np.unique(instance):
         own = instance == name
-        target[own] = columns[PUSHED_PREFIX + name][went][own]
+        target[own] = columns[PUSHED_PREFIX + name][approached][own]
     return Pushes(
-        trials=len(anything),
-        pushed=int((anything > MIN_PUSH).sum()),
-        largest=float(anything.max()),
+        trials=len(pushed),
+        pushed=int((pushed > MIN_PUSH).sum()),
+        largest=float(pushed.max()),
         target_pushed=int((target > MIN_PUSH).sum()),
         target_largest=float(target.max()),
     )

@@ -1,4 +1,4 @@
-"""The columnar store of a run: parts of its table beside its journals."""
+"""Columnar store of a run: its table in parts (Parquet files), made from its journals."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class StoredResults(Protocol):
     """A run of one scene or of many, whose rows are kept in parts.
 
     Attributes:
-        path: its folder, which has the parts.
-        places: the runs of its scenes, in the order of their rows.
-        instances: names of the free objects of all of them, for which all parts have columns.
+        path: its folder, with the parts.
+        places: runs of its scenes, in the order of their rows.
+        instances: names of the free objects of all scenes; all parts have columns for them.
     """
 
     @property
@@ -61,11 +61,11 @@ class StoredResults(Protocol):
 
 @dataclass(eq=False)
 class PartIndex:
-    """The parts of a folder and what they are made of.
+    """Parts in a folder, and the journal segments that they are made from.
 
     Attributes:
-        parts: those that are whole, by their numbers.
-        damaged: files that are not.
+        parts: intact parts, sorted by number.
+        damaged: damaged files.
     """
 
     parts: list[TablePart] = field(default_factory=list)
@@ -85,12 +85,12 @@ class PartIndex:
         return index
 
     def drop(self, part: TablePart) -> None:
-        """Takes out a part that is damaged."""
+        """Moves a part to the damaged ones."""
         self.parts = [other for other in self.parts if other is not part]
         self.damaged.append(part.path)
 
     def segments(self) -> dict[str, list[tuple[JournalSegment, TablePart, int]]]:
-        """By scene: segments, the parts that they are in, and where their rows begin there."""
+        """Segments by scene, each with its part and the first of its rows in the part."""
         found: dict[str, list[tuple[JournalSegment, TablePart, int]]] = defaultdict(list)
         for part in self.parts:
             row = 0
@@ -101,11 +101,11 @@ class PartIndex:
 
 
 def read_rows(run: StoredResults, names: Sequence[str] | None) -> StoredRows:
-    """Columns of the judged grasps of a run.
+    """Reads columns of the judged grasps of a run.
 
     Args:
         run: the run.
-        names: of the columns; all if None. What a scene does not have is null.
+        names: names of the columns; all if None. Cells of columns that a scene lacks are null.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
@@ -120,7 +120,7 @@ def read_rows(run: StoredResults, names: Sequence[str] | None) -> StoredRows:
 
 
 def segment_table(run: Run, begin: int, end: int) -> Any:
-    """The rows of a stretch of a run's journal, in the order of the candidates."""
+    """Arrow table of a range of bytes of a run's journal, in the order of the candidates."""
     verdicts = read_journal(run.path / JOURNAL_FILE, begin, end)
     rows = run.candidates.rows(list(verdicts))
     order = np.argsort(rows)
@@ -136,7 +136,7 @@ def segment_table(run: Run, begin: int, end: int) -> Any:
 
 
 def merge_tables(tables: Sequence[Any]) -> Any:
-    """Tables of one run as one: of each candidate the last row, in the order of the candidates."""
+    """Merges tables of one run: the last row of each candidate, in the candidates' order."""
     arrow = require_arrow("a columnar table")
     table = arrow.concat_tables(tables, promote_options="permissive")
     candidate = table.column(CANDIDATE_COLUMN).to_numpy()
@@ -148,17 +148,17 @@ def merge_tables(tables: Sequence[Any]) -> Any:
 def _read_tables(
     index: PartIndex, run: StoredResults, names: Sequence[str] | None
 ) -> StoredRows | TablePart:
-    """The rows, or a part that is damaged."""
+    """Reads the rows of a run; returns the part if one turns out to be damaged."""
     arrow = require_arrow("reading the results of many grasps")
     segments = index.segments()
     pieces: list[list[tuple[TablePart, int, int]]] = []
     tails: list[Any | None] = []
     for place in run.places:
-        mine = segments.get(place.scene, [])
-        found = valid_segments([segment for segment, _, _ in mine], place.journal)
-        where = {segment: (part, row, segment.rows) for segment, part, row in mine}
-        pieces.append([where[segment] for segment in found])
-        tail = _read_tail(place, found[-1].end if found else 0)
+        located = segments.get(place.scene, [])
+        valid = valid_segments([segment for segment, _, _ in located], place.journal)
+        where = {segment: (part, row, segment.rows) for segment, part, row in located}
+        pieces.append([where[segment] for segment in valid])
+        tail = _read_tail(place, valid[-1].end if valid else 0)
         tails.append(None if tail is None else with_instances(tail, run.instances))
     used = {part.path: part for piece in pieces for part, _, _ in piece}
     if names is None:
@@ -180,19 +180,19 @@ def _read_tables(
             slices.append(select_columns(tail, wanted))
         runs.append(merge_tables(slices) if len(slices) > 1 else slices[0] if slices else None)
     counts = np.array([_row_count(run) for run in runs], dtype=np.int64)
-    there = [table for table in _concatenate_runs(runs, tables) if table.num_rows]
+    filled = [table for table in _concatenate_runs(runs, tables) if table.num_rows]
     empty = arrow.table({name: empty_column(name, 0) for name in wanted})
-    whole = arrow.concat_tables(there, promote_options="permissive") if there else empty
+    whole = arrow.concat_tables(filled, promote_options="permissive") if filled else empty
     return StoredRows(whole.select(list(names)), counts)
 
 
 def _row_count(run: Any) -> int:
-    """Rows of a run: of a piece of a part, of a table, or none."""
+    """Number of rows of a run, given as a slice of a part, as a table, or as None."""
     return 0 if run is None else run[2] if isinstance(run, tuple) else run.num_rows
 
 
 def _concatenate_runs(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterator[Any]:
-    """Tables of runs one after the other; pieces that follow on each other in a part as one."""
+    """Yields the tables of runs in order; adjacent slices of a part are joined to one."""
     k = 0
     while k < len(runs):
         if isinstance(runs[k], tuple):
@@ -210,13 +210,13 @@ def _concatenate_runs(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterat
 
 
 def _read_tail(place: StoredRun, begin: int) -> Any | None:
-    """Rows of what a journal has beyond its parts; None if it has nothing."""
+    """Reads the rows of a journal that are not in parts yet; None if there are none."""
     end = whole_lines(place.journal)
     return segment_table(load_run(place.folder), begin, end) if end > begin else None
 
 
 def _all_names(parts: Sequence[TablePart], tails: Sequence[Any | None]) -> list[str]:
-    """Names of all columns, in the order of the tables."""
+    """Names of the columns of all tables, in their order."""
     names: dict[str, None] = {}
     for part in parts:
         names |= dict.fromkeys(column_names(part))
@@ -227,7 +227,7 @@ def _all_names(parts: Sequence[TablePart], tails: Sequence[Any | None]) -> list[
 
 
 def with_instances(table: Any, instances: Sequence[str]) -> Any:
-    """A table with columns for all instances, each kind where its first one is."""
+    """Table with columns for all instances, inserted at the first column of each kind."""
     if not instances:
         return table
     arrow = require_arrow("a columnar table")
@@ -243,16 +243,16 @@ def with_instances(table: Any, instances: Sequence[str]) -> Any:
 
 
 PART_ROWS = 50_000
-"""Rows of a part: few enough to be made in a second or two, enough that parts are few."""
+"""Rows per part: few enough to write one in a second or two, enough to keep parts few."""
 BATCH_BYTES = 8 << 20
-"""Bytes of a journal whose rows are made at a time; a row has some hundred."""
+"""Bytes of a journal that are converted at a time; a row takes a few hundred."""
 
 
 class PartWriter:
-    """Writes parts; one process at a time, the one that has the run."""
+    """Writes the parts of a run; only for the process that holds the run's lock."""
 
     def __init__(self, run: StoredResults) -> None:
-        """Looks at what is there, and removes what is damaged or does not hold any more."""
+        """Reads the existing parts; removes damaged parts and outdated segments."""
         self._folder = run.path / PARTS_FOLDER
         self._instances = list(run.instances)
         self._pending: list[tuple[Any, JournalSegment]] = []
@@ -266,37 +266,37 @@ class PartWriter:
         self._number = max((part.number for part in self._index.parts), default=0)
         self._remove_stale_segments()
 
-    def scenes_behind(self) -> list[str]:
-        """Scenes whose journals have more than the parts."""
+    def scenes_with_new_rows(self) -> list[str]:
+        """Scenes whose journals have lines that are not in parts yet."""
         return [
             scene
             for scene, place in self._places.items()
             if place.journal.exists() and place.journal.stat().st_size > self._ends.get(scene, 0)
         ]
 
-    def catch_up(self, scenes: Iterable[str] | None = None) -> None:
-        """Takes what the journals have beyond the parts; of all scenes if None."""
-        for scene in self.scenes_behind() if scenes is None else scenes:
+    def add_new_rows(self, scenes: Iterable[str] | None = None) -> None:
+        """Adds the new rows of the journals of scenes; of all scenes if None."""
+        for scene in self.scenes_with_new_rows() if scenes is None else scenes:
             self.add_rows(scene)
 
     def add_rows(self, scene: str, run: Run | None = None) -> None:
-        """Takes what the journal of a scene has beyond the parts."""
+        """Adds the new rows of the journal of a scene; full parts are written."""
         place = self._places[scene]
         begin, end = self._ends.get(scene, 0), whole_lines(place.journal)
         if end > begin and run is None:
             run = load_run(place.folder)
         while begin < end:
             assert run is not None
-            upto = min(end, line_end(place.journal, min(end, begin + BATCH_BYTES)))
-            table = segment_table(run, begin, upto)
-            segment = segment_of(scene, place.journal, begin, upto, table.num_rows)
+            batch_end = min(end, line_end(place.journal, min(end, begin + BATCH_BYTES)))
+            table = segment_table(run, begin, batch_end)
+            segment = segment_of(scene, place.journal, begin, batch_end, table.num_rows)
             self._pending.append((with_instances(table, self._instances), segment))
-            self._ends[scene] = begin = upto
+            self._ends[scene] = begin = batch_end
             if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
                 self.flush()
 
     def flush(self) -> None:
-        """Writes what was taken."""
+        """Writes the pending rows to a part."""
         if self._pending:
             arrow = require_arrow("a columnar table")
             tables, segments = zip(*self._pending, strict=True)
@@ -305,27 +305,27 @@ class PartWriter:
             self._pending.clear()
 
     def close(self) -> None:
-        """Writes what is left; of grasps that were judged again only the last row stays."""
+        """Writes pending rows; keeps only the last row of grasps that were judged again."""
         self.flush()
-        again = self._judged_again()
+        again = self._scenes_judged_again()
         if again:
             parts = self._index.parts
-            self._remove({s for part in parts for s in part.segments if s.scene in again})
+            self._rewrite_without({s for part in parts for s in part.segments if s.scene in again})
             for scene in again:
                 self._ends.pop(scene)
-            self.catch_up(again)
+            self.add_new_rows(again)
             self.flush()
 
-    def _judged_again(self) -> list[str]:
-        """Scenes with several rows about a grasp."""
+    def _scenes_judged_again(self) -> list[str]:
+        """Scenes with several rows of one grasp."""
         segments = self._index.segments()
         several = [scene for scene, found in segments.items() if len(found) > 1]
-        twice = []
+        repeated = []
         for scene in several:
-            places = [_candidates(part)[row : row + s.rows] for s, part, row in segments[scene]]
-            if len(np.unique(np.concatenate(places))) < sum(map(len, places)):
-                twice.append(scene)
-        return twice
+            rows = [_candidates(part)[row : row + s.rows] for s, part, row in segments[scene]]
+            if len(np.unique(np.concatenate(rows))) < sum(map(len, rows)):
+                repeated.append(scene)
+        return repeated
 
     def _write(self, table: Any, segments: Sequence[JournalSegment]) -> None:
         self._number += 1
@@ -339,11 +339,13 @@ class PartWriter:
             held = valid_segments(segments, place.journal) if place else []
             stale |= {*segments} - {*held}
             self._ends[scene] = held[-1].end if held else 0
-        self._remove(stale)
+        self._rewrite_without(stale)
 
-    def _remove(self, stale: set[JournalSegment]) -> None:
-        """Writes parts without some of their segments again, and without those that a newer part
-        has, too, because the process was killed at this."""
+    def _rewrite_without(self, stale: set[JournalSegment]) -> None:
+        """Rewrites parts without their stale segments.
+
+        Also drops segments that a newer part has, left by a process that was killed while doing so.
+        """
         seen: set[JournalSegment] = set()
         for part in sorted(self._index.parts, key=lambda part: -part.number):
             kept = [s for s in part.segments if s not in stale and s not in seen]
@@ -371,39 +373,38 @@ def _candidates(part: TablePart) -> Any:
 
 
 def keep_parts(run: Run) -> None:
-    """Keeps parts of a run of one scene, if it is so large that they matter and pyarrow is
-    installed."""
+    """Writes parts of a run of one scene if it is large enough and pyarrow is installed."""
     if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
         return
     update_parts(run)
 
 
 def update_parts(run: StoredResults) -> None:
-    """Writes what the journals of a run have beyond the parts; see `PartWriter`."""
+    """Writes the new rows of the journals of a run to parts; see `PartWriter`."""
     writer = PartWriter(run)
-    writer.catch_up()
+    writer.add_new_rows()
     writer.close()
 
 
 JOURNAL_LINE_PATTERN = re.compile(
     rb'^\{"id":"((?:[^"\\]|\\.)*)","outcome":"([a-z_]+)"[^\n]*\}\n', re.MULTILINE
 )
-"""A line of a journal, as `encode_verdict` writes it."""
+"""Matches a line of a journal, as `encode_verdict` writes it."""
 PREVIOUS_OUTCOME_PATTERN = re.compile(rb'"outcome_before":"([a-z_]+)"')
-"""In a line of a grasp judged again: the outcome that no longer counts."""
+"""Matches, in the line of a grasp judged again, the outcome that no longer counts."""
 FAILED_OUTCOME = Outcome.SIMULATION_FAILED.value.encode()
 
 
 @dataclass
 class JournalTail:
-    """What is known of a journal, up to a byte.
+    """Counts of a journal, updated as it grows.
 
     Attributes:
         path: the journal.
-        place: the byte.
-        lines: grasps that have a verdict.
+        place: number of bytes that were counted.
+        lines: number of grasps with a verdict.
         outcomes: number of grasps by outcome.
-        failed: ids of those that could not be simulated, which may be judged again.
+        failed: ids of grasps that could not be simulated, which may be judged again.
         modified: date of the last verdict, seconds since 1970; 0 if there is none.
     """
 
@@ -415,12 +416,12 @@ class JournalTail:
     modified: float = 0.0
 
     def refresh(self) -> None:
-        """Reads what has come since."""
+        """Counts the lines that were appended since the last call."""
         try:
             status = os.stat(self.path)
         except OSError:
             return
-        if status.st_size < self.place:  # it was begun again
+        if status.st_size < self.place:  # the journal was started anew
             self.place, self.lines, self.outcomes, self.failed = 0, 0, Counter(), set()
         self.modified = status.st_mtime if status.st_size else 0.0
         if status.st_size == self.place:
@@ -454,7 +455,7 @@ class JournalTail:
 
 
 def read_journal_tails(run: StoredResults) -> dict[str, JournalTail]:
-    """What the parts of a run know of its journals, by scene."""
+    """Counts of the journals of a run by scene, as far as its parts have their rows."""
     tails = {place.scene: JournalTail(place.journal) for place in run.places}
     if not (run.path / PARTS_FOLDER).is_dir() or find_spec("pyarrow") is None:
         return tails
@@ -475,7 +476,7 @@ def read_journal_tails(run: StoredResults) -> dict[str, JournalTail]:
 
 
 def _count_rows(tail: JournalTail, slices: Sequence[Any]) -> None:
-    """Counts rows of Arrow tables."""
+    """Sets the counts of a journal from rows of Arrow tables."""
     table = merge_tables(slices) if len(slices) > 1 else slices[0]
     column = table.column("outcome")
     counts = {item["values"]: item["counts"] for item in column.value_counts().to_pylist()}

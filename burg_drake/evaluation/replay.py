@@ -1,4 +1,4 @@
-"""Executes a recorded trial again and compares: outcome and margins have to be the same bits."""
+"""Executes a recorded trial again, and compares outcome and margins bit for bit."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ FilePlace = tuple[str, Callable[[], Document]]
 
 @dataclass(frozen=True)
 class TrialInputs:
-    """What a trial was executed on.
+    """Scene and station on which a trial is replayed.
 
     Attributes:
-        scene, station: as found.
-        notes: how they differ from what was asked for, for people; empty if they do not.
+        scene, station: the scene and station that were found.
+        notes: differences from the recorded ones, in words; empty if there are none.
     """
 
     scene: Scene
@@ -61,18 +61,18 @@ def find_inputs(
     station: str | None = None,
     force: bool = False,
 ) -> TrialInputs:
-    """Loads the documents with the contents that the row asks for.
+    """Loads the scene and station of a recorded trial, identified by their content hashes.
 
     Args:
-        origin: what the row tells.
-        where: names the row in messages.
-        folder: of the table; if it is the folder of the row's run, its copies come first.
-        scene, station: where to look instead.
-        force: takes documents of another content, too.
+        origin: origin that the row records.
+        where: name of the row, for messages.
+        folder: folder of the table; if it is the row's run, its copies come first.
+        scene, station: files to use instead.
+        force: also accept documents with another content.
 
     Raises:
-        InvalidInputError: a document is not where it was, or has another content; the message
-            says which one is needed.
+        InvalidInputError: a document is missing, or has another content; the message says which
+            one is needed.
     """
     scenes: list[FilePlace[Scene]]
     stations: list[FilePlace[Station]]
@@ -99,7 +99,7 @@ def find_inputs(
 
 
 def _existing_file(reference: str, kind: str) -> Path:
-    """The file of a document; what else there is would not help here."""
+    """Path of a document; if it does not exist, the error lists no alternatives."""
     try:
         return resolve_reference(reference, kind)
     except UnknownNameError as error:
@@ -109,8 +109,12 @@ def _existing_file(reference: str, kind: str) -> Path:
 def _find_document(
     kind: str, origin: TrialOrigin, places: Sequence[FilePlace[Any]], force: bool
 ) -> Any:
-    """The first document that fits, and a note if it is taken by force though it does not fit; a
-    text that says what is needed if there is none."""
+    """Finds the document with the recorded content.
+
+    Returns:
+        The document, and a note if `force` accepted one with another content; or, if none was
+        found, a text that says which one is needed.
+    """
     content = origin.scene_content if kind == "scene" else origin.station_content
     problems: list[str] = []
     other = None
@@ -137,11 +141,11 @@ def _find_document(
 
 @dataclass(frozen=True)
 class Difference:
-    """A result that is not as recorded.
+    """A result that differs from the recorded one.
 
     Attributes:
-        name: of the result.
-        recorded, now: its values; NaN or an empty text where there is none.
+        name: name of the result.
+        recorded, now: its values; NaN or an empty text if there is none.
     """
 
     name: str
@@ -150,7 +154,7 @@ class Difference:
 
     @property
     def rounding(self) -> bool:
-        """Whether a table that was written again by another program explains it."""
+        """Whether rounding by a program that rewrote the table explains the difference."""
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
         return math.isclose(
@@ -164,15 +168,15 @@ class Difference:
 def rerun(
     scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
 ) -> tuple[Verdict, Plan | None]:
-    """Judges a grasp again as its row tells.
+    """Judges a grasp again with the recorded settings.
 
-    The arm is asked only where it has decided, or has executed the grasp.
+    The arm is checked only if it decided the outcome, or executed the grasp.
 
     Returns:
-        The verdict, and the plan that the arm executed, if it did.
+        The verdict, and the plan if the arm executed one.
 
     Raises:
-        InvalidInputError: settings that this release lacks, or an unsound scene.
+        InvalidInputError: this release lacks a setting, or the scene is invalid.
     """
     judge = build_judge(
         scene,
@@ -186,21 +190,21 @@ def rerun(
 
 
 def decisive_mode(trial: RecordedTrial, origin: TrialOrigin) -> Mode:
-    """The least that has to be asked to come to the same verdict."""
+    """Cheapest mode that leads to the same verdict."""
     stage = None if trial.verdict is None else trial.verdict.stage
     by_hand = stage is Stage.CLEAR or (origin.mode == "reach" and stage is Stage.EXECUTED)
     return "hand" if by_hand else origin.mode
 
 
 def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
-    """Results that are not the same bits; times and arm configurations are not compared."""
+    """Results that differ in any bit, except times and arm configurations."""
     there, here = _compared_results(recorded), _compared_results(now)
-    if "clearance" not in there:  # of a release that did not measure it
+    if "clearance" not in there:  # recorded by a release that did not measure it
         here.pop("clearance", None)
     name = MarginNames.lift_height
-    if math.isnan(recorded.margins.get(name, math.nan)):  # likewise, or of a trial alone
+    if math.isnan(recorded.margins.get(name, math.nan)):  # likewise, or a trial without stages
         here.pop(name, None)
-    if math.isnan(recorded.margins.get("others_turned", math.nan)):  # it watched centres of mass
+    if math.isnan(recorded.margins.get("others_turned", math.nan)):  # centres of mass were measured
         there, here = (_drop_object_motions(found) for found in (there, here))
     # The arm may have passed a grasp on, and is not asked again.
     for name in MarginNames.arm_screen:
@@ -216,7 +220,7 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
 
 
 def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
-    """What `differences` found as lines for people; `as recorded` if every bit is the same."""
+    """Differences as lines of text; `as recorded` if there are none."""
     if not found:
         return ["as recorded"]
     if all(difference.rounding for difference in found):
@@ -234,19 +238,19 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
 
 
 def _compared_results(verdict: Verdict) -> dict[str, float | str]:
-    """What is compared, by the name that people read: texts first."""
+    """Results that are compared, by displayed name, texts first."""
     found = {
         name: value
         for one in RecordedFields.verdict
         for name, value in one.compared(getattr(verdict, one.name)).items()
     }
-    if found.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
+    if found.get("end_time") == 0.0:  # a trial that never began may lack an end time
         del found["end_time"]
     return dict(sorted(found.items(), key=lambda one: not isinstance(one[1], str)))
 
 
 def _drop_object_motions(found: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Results without what tells how far objects were moved and turned."""
+    """Results without the distances and angles by which objects were moved and turned."""
     names = {"others_moved", "others_turned", "toppled", "pushed"}
     of_each = tuple(prefix.replace("_", " ") for prefix in INSTANCE_PREFIXES.values())
     return {k: v for k, v in found.items() if k not in names and not k.startswith(of_each)}
@@ -257,7 +261,7 @@ def _float_bits(value: float | str) -> str:
 
 
 def arm_figures(verdict: Verdict) -> list[str]:
-    """What the screen of the arm has measured, as lines for people; none if it was not asked."""
+    """Margins of the arm's screen as lines of text; empty if the arm was not checked."""
     others = {*MarginNames.trial, MarginNames.lift_height}
     of_arm = [name for name in MarginNames.all if name not in others]
     figures = format_column_values(verdict.margins, of_arm)
@@ -265,7 +269,7 @@ def arm_figures(verdict: Verdict) -> list[str]:
 
 
 def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
-    """Where the hand goes, as lines for people; none if that is the usual way."""
+    """Motion of the hand as lines of text; empty for the default motion."""
     motion = origin.settings().motion
     if motion is None or motion == GraspMotion():
         return []
@@ -275,7 +279,7 @@ def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
 
 
 def as_result(verdict: Verdict) -> TrialResult:
-    """A verdict as a trial returns it."""
+    """Converts a verdict to the result of a trial."""
     trial_margins = Margins().of_trial().keys()
     margins = Margins(**{k: v for k, v in verdict.margins.items() if k in trial_margins})
     return TrialResult(outcome=verdict.outcome, **verdict.of_trial() | {"margins": margins})

@@ -1,4 +1,4 @@
-"""The results of a run in little memory: what repeats, or does not exist, takes no room."""
+"""Results of a run in little memory: repeated and missing values take no room."""
 
 from __future__ import annotations
 
@@ -22,20 +22,18 @@ from burg_drake.evaluation.results_table import (
 from burg_drake.evaluation.trial_origin import TrialOrigin
 
 CHUNK_ROWS = 1 << 14
-"""Rows whose columns are made at a time."""
+"""Rows per chunk of a table in memory."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResultRows(Mapping[str, ColumnValues]):
-    """The table of judged grasps, N rows in the order of the candidates.
-
-    A column is made when it is asked for.
+    """Table of judged grasps, N rows in the order of the candidates. Columns are made on access.
 
     Attributes:
         candidates: all grasps of the run.
-        places: (N,) which of them are judged.
-        chunks: by column, what is kept of `CHUNK_ROWS` rows each; nothing of columns that follow
-            from the candidates.
+        places: (N,) rows of the judged candidates.
+        chunks: packed values of `CHUNK_ROWS` rows each, by column; None for columns that are
+            computed from the candidates.
     """
 
     candidates: Candidates
@@ -57,8 +55,8 @@ class ResultRows(Mapping[str, ColumnValues]):
 
         Args:
             candidates: the grasps.
-            places: (N,) which of them are judged, ascending.
-            verdicts_of: reads the verdicts about some of them.
+            places: (N,) rows of the judged candidates, ascending.
+            verdicts_of: reads the verdicts on the candidates in given rows.
             origin, instances, joints: see `make_columns`.
         """
         chunks = []
@@ -95,38 +93,38 @@ class ResultRows(Mapping[str, ColumnValues]):
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def codes(self, name: str) -> TextValues:
-        """A column of texts as numbers, and the texts that they stand for, as they come up."""
+        """A column of texts as codes, and the texts in order of occurrence."""
         places: dict[str, int] = {}
         found = []
         for k, chunk in enumerate(self.chunks):
             kept = chunk[name]
             values = kept if isinstance(kept, TextValues) else code_texts(self._cells(k, name))
-            into = [places.setdefault(text, len(places)) for text in values.names]
-            found.append(np.array(into, dtype=np.min_scalar_type(len(places)))[values.codes])
+            merged = [places.setdefault(text, len(places)) for text in values.names]
+            found.append(np.array(merged, dtype=np.min_scalar_type(len(places)))[values.codes])
         return TextValues(np.concatenate(found), tuple(places))
 
     @property
     def run(self) -> NDArray[np.int64]:
-        """(N,) zeros, as all rows are of one run; see `StoredRows.run`."""
+        """(N,) zeros, as all rows belong to one run; see `StoredRows.run`."""
         return np.broadcast_to(np.int64(0), self.count)
 
     def is_text(self, name: str) -> bool:
-        """Whether a column has texts."""
+        """Whether a column holds texts."""
         kept = self.chunks[0][name]
         return isinstance(kept, TextValues) or self._cells(0, name).dtype.kind == "U"
 
     def column(self, name: str) -> ColumnValues:
-        """A column; NaN, or empty texts, if there is none."""
+        """A column; NaN or empty texts if the table lacks it."""
         if name in self:
             return self[name]
         return np.full(self.count, "" if name in TEXT_COLUMNS else np.nan)
 
     def columns(self, names: Sequence[str], rows: NDArray[np.int64] | None = None) -> Columns:
-        """Several columns, of all rows or of some (M,)."""
+        """Several columns, of all rows or of the given ones (M,)."""
         return {name: self[name] if rows is None else self.cells(name, rows) for name in names}
 
     def cells(self, name: str, rows: NDArray[np.int64]) -> ColumnValues:
-        """A column of some rows (M,)."""
+        """A column at the given rows (M,)."""
         rows = np.asarray(rows, dtype=np.int64)
         if self.chunks[0][name] is None:
             return grasp_columns(self.candidates, self.places[rows], [name])[name]
@@ -140,7 +138,7 @@ class ResultRows(Mapping[str, ColumnValues]):
         return found[np.argsort(order, kind="stable")]
 
     def parts(self) -> Iterator[Columns]:
-        """The table in pieces, one after the other."""
+        """Yields the table chunk by chunk."""
         for k, chunk in enumerate(self.chunks):
             yield {name: self._cells(k, name) for name in chunk}
 
@@ -157,7 +155,7 @@ class ResultRows(Mapping[str, ColumnValues]):
 
 
 def _pack(values: ColumnValues) -> ColumnValues | TextValues:
-    """What is kept of a column: one number for all rows if there are no others, texts once each."""
+    """Packs a column: a constant is stored once, and so is each distinct text."""
     if not len(values) or values.strides == (0,):
         return values
     if values.dtype.kind == "U":

@@ -1,4 +1,4 @@
-"""The results table: its columns, one row per trial; trials read from rows; the ranking of rows."""
+"""The results table, one row per trial: makes its columns, reads trials back, and ranks rows."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ from burg_drake.evaluation.trial_origin import ORIGIN_TEXT, TrialOrigin, engine_
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordedTrial:
-    """A grasp and what became of it.
+    """A grasp and its verdict.
 
     Attributes:
-        id: of the grasp, or of this trial of it.
+        id: id of the grasp, or of this trial of it.
         instance: name of the target in the scene.
         object: its name in the library.
         X_OG: (4, 4) grasp in the target's frame.
-        width: distance of the contacts [m].
-        score: the sampler's.
-        friction: coefficient in place of the library's.
-        mass: in place of the library's [kg].
-        verdict: what became of it; None if nobody has judged it.
+        width: distance between the contacts [m].
+        score: score of the sampler.
+        friction: friction coefficient of the target; None for the library's.
+        mass: mass of the target [kg]; None for the library's.
+        verdict: the verdict; None if the grasp is not judged.
     """
 
     id: str
@@ -63,29 +63,28 @@ class RecordedTrial:
 
     @property
     def lift(self) -> float | None:
-        """Length of the lift that was executed, in place of the motion's [m]; None if it is not
-        known, which it is not of older releases."""
+        """Length of the executed lift [m]; None if unknown, as in rows of older releases."""
         margins = {} if self.verdict is None else self.verdict.margins
         height = margins.get(MarginNames.lift_height, math.nan)
         return None if math.isnan(height) else height
 
     @property
     def candidate(self) -> Candidate:
-        """What a judge has to know."""
+        """The grasp as a judge takes it."""
         grasp = (self.id, self.instance, self.X_OG, self.friction, self.mass)
         return Candidate(*grasp, width=self.width, lift=self.lift)
 
 
 def pose_text(X_OG: Array) -> str:
-    """The upper three rows of a pose (4, 4), one after the other; every bit is kept."""
+    """Upper three rows of a pose (4, 4) as 12 numbers; every bit is kept."""
     return " ".join(map(repr, X_OG[:3].ravel().tolist()))
 
 
 def pose_from_text(text: str, where: str) -> Array:
-    """The pose (4, 4) that `pose_text` wrote.
+    """Reads a pose (4, 4) that `pose_text` wrote.
 
     Raises:
-        InvalidInputError: the text is something else.
+        InvalidInputError: the text is not such a pose.
     """
     numbers = []
     expected = "it must be the 12 numbers of the upper three rows of the pose"
@@ -103,11 +102,11 @@ def pose_from_text(text: str, where: str) -> Array:
 
 
 def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
-    """The trial that a row tells.
+    """Reads the trial in a row of a table.
 
     Args:
         row: cells by column.
-        where: names the row in messages.
+        where: name of the row, for messages.
 
     Raises:
         InvalidInputError: columns are missing, or a cell cannot be read.
@@ -143,7 +142,7 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
 
 
 def _read_property(row: Mapping[str, Any], name: str, where: str) -> float | None:
-    """A property of the object in place of the library's; None if the row tells none."""
+    """Reads a property that replaces the library's; None if the cell is empty or missing."""
     max_value = 1e6  # Of mass [kg] and friction; larger ones cannot be simulated.
     value = _read_number(row, name, where)
     if math.isnan(value):
@@ -156,7 +155,7 @@ def _read_property(row: Mapping[str, Any], name: str, where: str) -> float | Non
 
 
 def _read_number(row: Mapping[str, Any], name: str, where: str) -> float:
-    """NaN where there is none."""
+    """Reads a number; NaN if the column is missing."""
     value = row.get(name, math.nan)
     try:
         return float(value)
@@ -175,14 +174,14 @@ TEXT_COLUMNS = (
     *ORIGIN_TEXT,
     "X_OG",
 )
-"""Columns of texts."""
+"""Names of the columns that hold texts."""
 
 
 class TextValues(NamedTuple):
-    """A column of texts, each different one once.
+    """A column of texts that stores each distinct text once.
 
     Attributes:
-        codes: (N,) which text each row has.
+        codes: (N,) index of each row's text in `names`.
         names: the texts.
     """
 
@@ -190,16 +189,16 @@ class TextValues(NamedTuple):
     names: Sequence[str]
 
     def equal(self, text: str) -> NDArray[np.bool_]:
-        """(N,) which rows have a text."""
+        """(N,) whether each row has this text."""
         equal: NDArray[np.bool_] = self.codes == self.place(text)
         return equal
 
     def place(self, text: str) -> int:
-        """Which of the texts it is; -1 if it is none of them."""
+        """Index of a text; -1 if it does not occur."""
         return self.names.index(text) if text in self.names else -1
 
     def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
-        """The most frequent texts of some rows, with how often; empty ones do not count."""
+        """The `most` most frequent texts of some rows, with counts; without empty texts."""
         counts = np.bincount(self.codes[rows], minlength=len(self.names))
         ranked = np.argsort(-counts, kind="stable").tolist()
         found = [(self.names[k], int(counts[k])) for k in ranked if counts[k] and self.names[k]]
@@ -207,7 +206,7 @@ class TextValues(NamedTuple):
 
 
 def code_texts(values: NDArray[np.str_]) -> TextValues:
-    """A column (N,) of few different texts."""
+    """Encodes a column (N,) of few distinct texts."""
     texts = values.tolist()
     places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
     codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
@@ -223,13 +222,13 @@ def make_columns(
     instances: Sequence[str],
     joints: int = 0,
 ) -> Columns:
-    """The table of judged grasps.
+    """Makes the table of judged grasps.
 
     Args:
         candidates: all grasps of a run.
-        rows: (N,) the judged ones among them.
-        verdicts: what became of each.
-        origin: what made them.
+        rows: (N,) rows of the judged candidates.
+        verdicts: verdict of each judged candidate.
+        origin: scene, station, engine and settings of the trials.
         instances: names of the scene's free objects.
         joints: number of the arm's joints, 0 without an arm.
     """
@@ -240,7 +239,7 @@ def make_columns(
 def grasp_columns(
     candidates: Candidates, rows: NDArray[np.int64], names: Sequence[str] | None = None
 ) -> Columns:
-    """Those columns of `make_columns` that do not depend on verdicts; all, or some by name."""
+    """Columns of `make_columns` that do not depend on verdicts; only those named, if given."""
     grasps = candidates.grasps
     X_OG = grasps.X_OG[rows]
     poses: Columns = {}
@@ -251,7 +250,7 @@ def grasp_columns(
 
     def input_column(name: str) -> ColumnValues:
         values = grasps.columns[name][rows]
-        # truth values become 1 and 0, which every reader takes for numbers
+        # booleans become 1 and 0, which every reader takes for numbers
         return values.astype(np.int64) if values.dtype.kind == "b" else values
 
     known: dict[str, Callable[[], ColumnValues]] = {
@@ -274,7 +273,7 @@ def trial_columns(
     instances: Sequence[str],
     joints: int = 0,
 ) -> Columns:
-    """The table of judged trials; see `make_columns`. Their ids need not differ."""
+    """Makes the table of judged trials; see `make_columns`. Their ids need not be unique."""
     rows = [t.verdict for t in trials if t.verdict is not None]
     if len(rows) != len(trials):
         raise ValueError("a table is made of judged trials only")
@@ -296,12 +295,12 @@ def arrange_columns(
     instances: Sequence[str],
     joints: int = 0,
 ) -> dict[str, T | ColumnValues]:
-    """The columns of a table in their order.
+    """Arranges the columns of a table in their order.
 
     Args:
-        grasps: what is known of N grasps, by the names of `grasp_columns`, and friction and mass
-            where they are not the library's.
-        verdicts: what became of each.
+        grasps: columns of N grasps by the names of `grasp_columns`, and `friction` and `mass` if
+            they are not the library's.
+        verdicts: verdict of each grasp.
         origin, instances, joints: see `make_columns`.
     """
     approach = bool(origin.trial.get("approach"))
@@ -312,14 +311,14 @@ def arrange_columns(
     labels = {name: engine_label(one.engine) for name, one in origins.items()}
     cells = {name: one.cells() for name, one in origins.items()}
     texts = {name: {judge: cells[judge][name] for judge in cells} for name in ORIGIN_TEXT}
-    own = ("friction", "mass")
-    named = ("id", "instance", "object", "X_OG", *own)
+    properties = ("friction", "mass")
+    named = ("id", "instance", "object", "X_OG", *properties)
     return {
         **{name: grasps[name] for name in named[:3]},
         **columns_of_verdicts(verdicts, "decided", shape),
         **{n: v for n, v in grasps.items() if n not in named and not n.startswith(INPUT_PREFIX)},
         **columns_of_verdicts(verdicts, "measured", shape),
-        **{name: grasps.get(name, np.full(count, np.nan)) for name in own},
+        **{name: grasps.get(name, np.full(count, np.nan)) for name in properties},
         **columns_of_verdicts(verdicts, "posture", shape),
         "seed": np.full(count, origin.seed, dtype=np.int64),
         "engine": _judge_column(labels, judges),
@@ -332,14 +331,14 @@ def arrange_columns(
 
 
 def pose_columns(X_OG: Array) -> Columns:
-    """Columns of positions and quaternions of poses (N, 4, 4)."""
+    """Position and quaternion columns of poses (N, 4, 4)."""
     wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if len(X_OG) else np.empty((0, 4))
     columns = {name: X_OG[:, k, 3] for k, name in enumerate("xyz")}
     return columns | {name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))}
 
 
 def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: TableShape) -> Columns:
-    """The columns of verdicts that lie in a part of a row, see `TableShape`."""
+    """Columns of verdicts that belong to one part of a row, see `TableShape`."""
     columns: Columns = {}
     for one in fields_of_part(shape, part):
         values = [getattr(verdict, one.name) for verdict in rows]
@@ -359,12 +358,12 @@ def _text_column(values: Sequence[str]) -> NDArray[Any]:
 
 
 def _constant_column(text: str, count: int) -> NDArray[Any]:
-    """A column of one text, at the price of one cell."""
+    """A column with the same text in all rows, which takes the memory of one cell."""
     return np.broadcast_to(np.array(text, dtype=np.str_), count)
 
 
 def _judge_column(texts: Mapping[str, str], judges: Sequence[str]) -> NDArray[Any]:
-    """A column of the texts of judges, which are mostly the same."""
+    """A column with the text of each row's judge."""
     if len(set(texts.values())) == 1:
         return _constant_column(texts[""], len(judges))
     return _text_column([texts[judge] for judge in judges])
@@ -375,11 +374,11 @@ def _number_column(values: Sequence[float | None]) -> NDArray[Any]:
 
 
 def contested_rows(confidence: Array, settled: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Rows (N,) whose verdict is contested, as `Verdict.contested` has it.
+    """Mask (N,) of rows whose verdict is contested, by the rule of `Verdict.contested`.
 
     Args:
-        confidence: (N,) NaN where there is none.
-        settled: (N,) whether another engine has judged again.
+        confidence: (N,) confidence of each verdict; NaN if there is none.
+        settled: (N,) whether another engine has judged the grasp again.
     """
     contested: NDArray[np.bool_] = (confidence < CONTESTED_CONFIDENCE) & ~settled  # not NaN
     return contested
@@ -396,22 +395,21 @@ def best_rows(
     each: bool = False,
     only: Iterable[str] | None = None,
 ) -> list[int]:
-    """Indices of the lifted grasps that can be trusted most, best first; fewer if fewer were
-    lifted.
+    """Indices of the most robust lifted grasps, best first; fewer if fewer were lifted.
 
-    Ranked by the clearance of the open hand, in steps of 0.5 mm: of all margins of a row it tells
-    best how often a grasp is lifted when pose, mass and friction are not quite what they are taken
-    for, as four of five failures then are an open hand that hits something. Its rank correlation
-    with that share is 0.6, that of all others from -0.35 to 0.25 (`benchmarks/best.py`). Of equal
-    ones that which disturbed less, by slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm,
-    rounded to 0.1 mm and 0.1 deg; then by the larger contact patch of the weaker pad, rounded to
-    1 mm2, by the higher score of the sampler, and by id. Contested ones, and those whose clearance
-    is not known, rank last; other margins that are not known count as 0.
+    Ranked by the clearance of the open hand, in steps of 0.5 mm. Of all margins it best predicts
+    how often a grasp is lifted if pose, mass and friction are perturbed, as in four of five
+    failures the open hand then hits something: its rank correlation with that share is 0.6, those
+    of the other margins are between -0.35 and 0.25 (`benchmarks/best.py`). Ties go to the smaller
+    disturbance, slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm, rounded to 0.1 mm and
+    0.1 deg; then to the larger contact patch of the weaker pad, rounded to 1 mm2, to the higher
+    score of the sampler, and by id. Contested grasps, and those without a known clearance, rank
+    last; other unknown margins count as 0.
 
     Args:
         columns: a table of results.
-        count: how many.
-        each: so many of each object, in the order of the table, in place of all together.
+        count: number of grasps.
+        each: return `count` grasps of each object, in the order of the table.
         only: names of objects or instances; others are left out.
 
     Raises:
@@ -445,7 +443,7 @@ def best_rows(
 
 
 def _clearance_steps(columns: Mapping[str, ColumnValues], rows: NDArray[np.int64]) -> Array:
-    """Clearances of some rows in whole steps; those of contested ones are behind all others."""
+    """Clearances of some rows in steps; lowered for contested grasps, so that they rank last."""
     max_steps = 1e6  # More steps of clearance than any grasp has.
     clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
     steps = np.nan_to_num(np.floor(clearance / RANKING_CLEARANCE_STEP + 1e-9), nan=-max_steps)
@@ -459,8 +457,10 @@ def _clearance_steps(columns: Mapping[str, ColumnValues], rows: NDArray[np.int64
 def _clearest_rows(
     columns: Mapping[str, ColumnValues], rows: NDArray[np.int64], count: int, *, each: bool
 ) -> NDArray[np.int64]:
-    """Those of some rows that can be among the first `count`, of each object or of all together:
-    the others have less room than so many. To rank a million takes seconds."""
+    """Rows whose clearance may rank them among the first `count`, overall or of each object.
+
+    Saves the full ranking of the others, which takes seconds for a million rows.
+    """
     groups = [rows]
     if each:
         objects = columns["object"][rows]
@@ -474,7 +474,7 @@ def _clearest_rows(
 
 
 def _round_to_step(values: Array, step: float) -> Array:
-    """The nearest multiples of a step; 0 for NaN."""
+    """Rounds to the nearest multiple of a step; NaN becomes 0."""
     return np.nan_to_num(np.round(values / step) * step)
 
 
@@ -482,7 +482,7 @@ def rows_of(columns: Columns, id: str, where: str) -> list[int]:
     """Indices of the rows of one grasp, at least one.
 
     Raises:
-        UnknownNameError: there is none; the message names the nearest.
+        UnknownNameError: there is none; the message names the most similar ids.
     """
     ids = columns["id"].tolist()
     rows = [row for row, known in enumerate(ids) if known == id]
@@ -494,7 +494,7 @@ def rows_of(columns: Columns, id: str, where: str) -> list[int]:
 def unknown_grasp_error(
     id: str, ids: Sequence[str], where: str, hint: str = ""
 ) -> UnknownNameError:
-    """The error about an id that nothing goes by; names those that are much like it, if any."""
+    """Error about an unknown id; names similar ids, if any."""
     min_similarity = 0.7  # Two grasps of one object have 0.43 on average.
     close = difflib.get_close_matches(id, ids, n=3, cutoff=min_similarity)
     known = f"did you mean {' or '.join(close)}?" if close else f"known: {list_names(ids)}"

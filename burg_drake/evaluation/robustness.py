@@ -1,4 +1,4 @@
-"""Robustness of lifted grasps of a run: tests in worker processes, and the table of results."""
+"""Robustness tests of the lifted grasps of a run in worker processes, and their table."""
 
 from __future__ import annotations
 
@@ -60,16 +60,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class GraspRobustness:
-    """What is known of one grasp.
+    """Results of the robustness tests of one grasp.
 
     Attributes:
-        id, instance, object: which grasp on what.
-        friction: the target's coefficient.
-        tug, shake: what the grip bears; None if not asked or failed.
-        friction_min: smallest coefficient that lifts; None if not asked or failed.
-        success: of the perturbed repeats; None if not asked.
-        failed: tests that could not be simulated, each once; perturbed repeats are counted by
-            outcome instead.
+        id, instance, object: the grasp and its target.
+        friction: friction coefficient of the target.
+        tug, shake: loads that the grip withstands; None if not tested or failed.
+        friction_min: smallest friction coefficient that lifts; None if not tested or failed.
+        success: success rate of the perturbed repeats; None if not tested.
+        failed: names of failed tests; failed perturbed repeats are counted in `success`.
     """
 
     id: str
@@ -86,7 +85,7 @@ class GraspRobustness:
 def gather_answers(
     id: str, instance: str, object: str, friction: float, answers: Sequence[ProbeAnswer]
 ) -> GraspRobustness:
-    """What the answers to the probes of a grasp say of it; see `GraspRobustness`."""
+    """Combines the answers to the probes of a grasp."""
     by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
     repeats = Counter(a.outcome for a in answers if a.test == "noise" and a.outcome is not None)
     tug, shake, friction_min = (by_test.get(test) for test in ("tug", "shake", "friction"))
@@ -109,8 +108,8 @@ def robustness_columns(
     engines: Sequence[Engine],
     run: str,
 ) -> Columns:
-    """The table; `engines` are those of the grasps."""
-    # Outcomes of a grasp that no arm is asked about.
+    """Table of the results; `engines` has the engine of each grasp."""
+    # Outcomes that are possible without an arm.
     hand_outcomes = tuple(o for o in Outcome if o.stage in (Stage.CLEAR, Stage.EXECUTED))
     columns = {n: _text_column(getattr(g, n) for g in grasps) for n in ("id", "instance", "object")}
     tugs = [None if g.tug is None else g.tug.accelerations for g in grasps]
@@ -150,7 +149,7 @@ def _settings_text(settings: RobustnessSettings) -> str:
 
 
 def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSettings) -> TextTable:
-    """The table for a terminal: weakest directions, friction and success."""
+    """Table for a terminal: weakest directions, friction and success."""
     table = TextTable("Robustness of lifted grasps", caption=_table_caption(settings)).texts(
         "grasp"
     )
@@ -177,7 +176,7 @@ def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSetti
 def _weakest_text(forces: HoldForces | None, largest: float) -> str:
     if forces is None:
         return "-"
-    name, value = forces.weakest
+    name, value = forces.lowest_limit
     return f"> {largest:g} g   " if math.isinf(value) else f"{format_number(value, 1)} g {name:>2}"
 
 
@@ -215,28 +214,28 @@ def _text_column(values: Iterable[str]) -> np.ndarray:
 
 
 def _integer_column(values: Sequence[T | None], count: Callable[[T], int]) -> np.ndarray:
-    """A whole number of each value, None where there is none."""
+    """Column of `count` of each value; None for a missing value."""
     return np.array([None if v is None else count(v) for v in values], dtype=object)
 
 
 def _float_column(values: Sequence[T | None], number: Callable[[T], float]) -> np.ndarray:
-    """A number of each value, NaN where there is none."""
+    """Column of `number` of each value; NaN for a missing value."""
     return np.array([math.nan if v is None else number(v) for v in values], dtype=float)
 
 
 TEST_COSTS = {"tug": 40.0, "shake": 50.0, "friction": 30.0, "noise": 2.0}
-"""CPU time of tests in units of the grasp's own trial, measured."""
+"""Measured CPU time of each test, as a multiple of the grasp's own trial."""
 
 
 @dataclass(frozen=True, eq=False)
 class Robustness:
-    """What was found.
+    """Results of `assess_robustness`.
 
     Attributes:
-        grasps: answers by grasp, in the order asked.
-        table_path: the table.
+        grasps: results by grasp, in the order of the request.
+        table_path: path of the table.
         failures: ids of probes that could not be simulated, with the reason.
-        interrupted: how many of them failed because their worker process was ended from outside.
+        interrupted: number of these whose worker process was killed from outside.
     """
 
     grasps: tuple[GraspRobustness, ...]
@@ -247,11 +246,11 @@ class Robustness:
 
 @dataclass(frozen=True, eq=False)
 class _EngineTests:
-    """How grasps are tested whose verdicts one engine has given.
+    """Tests of the grasps that one engine has judged.
 
     Attributes:
-        factory: how.
-        context: what decides about the answers beside the settings of the tests.
+        factory: builds the judge of the probes.
+        context: inputs and versions, besides the settings of the tests, that determine answers.
     """
 
     factory: ProbeJudgeFactory
@@ -259,18 +258,18 @@ class _EngineTests:
 
     @classmethod
     def of(cls, factory: ProbeJudgeFactory) -> _EngineTests:
-        """With the versions that are installed."""
+        """Tests with the context of the installed versions."""
         packages = factory.engine.packages
         versions = software_versions({**JUDGING_PACKAGES, **packages})
         names = ("burg_drake", "drake", *packages)
         return cls(factory, (*factory.content(), *(versions[name] for name in names)))
 
     def probes(self, grasp: Candidate) -> Iterator[RobustnessProbe]:
-        """All questions about a grasp."""
+        """Probes of a grasp."""
         return make_probes(grasp, self.factory.scene, self.factory.settings, self.context)
 
-    def gathered(self, grasp: Candidate, answers: Mapping[str, Verdict]) -> GraspRobustness:
-        """What answers, by the id of the probe, say of a grasp."""
+    def combine_answers(self, grasp: Candidate, answers: Mapping[str, Verdict]) -> GraspRobustness:
+        """Combines the answers on a grasp, given by the id of the probe."""
         scene, settings = self.factory.scene, self.factory.settings
         return gather_answers(
             grasp.id,
@@ -293,28 +292,28 @@ def assess_robustness(
     retry_failed: bool = False,
     progress: bool | Listener = True,
 ) -> Robustness:
-    """Tests how robust lifted grasps of a run are, and writes a table.
+    """Tests the robustness of lifted grasps of a run, and writes a table.
 
-    Each is tested by the engine whose verdict it has: the run's, or the one that judged it again.
+    Each is tested with the engine that judged it: the run's, or the one that judged it again.
 
     Args:
         run: the run, or its folder.
-        grasps: ids; the best ones of the run if None.
-        best: how many of those of each object at most; see `best_rows`.
-        only: names of the objects or instances whose best grasps are meant; all if None.
-        settings: what is asked; all tests with their defaults if None.
-        out: the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The journal
-            is the file of the same name with the suffix .jsonl.
-        workers: number of processes; as many as there are processors if None.
-        retry_failed: ask all again that an earlier call could not simulate, not only that whose
-            worker process was ended from outside.
+        grasps: ids of grasps; the best of the run if None.
+        best: without `grasps`, number of best grasps of each object to test; see `best_rows`.
+        only: without `grasps`, names of the objects or instances to test; all if None.
+        settings: settings of the tests; all tests with their defaults if None.
+        out: path of the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The
+            journal is the file of the same name with the suffix .jsonl.
+        workers: number of processes; one per processor if None.
+        retry_failed: retry all probes that an earlier call could not simulate, not only those whose
+            worker process was killed from outside.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Raises:
         UnknownNameError: a grasp, object or instance is not in the run.
-        InvalidInputError: a grasp was not lifted, the engine that judged it cannot have a test, the
-            scene has changed since the run, or the table cannot be written.
-        MissingDependencyError: that engine is not installed.
+        InvalidInputError: a grasp was not lifted, the engine that judged it does not support a
+            test, the scene has changed since the run, or the table cannot be written.
+        MissingDependencyError: the engine is not installed.
         SimulationError: the simulation of the scene cannot be built.
     """
     run = run if isinstance(run, Run) else load_run(run)
@@ -328,11 +327,11 @@ def assess_robustness(
     probes = [probe for grasp in chosen for probe in tests[grasp.id].probes(grasp)]
     ensure_writable_folder(table.parent)
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
-        there = read_journal(journal_path)
-        known = {id for id, v in there.items() if not v.is_open(retry_failed=retry_failed)}
+        before = read_journal(journal_path)
+        known = {id for id, v in before.items() if not v.is_open(retry_failed=retry_failed)}
         _answer_probes(run, probes, tests, journal, known, workers, reporter)
     answers = read_journal(journal_path)
-    found = tuple(tests[grasp.id].gathered(grasp, answers) for grasp in chosen)
+    found = tuple(tests[grasp.id].combine_answers(grasp, answers) for grasp in chosen)
     engines = [tests[grasp.id].factory.engine for grasp in chosen]
     write_table(table, robustness_columns(found, settings, engines, run.document.hash))
     asked = {probe.id: answers[probe.id] for probe in probes}
@@ -343,7 +342,7 @@ def assess_robustness(
 
 
 def _require_other_files(run: Run, *written: Path) -> None:
-    """Refuses to write over the run's own results or journal."""
+    """Refuses to overwrite the run's own results or journal."""
     own = [path.resolve() for path in (run.table_path, run.path / JOURNAL_FILE)]
     for path in written:
         if path.resolve() in own:
@@ -374,7 +373,7 @@ def _choose_grasps(
 def _tests_by_grasp(
     run: Run, chosen: Iterable[Candidate], settings: RobustnessSettings
 ) -> dict[str, _EngineTests]:
-    """How grasps are tested, by id."""
+    """Tests of each grasp, by id."""
     scene, station, origin = run.scene(), run.station(), origin_of(run.document)
     trial = origin.settings(f"{run.path / RUN_FILE}: trial")
     loaded = [test for test in settings.tests if test in LOADED_TESTS]
@@ -406,7 +405,7 @@ def _answer_probes(
     workers: int | None,
     reporter: Reporter,
 ) -> None:
-    """Asks what is not known yet; each answer is on disk at once."""
+    """Answers the probes that are not known yet, and writes each answer to the journal at once."""
     todo = [probe for probe in probes if probe.id not in known]
     work = sum(TEST_COSTS[probe.test] for probe in todo)
     expected = work * _trial_time(run, probes) / (workers or default_workers())
@@ -415,16 +414,16 @@ def _answer_probes(
     )
     pace = ProgressMeter(reporter.show, begin, "testing", work=work)
     for engine in dict.fromkeys(tests.values()):
-        own = {probe.id: probe.test for probe in todo if tests[probe.grasp] is engine}
-        trials = [probe.trial for probe in todo if probe.id in own]
-        factory = replace(engine.factory, tests=own)
-        with closing(judge_all(trials, factory, workers=workers)) as answered:
-            for asked, verdict in answered:
-                journal.append(asked.id, verdict)
-                pace.step(work=TEST_COSTS[own[asked.id]])
+        test_by_id = {probe.id: probe.test for probe in todo if tests[probe.grasp] is engine}
+        trials = [probe.trial for probe in todo if probe.id in test_by_id]
+        factory = replace(engine.factory, tests=test_by_id)
+        with closing(judge_all(trials, factory, workers=workers)) as answers:
+            for trial, verdict in answers:
+                journal.append(trial.id, verdict)
+                pace.step(work=TEST_COSTS[test_by_id[trial.id]])
 
 
 def _trial_time(run: Run, probes: Sequence[RobustnessProbe]) -> float:
-    """CPU time that the run's own trials of the grasps took on average [s]."""
+    """Mean CPU time of the run's own trials of the grasps [s]."""
     took = [run.verdicts[id].cpu.get(Stage.EXECUTED, 0.0) for id in {p.grasp for p in probes}]
     return sum(took) / max(len(took), 1)

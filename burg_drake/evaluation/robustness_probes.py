@@ -1,4 +1,4 @@
-"""Single tests of a grasp's robustness: how they are made, answered by workers, and recorded."""
+"""Probes, which are single robustness tests of a grasp: made, answered by workers, and recorded."""
 
 from __future__ import annotations
 
@@ -33,17 +33,16 @@ if TYPE_CHECKING:
 class ProbeAnswer:
     """The answer to a probe.
 
-    Workers return it and journals keep it in the form of a verdict, with its numbers in the place
-    of the margins. A verdict needs an outcome: `lifted` stands for an answer in numbers, as only
-    what was lifted has one. A journal has no infinity, which stands for a limit beyond all that is
-    tried.
+    Workers return it and journals store it as a verdict, with its numbers as the margins. A verdict
+    needs an outcome: `lifted` stands for an answer in numbers, which only a lifted grasp has.
+    Infinity means a limit beyond the tested range; journals, which have no infinity, store null.
 
     Attributes:
         test: one of `ROBUSTNESS_TESTS`.
-        outcome: how the trial ended. Of `noise` that is the answer; the other tests have one only
-            where the object was not held, and None where their answer is in numbers.
-        forces: what the grip bears, of `tug` and `shake`.
-        friction: smallest coefficient that lifts, of `friction`.
+        outcome: outcome of the trial. It is the answer of `noise`; for the other tests it says why
+            the object was not held, and is None if they have an answer in numbers.
+        forces: loads that the grip withstands, for `tug` and `shake`.
+        friction: smallest friction coefficient that lifts, for `friction`.
     """
 
     test: str
@@ -57,7 +56,7 @@ class ProbeAnswer:
         return self.test != "noise" and self.outcome is not None
 
     def decision(self) -> Decision:
-        """The form in which workers return it."""
+        """Decision as which a worker returns the answer."""
         numbers: dict[str, float] = {}
         if self.forces is not None:
             numbers = {**self.forces.accelerations, "weight": self.forces.weight}
@@ -67,7 +66,7 @@ class ProbeAnswer:
 
     @classmethod
     def from_verdict(cls, test: str, verdict: Verdict) -> ProbeAnswer:
-        """The answer that a journal has kept; of a trial, only how it ended."""
+        """Reads an answer from its verdict in a journal; a trial only gives its outcome."""
         if test == "noise" or verdict.outcome is not Outcome.LIFTED:
             return cls(test, verdict.outcome)
         numbers = {name: _nan_to_infinity(value) for name, value in verdict.margins.items()}
@@ -83,12 +82,12 @@ def _nan_to_infinity(value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class RobustnessProbe:
-    """One question.
+    """A single robustness test of a grasp.
 
     Attributes:
         test: one of `ROBUSTNESS_TESTS`.
         grasp: id of the grasp.
-        trial: the grasp as it is tried, perturbed or not; its id tells test, repeat and settings.
+        trial: the grasp to try, perturbed or not; its id has test, repeat and settings.
     """
 
     test: str
@@ -97,20 +96,20 @@ class RobustnessProbe:
 
     @property
     def id(self) -> str:
-        """Under which the answer is kept."""
+        """Id of the answer in the journal."""
         return self.trial.id
 
 
 def make_probes(
     grasp: Candidate, scene: Scene, settings: RobustnessSettings, context: Sequence[object]
 ) -> Iterator[RobustnessProbe]:
-    """All questions about a grasp that the settings ask.
+    """Yields the probes of a grasp.
 
     Args:
         grasp: the grasp.
-        scene: gives mass and friction of the target.
-        settings: what is asked.
-        context: JSON values of what decides about the answers beside the settings.
+        scene: has mass and friction of the target.
+        settings: settings of the tests.
+        context: JSON values that determine the answers, besides the settings.
     """
     for test in settings.tests:
         key = _settings_key(test, settings, context)
@@ -147,16 +146,16 @@ def known_answers(
     settings: RobustnessSettings,
     context: Sequence[object],
 ) -> list[ProbeAnswer]:
-    """Answers about a grasp, whichever call asked for them: all tests, and all repeats.
+    """Known answers on a grasp from any call, for all tests and repeats.
 
     Args:
-        grasp: its id.
-        answers: by the id of the probe, as a journal has them.
-        settings: only answers found with these count; tests and number of repeats do not matter.
+        grasp: id of the grasp.
+        answers: verdicts in the journal, by the id of the probe.
+        settings: only answers with these settings count, whatever their tests and repeats.
         context: as for `make_probes`.
 
     Returns:
-        In the order of tests; of the repeats those up to the first that is missing.
+        Answers in the order of `ROBUSTNESS_TESTS`; repeats up to the first missing one.
     """
     found: list[ProbeAnswer] = []
     for test in ROBUSTNESS_TESTS:
@@ -169,7 +168,7 @@ def known_answers(
 
 
 def _settings_key(test: str, settings: RobustnessSettings, context: Sequence[object]) -> str:
-    digits = 8  # Of the hash of the settings: answers found with other settings do not count.
+    digits = 8  # Of the hash; answers with other settings have another key.
     return content_hash(test, settings.content(test), list(context))[:digits]
 
 
@@ -178,7 +177,7 @@ def _probe_id(grasp: str, test: str, key: str, repeat: int | None = None) -> str
 
 
 class ProbeJudge:
-    """Answers probes. There are no screens: what starts in a collision is an answer, too."""
+    """Answers probes. It has no screens, as a start in collision is an answer, too."""
 
     screens: tuple[Screen, ...] = ()
 
@@ -197,24 +196,24 @@ class ProbeJudge:
         return trial_decision(found) if isinstance(found, TrialResult) else found.decision()
 
     def answer(self, test: str, grasp: Candidate) -> ProbeAnswer | TrialResult:
-        """The answer to a probe.
+        """Answers a probe.
 
         Args:
             test: one of `ROBUSTNESS_TESTS`.
-            grasp: as it is tried.
+            grasp: the grasp to try.
 
         Returns:
-            Of `noise`, and where the object is not held, the trial.
+            The answer; the result of the trial for `noise`, and if the object is not held.
         """
         trial, settings, lift = self._trial, self._settings, grasp.lift
-        what = (grasp.instance, grasp.X_OG)
+        pose = (grasp.instance, grasp.X_OG)
         if test == "noise":
-            return trial.run(*what, friction=grasp.friction, mass=grasp.mass, lift=lift)
+            return trial.run(*pose, friction=grasp.friction, mass=grasp.mass, lift=lift)
         if test == "friction":
-            limit = friction_limit(trial, *what, lift=lift, settings=settings.friction)
+            limit = friction_limit(trial, *pose, lift=lift, settings=settings.friction)
             return ProbeAnswer(test, friction=limit)
         assert isinstance(trial, HandTrial)  # else `assess_robustness` refuses the test
-        grip = take_grip(trial, *what, lift=lift)
+        grip = take_grip(trial, *pose, lift=lift)
         if isinstance(grip, TrialResult):
             return grip
         return ProbeAnswer(test, forces=(tug if test == "tug" else shake)(grip, settings.loads))
@@ -222,13 +221,13 @@ class ProbeJudge:
 
 @dataclass(frozen=True)
 class ProbeJudgeFactory:
-    """What a worker process needs to build its `ProbeJudge`.
+    """Builds the `ProbeJudge` of a worker process.
 
     Attributes:
-        scene, station: where the grasps are.
-        engine, trial: how their trials are executed.
-        settings: what is asked.
-        tests: of each probe by its id.
+        scene, station: scene and station of the grasps.
+        engine, trial: engine and settings of the trials.
+        settings: settings of the tests.
+        tests: test of each probe, by its id.
     """
 
     scene: Scene
@@ -242,5 +241,5 @@ class ProbeJudgeFactory:
         return ProbeJudge(self)
 
     def content(self) -> list[object]:
-        """What decides about answers beside the settings of the tests."""
+        """JSON values that determine answers, besides the settings of the tests."""
         return [self.scene.content, self.station.content, asdict(self.engine), asdict(self.trial)]

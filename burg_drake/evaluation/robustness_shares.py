@@ -1,4 +1,4 @@
-"""Success probabilities: shares of perturbed repeats that lift, from tables of robustness."""
+"""Success probabilities (shares of perturbed repeats that lift) from robustness tables."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from burg_drake.core import InvalidInputError, list_names
 from burg_drake.evaluation.table_file import read_table
 
 ROBUSTNESS_FILES = ("robustness.csv", "robustness.parquet")
-"""Tables of `burg-drake robustness` in the folder of a run."""
+"""Names of the tables of `burg-drake robustness` in the folder of a run."""
 
 
 def find_robustness_table(folder: Path) -> Path | None:
-    """The table of robustness in the folder of a run, if it is there."""
+    """Path of the robustness table in the folder of a run; None if there is none."""
     places = (folder / name for name in ROBUSTNESS_FILES)
     return next((place for place in places if place.is_file()), None)
 
@@ -23,13 +23,13 @@ def find_robustness_table(folder: Path) -> Path | None:
 def lifted_shares(
     path: Path, runs: Collection[str], ids: Collection[str] | None
 ) -> dict[tuple[str, str], float]:
-    """Shares by the hash of the run and the id of the grasp.
+    """Reads the success shares of a robustness table, by run hash and grasp id.
 
     Args:
-        path: the table.
-        runs: hashes of the runs that it may be of.
-        ids: of all grasps, if it is one run. A table that does not say of which run it is, as those
-            of earlier versions, is then taken for its own if it has no other grasp.
+        path: path of the table.
+        runs: hashes of the accepted runs.
+        ids: ids of all grasps, if there is one run. A table without a column `run`, as earlier
+            releases wrote it, is then accepted if all its grasps are among them.
 
     Raises:
         InvalidInputError: the table cannot be read, has no such shares, or is of another run.
@@ -57,7 +57,7 @@ def lifted_shares(
 def _require_one_run(
     path: Path, runs: Collection[str], ids: Collection[str] | None, grasps: Collection[str]
 ) -> str:
-    """The run of a table that does not say it."""
+    """Hash of the run of a table that has no column `run`."""
     if ids is None or len(runs) != 1:
         raise InvalidInputError(
             f"{path} has no column run, but ids of grasps repeat between scenes; make it"

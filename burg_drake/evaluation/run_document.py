@@ -17,7 +17,7 @@ from burg_drake.scene import Scene
 from burg_drake.station import Engine, Station
 
 HASH_DIGITS = 12
-"""Digits of a hash that people get to see."""
+"""Digits of a displayed hash."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +110,7 @@ class WorkSession:
     seconds: float | None = None
 
     def finish(self, judged: int, begun: float) -> WorkSession:
-        """The session once it has judged so many grasps since `begun`, by `time.monotonic`."""
+        """The finished session, given its judged grasps and its start by `time.monotonic`."""
         return replace(self, judged=judged, seconds=round(time.monotonic() - begun, 3))
 
 
@@ -184,9 +184,11 @@ class SceneEntry:
     def __post_init__(self) -> None:
         require_name(self.name, "name")
 
-    def chosen(self, only: Collection[str]) -> dict[str, str]:
-        """Objects by name of the free instances whose own name or whose object's is among `only`;
-        of all if that is empty."""
+    def selected_instances(self, only: Collection[str]) -> dict[str, str]:
+        """Objects by free instance, for instances named in `only` by instance or object name.
+
+        All free instances if `only` is empty.
+        """
         pairs = self.instances.items()
         return {name: o for name, o in pairs if not only or name in only or o in only}
 
@@ -236,8 +238,8 @@ class CampaignDocument:
     hints: tuple[str, ...] = ()
 
     @property
-    def mine(self) -> tuple[SceneEntry, ...]:
-        """Scenes that are judged here, wholly or in part."""
+    def assigned_scenes(self) -> tuple[SceneEntry, ...]:
+        """Scenes assigned to this run (or shard), wholly or in part."""
         shard = as_shard(self.shard or None)
         if shard is None or not shard.divides_scenes(len(self.scenes)):
             return self.scenes
@@ -245,14 +247,14 @@ class CampaignDocument:
 
     @property
     def shard_of_grasps(self) -> Shard | None:
-        """The share of the grasps of each scene that is judged here; None is all."""
+        """Shard of the grasps of each scene that this run judges; None for all grasps."""
         shard = as_shard(self.shard or None)
         divides = shard is not None and shard.divides_scenes(len(self.scenes))
         return None if divides else shard
 
     @property
     def has_few_scenes(self) -> bool:
-        """Whether each scene has a report of its own, if nothing else is asked for."""
+        """Whether each scene gets a report by default."""
         return len(self.scenes) <= MAX_SCENES
 
     @property
@@ -271,13 +273,13 @@ def add_session(document: OneRunDocument, session: WorkSession) -> OneRunDocumen
 
 
 def begin_session(workers: int, before: int) -> WorkSession:
-    """A session that begins now, when so many grasps have a verdict."""
+    """A session that begins now; `before` is the number of grasps that have a verdict."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
     return WorkSession(started=started, workers=workers, before=before)
 
 
 def origin_of(document: RunDocument) -> TrialOrigin:
-    """What every row of the run's table tells of it."""
+    """Origin that every row of the run's table records."""
     return TrialOrigin(
         scene=document.scene.path,
         scene_content=document.scene.content[:HASH_DIGITS],
@@ -293,20 +295,22 @@ def origin_of(document: RunDocument) -> TrialOrigin:
 
 
 def input_reference(path: Path, kind: str) -> str:
-    """How a user refers to a document: the bare name of a built-in one, else the path."""
+    """Reference to a document: the name of a built-in one, else the path."""
     builtin = path.resolve().parent == (data_root() / kind).resolve()
     return path.stem if builtin else str(path)
 
 
 def input_of(document: Scene | Station, kind: str) -> Input:
-    """The record of a scene or station; `kind` is the folder of the built-in ones."""
+    """Record of a scene or station; `kind` is the folder of the built-in ones."""
     path = input_reference(document.path, kind)
     return Input(name=document.name, path=path, content=document.content)
 
 
 def settings_numbers(settings: object) -> dict[str, float]:
-    """The numbers of a settings dataclass by name; those of a tuple are counted from 1, those of
-    settings within settings have their own names, and what is None or infinite is left out."""
+    """Numbers of a settings dataclass by name, without values that are None or infinite.
+
+    Items of a tuple get the suffixes `_1`, `_2` and so on; nested settings add their own names.
+    """
     found: dict[str, float] = {}
     for name, value in vars(settings).items():
         if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""The folder of a run: its files, and how to read it back."""
+"""Folder of a run: its files, and the run read from it."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ REPORT_FILE = "report.html"
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run whose rows are wanted.
+    """Folder of a run whose rows are stored in parts.
 
     Attributes:
-        scene: name by which parts know it; empty where the run is alone.
-        folder: of the run.
+        scene: name of its scene in the parts; empty for a run of one scene.
+        folder: folder of the run.
     """
 
     scene: str
@@ -71,7 +71,7 @@ class StoredRun:
 
     @property
     def journal(self) -> Path:
-        """Its journal."""
+        """Path of its journal."""
         return self.folder / JOURNAL_FILE
 
 
@@ -105,55 +105,57 @@ class Run:
 
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:
-        """What the journal holds, by grasp id; a verdict takes a kilobyte of memory."""
+        """Verdicts in the journal by grasp id; each takes a kilobyte of memory."""
         return read_journal(self.path / JOURNAL_FILE)
 
     @cached_property
     def index(self) -> JournalIndex:
-        """What the journal holds about each of the candidates, in short."""
+        """Index of the journal, with the outcome of each candidate."""
         candidates = self.candidates
         return index_journal(self.path / JOURNAL_FILE, len(candidates), candidates.rows)
 
     @property
-    def mine(self) -> Sequence[str]:
-        """Ids of the grasps that are judged here: all, or those of a shard."""
+    def assigned_ids(self) -> Sequence[str]:
+        """Ids of the grasps assigned to this run: all, or those of its shard."""
         return select_share(self.candidates.id, self.document.shard)
 
     @property
-    def is_mine(self) -> NDArray[np.bool_]:
-        """(N,) which candidates are judged here."""
+    def is_assigned(self) -> NDArray[np.bool_]:
+        """(N,) whether each candidate is assigned to this run."""
         mine = np.zeros(len(self.candidates), dtype=bool)
         mine[share_rows(len(mine), self.document.shard)] = True
         return mine
 
     @property
     def left(self) -> NDArray[np.int64]:
-        """Rows of the candidates that are judged here and have no verdict yet."""
-        return np.flatnonzero(self.is_mine & ~self.index.judged)
+        """Rows of the assigned candidates that have no verdict yet."""
+        return np.flatnonzero(self.is_assigned & ~self.index.judged)
 
     @property
     def complete(self) -> bool:
-        """Whether every grasp that is judged here is judged."""
+        """Whether all assigned grasps are judged."""
         return not len(self.left)
 
     @property
     def places(self) -> list[StoredRun]:
-        """Where the run of its one scene is; see `Campaign.places`."""
+        """Folder of the run of its one scene; see `Campaign.places`."""
         return [StoredRun("", self.path)]
 
     @property
     def table_path(self) -> Path:
-        """The results file."""
+        """Path of the results table."""
         return self.path / f"results.{self.document.table}"
 
     @property
     def report_path(self) -> Path:
-        """The report."""
+        """Path of the report."""
         return self.path / REPORT_FILE
 
     def rows(self, names: Sequence[str] | None = None) -> ResultRows:
-        """Judged grasps in the order of the candidates, in little memory: all columns, whichever
-        are named; see `Campaign.rows`."""
+        """Rows of the judged grasps in the order of the candidates, in little memory.
+
+        They have all columns, whatever the names; see `Campaign.rows`.
+        """
         return self._rows
 
     @cached_property
@@ -168,14 +170,14 @@ class Run:
 
     @cached_property
     def results(self) -> Columns:
-        """The same as columns, see `evaluation.results_table`."""
+        """All columns of the judged grasps, see `evaluation.results_table`."""
         return dict(self.rows())
 
     def columns(self, names: Sequence[str] | None = None) -> Columns:
         """Columns of the judged grasps.
 
         Args:
-            names: of the columns; all if None. What the run does not have is NaN, or empty texts.
+            names: names of the columns; all if None. Missing columns are NaN or empty texts.
         """
         return {
             name: self.rows().column(name) for name in (self.rows() if names is None else names)
@@ -191,7 +193,7 @@ class Run:
         """Judged grasps as a data frame; see `evaluation.table_parts`.
 
         Args:
-            names: of the columns; all if None.
+            names: names of the columns; all if None.
 
         Raises:
             MissingDependencyError: pandas is not installed.
@@ -204,13 +206,13 @@ class Run:
         return results_frame(rows, list(names or rows), texts)
 
     def with_candidates(self, candidates: Candidates) -> Run:
-        """The same run, which need not read its candidates."""
+        """Copy that already has its candidates in memory."""
         run = Run(self.path, self.document)
         run.__dict__["candidates"] = candidates
         return run
 
     def with_document(self, document: RunDocument) -> Run:
-        """The same run with another document about the same grasps; what was read is kept."""
+        """Copy with another document on the same grasps; keeps data that was read."""
         run = Run(self.path, document)
         run.__dict__.update(self.__dict__ | {"document": document})
         return run
@@ -218,12 +220,12 @@ class Run:
     @property
     def failures(self) -> list[str]:
         """Ids of the grasps that could not be simulated."""
-        return self._ids(self.index.failed)
+        return self._ids_where(self.index.failed)
 
     @property
     def interrupted(self) -> list[str]:
-        """Ids of those whose worker process was ended from outside; `evaluate` tries them again."""
-        return self._ids(self.index.failed & self.index.interrupted)
+        """Ids of failures whose worker process was killed from outside; `evaluate` retries them."""
+        return self._ids_where(self.index.failed & self.index.interrupted)
 
     @property
     def contested(self) -> list[str]:
@@ -232,9 +234,9 @@ class Run:
         settled = self.index.judged_again[rows.places]
         contested = np.zeros(len(self.candidates), dtype=bool)
         contested[rows.places] = contested_rows(rows["confidence"], settled)
-        return self._ids(contested & self.is_mine)
+        return self._ids_where(contested & self.is_assigned)
 
-    def _ids(self, chosen: NDArray[np.bool_]) -> list[str]:
+    def _ids_where(self, chosen: NDArray[np.bool_]) -> list[str]:
         ids = self.candidates.id
         return [ids[row] for row in np.flatnonzero(chosen).tolist()]
 
@@ -242,31 +244,31 @@ class Run:
         """One row of the results.
 
         Raises:
-            UnknownNameError: no judged grasp goes by this id; the message names the nearest.
+            UnknownNameError: there is no judged grasp with this id; the message names similar ids.
         """
         (place,) = self.candidates.rows([id]).tolist()
         rows = self.rows()
         found = np.flatnonzero(rows.places == place)
         if place < 0 or not len(found):
-            raise self._unknown(id)
+            raise self._unknown_grasp_error(id)
         return table_row(rows.columns(list(rows), found), 0)
 
     def candidate(self, id: str) -> Candidate:
-        """One grasp, judged or not, with its pose as it was judged, bit for bit.
+        """One grasp, judged or not, with exactly the pose that is judged.
 
         Raises:
-            UnknownNameError: the run has no such grasp; the message names the nearest.
+            UnknownNameError: the run has no such grasp; the message names similar ids.
         """
         (row,) = self.candidates.rows([id]).tolist()
         if row < 0:
-            raise self._unknown(id)
+            raise self._unknown_grasp_error(id)
         return self.candidates[row]
 
     def trial(self, id: str) -> RecordedTrial:
-        """One grasp, judged or not, with its verdict.
+        """One grasp with its verdict, if it is judged.
 
         Raises:
-            UnknownNameError: the run has no such grasp; the message names the nearest.
+            UnknownNameError: the run has no such grasp; the message names similar ids.
         """
         candidate = self.candidate(id)
         place = int(self.index.place[self.candidates.rows([id])[0]])
@@ -282,11 +284,11 @@ class Run:
     def best(
         self, count: int = 1, *, each: bool = False, only: Iterable[str] | None = None
     ) -> list[str]:
-        """Ids of the lifted grasps that can be trusted most, best first; see `best_rows`.
+        """Ids of the most robust lifted grasps, best first; see `best_rows`.
 
         Args:
-            count: how many.
-            each: so many of each object.
+            count: number of grasps.
+            each: return `count` grasps of each object.
             only: names of objects or instances; others are left out.
 
         Raises:
@@ -297,14 +299,14 @@ class Run:
         return [self.candidates.id[row] for row in rows.places[best].tolist()]
 
     def scene(self) -> Scene:
-        """The scene as it was judged.
+        """The scene of the run.
 
         Raises:
-            InvalidInputError: the object library is gone, or has changed since.
+            InvalidInputError: the object library is missing, or has changed since the run.
         """
         path = self.path / SCENE_FILE
         document = load_document(path, SceneDocument)
-        scene = Scene(document, self._library(document.library), path)
+        scene = Scene(document, self._load_library(document.library), path)
         built = self.document.library.objects
         changed = [name for name in built if scene.library.content.get(name) != built[name]]
         if changed or scene.content != self.document.scene.content:
@@ -315,10 +317,10 @@ class Run:
         return scene
 
     def station(self) -> Station:
-        """The station as it was judged.
+        """The station of the run.
 
         Raises:
-            BurgError: a file that it needs is gone, or has changed since.
+            BurgError: a file that it needs is missing, or has changed since the run.
         """
         station = load_station(self.path / STATION_FILE)
         if station.content != self.document.station.content:
@@ -330,18 +332,18 @@ class Run:
 
     @cached_property
     def instances(self) -> tuple[str, ...]:
-        """Names of the free objects of the scene that was judged."""
+        """Names of the free objects of the scene."""
         document = load_document(self.path / SCENE_FILE, SceneDocument)
         return tuple(instance.name or instance.object for instance in document.instances)
 
     @cached_property
     def _joints(self) -> int:
-        """Number of the arm's joints, if it was asked."""
+        """Number of the arm's joints; 0 if no arm is used."""
         arm = load_document(self.path / STATION_FILE, StationDocument).arm
         return len(arm.home) if self.document.mode != "hand" and arm is not None else 0
 
-    def _library(self, reference: str) -> ObjectLibrary:
-        """The library, relative to the run's folder, or where it was then."""
+    def _load_library(self, reference: str) -> ObjectLibrary:
+        """Loads the library relative to the run's folder, or from its recorded path."""
         recorded = self.document.library.path
         for place, base in ((reference, self.path), (recorded, None)):
             with contextlib.suppress(UnknownNameError):
@@ -351,7 +353,7 @@ class Run:
             f" not at {recorded} either; write its place into this file"
         )
 
-    def _unknown(self, id: str) -> UnknownNameError:
+    def _unknown_grasp_error(self, id: str) -> UnknownNameError:
         hint = f"all ids are in {self.table_path.name}"
         return unknown_grasp_error(id, self.candidates.id, str(self.path), hint)
 
@@ -387,8 +389,8 @@ def create_run(
 ) -> Run:
     """Writes a new run without results.
 
-    The candidates come before run.yaml, which makes the folder a run, and the copies after it:
-    see `require_run_folder`.
+    Writes the candidates first, then run.yaml, which makes the folder a run, then the copies of
+    scene and station; see `require_run_folder`.
 
     Raises:
         InvalidInputError: the folder cannot be written.
@@ -401,7 +403,7 @@ def create_run(
 
 
 def write_copies(folder: Path, scene: Scene, station: Station) -> None:
-    """Writes those copies of the documents that a run lacks because it was killed before."""
+    """Writes the copies of scene and station that a run lacks, for example as it was killed."""
     if not (folder / SCENE_FILE).exists():
         library = portable_reference(scene.library.root, folder)
         save_scene(dataclasses.replace(scene.document, library=library), folder / SCENE_FILE)
@@ -417,14 +419,14 @@ def save_run(run: Run) -> Run:
 
 
 def require_run_folder(folder: Path) -> None:
-    """Refuses a folder that holds anything but a run; makes none.
+    """Refuses a folder that holds anything but a run. Does not create it.
 
-    Without run.yaml only what a run leaves that is killed at its very start is tolerated: an
-    empty journal, possibly with candidates beside it. Names alone prove nothing: scene.yaml,
+    A folder without run.yaml may only hold the files of a run that was killed at its start: an
+    empty journal, possibly with candidates. Other file names prove nothing: scene.yaml,
     station.yaml or grasps.npz may be the user's own.
 
     Raises:
-        InvalidInputError: it cannot be written, or something else is in it.
+        InvalidInputError: the folder cannot be written, or holds other files.
     """
     if not folder.exists():
         return
@@ -437,7 +439,7 @@ def require_run_folder(folder: Path) -> None:
 
 
 def refuse_other_files(folder: Path, own: Collection[str] = ()) -> None:
-    """Refuses a folder in which there is anything but files of some names, and hidden ones."""
+    """Refuses a folder with files other than hidden ones and those named in `own`."""
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
     if foreign := sorted(names.difference(own)):
         raise InvalidInputError(
@@ -446,7 +448,7 @@ def refuse_other_files(folder: Path, own: Collection[str] = ()) -> None:
 
 
 def portable_station(station: Station, folder: Path) -> StationDocument:
-    """The station's document for a copy in `folder`: references that hold there, too."""
+    """Document of a station for a copy in `folder`, with references that are valid there."""
     document = station.document
     hand = resolve_reference(document.hand, "models/hands", station.path.parent, station.packages)
     arm = document.arm

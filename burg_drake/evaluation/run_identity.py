@@ -1,4 +1,4 @@
-"""Comparison of two runs, or of a run and a call, by what decides about their results."""
+"""Compares two runs, or a run and a call, by the inputs and settings that determine results."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from burg_drake.evaluation.trial_origin import (
 SETTINGS_TOPIC = "settings of engine, trial and arm"
 """A topic of `run_identity`."""
 COMPARED_RUN_NAMES = ("there", "here")
-"""What two runs are called in messages: the one in a folder, and the one that is asked for."""
+"""Words for two runs in messages: the one in a folder, and the requested one."""
 
 
 def run_identity(document: AnyRunDocument) -> dict[str, str]:
-    """What two calls must have in common to work on the same run, in words, by topic."""
+    """Properties that two calls must share to work on the same run, as texts by topic."""
     if isinstance(document, CampaignDocument):
         return {"scenes": f"{len(document.scenes)} scenes", **request_identity(document)}
     scene = f"content {document.scene.content[:HASH_DIGITS]}"
@@ -39,7 +39,7 @@ def run_identity(document: AnyRunDocument) -> dict[str, str]:
 
 
 def request_identity(document: AnyRunDocument) -> dict[str, str]:
-    """The same of all scenes that it is asked about, in words, by topic."""
+    """Properties of `run_identity` that do not depend on the scene, as texts by topic."""
     grasps, engine = document.grasps, document.engine
     others = map(other_numbers, (document.trial, document.arm))
     settings = content_hash(vars(engine), *others)[:HASH_DIGITS]
@@ -82,8 +82,7 @@ def _only_words(grasps: Grasps) -> str:
 
 
 def run_hash(document: AnyRunDocument) -> str:
-    """Short hash of what decides about a run's results: `run_identity`, and the candidates of one
-    scene or the contents of many."""
+    """Short hash of `run_identity` and of the candidates of one scene or the contents of many."""
     if isinstance(document, CampaignDocument):
         content: object = [(entry.name, entry.content) for entry in document.scenes]
     else:
@@ -92,7 +91,7 @@ def run_hash(document: AnyRunDocument) -> str:
 
 
 def run_differences(there: OneRunDocument, here: OneRunDocument) -> list[str]:
-    """How two runs differ in what must be the same in one run, in words."""
+    """Differences in `run_identity` between two runs, in words."""
     if isinstance(there, CampaignDocument) and isinstance(here, CampaignDocument):
         return request_differences(there, here) + _scenes_differences(there, here)
     assert isinstance(there, RunDocument) and isinstance(here, RunDocument)
@@ -121,11 +120,11 @@ def _scenes_differences(there: CampaignDocument, here: CampaignDocument) -> list
 def request_differences(
     there: AnyRunDocument, here: AnyRunDocument, sides: Sequence[str] = COMPARED_RUN_NAMES
 ) -> list[str]:
-    """The same of what is asked, whatever the scene.
+    """Differences in `request_identity` between two runs, in words.
 
     Args:
-        there, here: documents of runs.
-        sides: what the two are called.
+        there, here: documents of the runs.
+        sides: words for the two runs.
     """
     first, second = request_identity(there), request_identity(here)
     return identity_differences(first, second, _difference_words(there, here, sides), sides)
@@ -137,15 +136,15 @@ def identity_differences(
     words: Mapping[str, Sequence[str]],
     sides: Sequence[str] = COMPARED_RUN_NAMES,
 ) -> list[str]:
-    """Topics that two identities have in common and differ in, in words.
+    """Differences between two identities in their common topics, in words.
 
     Args:
         there, here: texts by topic.
-        words: differences by topic, of topics whose texts are hashes.
-        sides: what the two are called.
+        words: differences to report for topics whose texts are hashes.
+        sides: words for the two runs.
     """
     topics = [k for k in there if k in here and there[k] != here[k]]
-    if "engine" in topics or "mode" in topics:  # settings differ too, which says nothing more
+    if "engine" in topics or "mode" in topics:  # then the settings differ as well
         topics = [k for k in topics if k != SETTINGS_TOPIC]
     found: list[str] = []
     for topic in topics:
@@ -160,13 +159,13 @@ def input_difference(
     sides: Sequence[str] = COMPARED_RUN_NAMES,
     behind: str = "models",
 ) -> str:
-    """How two documents with different contents differ, in words.
+    """Difference between two documents with different contents, in words.
 
     Args:
-        topic: what they are.
+        topic: kind of document.
         there, here: the documents.
-        sides: what the two are called.
-        behind: which files beside the document make its content.
+        sides: words for the two runs.
+        behind: kind of files that the document uses and its content includes.
     """
     if there.path != here.path:
         return _topic_difference(topic, there.path, here.path, sides)
@@ -178,7 +177,7 @@ def setting_differences(
     here: Mapping[str, object],
     sides: Sequence[str] = COMPARED_RUN_NAMES,
 ) -> list[str]:
-    """Settings that differ by name, with both values."""
+    """Settings that differ, in words with both values."""
     names = [k for k in {**there, **here} if there.get(k) != here.get(k)]
     texts = [[str(side.get(k, "not recorded")) for k in names] for side in (there, here)]
     return [_topic_difference(k, a, b, sides) for k, a, b in zip(names, *texts, strict=True)]
@@ -187,7 +186,7 @@ def setting_differences(
 def _difference_words(
     there: AnyRunDocument, here: AnyRunDocument, sides: Sequence[str]
 ) -> dict[str, list[str]]:
-    """Differences by topic, of topics whose texts in `request_identity` have hashes."""
+    """Differences by topic, for the topics of `request_identity` whose texts are hashes."""
     return {
         "station": [input_difference("station", there.station, here.station, sides)],
         SETTINGS_TOPIC: setting_differences(_all_settings(there), _all_settings(here), sides),
@@ -206,7 +205,7 @@ def _scene_difference(there: RunDocument, here: RunDocument) -> str:
 def grasp_differences(
     there: Grasps, here: Grasps, sides: Sequence[str] = COMPARED_RUN_NAMES
 ) -> list[str]:
-    """How the grasps of two runs differ, in words."""
+    """Differences between the grasps of two runs, in words."""
     found = []
     if there.correction != here.correction:
         first, second = (",".join(g.correction) or "none" for g in (there, here))
@@ -226,7 +225,7 @@ def _origin_words(grasps: Grasps) -> str:
 
 
 def _all_settings(document: AnyRunDocument) -> dict[str, object]:
-    """Settings of engine, trial and arm by name, without those that are topics of their own."""
+    """Settings of engine, trial and arm by name, without those that have their own topic."""
     return vars(document.engine) | other_numbers(document.trial) | other_numbers(document.arm)
 
 
@@ -236,14 +235,14 @@ def _topic_difference(topic: str, there: str, here: str, sides: Sequence[str]) -
 
 
 def require_same_run(folder: Path, there: OneRunDocument, here: OneRunDocument) -> None:
-    """Refuses to go on with another run, or with another shard of the same one.
+    """Refuses to continue a run with other settings or inputs, or another shard of it.
 
     Args:
-        folder: holds the run.
-        there, here: documents of the run in the folder and of the one asked for.
+        folder: folder of the run.
+        there, here: documents of the run in the folder and of the requested one.
 
     Raises:
-        InvalidInputError: names every difference, or both shards.
+        InvalidInputError: they differ; the message names every difference, or both shards.
     """
     if differences := run_differences(there, here):
         raise InvalidInputError(

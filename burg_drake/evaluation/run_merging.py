@@ -54,12 +54,12 @@ from burg_drake.evaluation.table_parts import require_arrow
 
 @dataclass(frozen=True)
 class MissingFromMerge:
-    """What none of the merged runs had.
+    """Grasps, scenes and shards that none of the merged runs has.
 
     Attributes:
-        missing: number of grasps.
-        scenes: that have not been begun.
-        shards: that were not among the runs.
+        missing: number of grasps without a verdict.
+        scenes: scenes that have not been begun.
+        shards: shards that are not among the runs.
     """
 
     missing: int = 0
@@ -67,20 +67,20 @@ class MissingFromMerge:
     shards: tuple[str, ...] = ()
 
 
-def read_unfinished(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
-    """What these runs lacked, if a folder has what they make together, not finished."""
+def read_merge_note(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
+    """Reads the note of an unfinished merge of these runs; None if the folder has none."""
     try:
-        stored = json.loads(_note_file(folder, sources).read_text(encoding="utf-8"))
+        stored = json.loads(_merge_note_path(folder, sources).read_text(encoding="utf-8"))
         return MissingFromMerge(stored["missing"], tuple(stored["scenes"]), tuple(stored["shards"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
 def finish_merge(folder: Path, sources: Sequence[Path]) -> Run | Campaign:
-    """Writes what is made from the journals of a merged run, as far as it is not there.
+    """Writes the missing tables, reports and parts of a merged run.
 
     Raises:
-        InvalidInputError: another process is writing it, or it cannot be written.
+        InvalidInputError: another process is writing the run, or it cannot be written.
     """
     with WriterLock(lock_file(folder)):
         result = open_results(folder)
@@ -88,12 +88,12 @@ def finish_merge(folder: Path, sources: Sequence[Path]) -> Run | Campaign:
             _finish_campaign(result)
         else:
             result = finish_run(result, result.document.table)
-        _note_file(folder, sources).unlink(missing_ok=True)
+        _merge_note_path(folder, sources).unlink(missing_ok=True)
     return result
 
 
 def lock_file(folder: Path) -> Path:
-    """The file by which a run is locked."""
+    """Path of the lock file of a run."""
     return folder / (CAMPAIGN_LOCK_FILE if is_campaign(folder) else JOURNAL_FILE)
 
 
@@ -110,25 +110,25 @@ def _finish_campaign(campaign: Campaign) -> None:
     write_campaign_report(campaign)
 
 
-def _note_file(folder: Path, sources: Sequence[Path]) -> Path:
-    """Named as `remove_unfinished` wants it."""
+def _merge_note_path(folder: Path, sources: Sequence[Path]) -> Path:
+    """Path of the note of an unfinished merge, named so that `remove_unfinished` finds it."""
     names = sorted(str(path.resolve()) for path in sources)
     return folder / f".merge.{content_hash(names)[:16]}"
 
 
 def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) -> MissingFromMerge:
-    """Writes a merged run over many scenes, but for what is made from its journals.
+    """Writes journals and documents of a merged run over many scenes, but no tables and reports.
 
     Args:
         campaigns: the runs.
-        staging: an empty folder to write it to.
-        folder: where it is to be, which references have to fit.
+        staging: empty folder to write it to.
+        folder: final folder, for which references are made.
 
     Returns:
-        What no run has.
+        Grasps, scenes and shards that no run has.
 
     Raises:
-        InvalidInputError: the runs are not of the same, or disagree.
+        InvalidInputError: the runs have different inputs or settings, or disagree about a grasp.
         MissingDependencyError: pyarrow is not installed.
     """
     require_arrow("a run over many scenes")
@@ -140,7 +140,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
     (staging / SCENES_FOLDER).mkdir()
     merge = _Merge(campaigns, merged, folder)
     for name in merged.names:
-        merge.take_scene(name)
+        merge.add_scene(name)
     merge.copy_parts()
     atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
     save_campaign(merged)
@@ -148,12 +148,12 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
 
 
 class _Merge:
-    """What is known while scenes are taken.
+    """Merges the scenes of runs one by one.
 
     Attributes:
-        states: of the scenes.
-        copied: by number of the run: scenes that were copied from it as they are.
-        missing: grasps without a verdict.
+        states: progress of the merged scenes.
+        copied: by number of the run, scenes that were copied from it unchanged.
+        missing: number of grasps without a verdict.
         not_begun: scenes that no run has begun.
     """
 
@@ -166,8 +166,8 @@ class _Merge:
         self.missing = 0
         self.not_begun: list[str] = []
 
-    def take_scene(self, name: str) -> None:
-        """Takes a scene."""
+    def add_scene(self, name: str) -> None:
+        """Copies or merges a scene."""
         begun = [k for k, c in enumerate(self._campaigns) if (c.folder(name) / RUN_FILE).exists()]
         known = [s for c in self._campaigns if (s := c.states.get(name)) is not None]
         if not begun:
@@ -186,14 +186,14 @@ class _Merge:
         final = self._folder / SCENES_FOLDER / name
         runs = [load_run(self._campaigns[k].folder(name)) for k in begun]
         if len(runs) == 1 and runs[0].document.shard == self._shard:
-            self._copy(begun[0], name, runs[0], target, final)
+            self._copy_scene(begun[0], name, runs[0], target, final)
             return
         target.mkdir()
         choice = write_merged(runs, target, final, self._shard)
         self._note_state(name, runs[0], choice)
 
     def copy_parts(self) -> None:
-        """Copies the parts of which all scenes were copied; the others are made from journals."""
+        """Copies parts whose scenes were all copied; other rows will be read from journals."""
         number = 0
         parts = self._merged.path / PARTS_FOLDER
         parts.mkdir()
@@ -204,8 +204,8 @@ class _Merge:
                     digest = part.path.stem.rpartition("-")[2]
                     shutil.copy2(part.path, parts / f"part-{number:06d}-{digest}.parquet")
 
-    def _copy(self, k: int, name: str, run: Run, target: Path, final: Path) -> None:
-        # the report tells commands about the run where it was
+    def _copy_scene(self, k: int, name: str, run: Run, target: Path, final: Path) -> None:
+        # the report has commands with the old path of the run
         shutil.copytree(run.path, target, ignore=shutil.ignore_patterns(".*", REPORT_FILE))
         copy_documents(run, target, final)
         self.copied[k].add(name)
@@ -214,8 +214,8 @@ class _Merge:
         if state is not None and state.state == "done" and state.size == size:
             self.states.append(state)
             return
-        mine = share_rows(len(run.candidates), run.document.shard)
-        choice = choose_verdicts([target / JOURNAL_FILE], run.candidates, mine)
+        assigned = share_rows(len(run.candidates), run.document.shard)
+        choice = choose_verdicts([target / JOURNAL_FILE], run.candidates, assigned)
         self._note_state(name, run, choice)
 
     def _note_state(self, name: str, run: Run, choice: JournalChoice) -> None:
@@ -241,7 +241,7 @@ class _Merge:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MergeResult(MissingFromMerge):
-    """A merged run, and what it lacks.
+    """A merged run, and the grasps, scenes and shards that it lacks.
 
     Attributes:
         result: the run.
@@ -251,7 +251,7 @@ class MergeResult(MissingFromMerge):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is missing, and how to judge it, one sentence each."""
+        """Notes on missing grasps and how to judge them, one sentence each."""
         notes = []
         shard = self.result.document.shard
         if shard:
@@ -281,21 +281,20 @@ def merge_runs(paths: Sequence[str | Path], out: str | Path) -> Run | Campaign:
 def merge_folders(paths: Sequence[str | Path], out: str | Path) -> MergeResult:
     """Merges runs of the same scenes and grasps: shards, or copies that were interrupted.
 
-    Of each grasp the verdict is taken that some run has; one of a trial goes before
-    `simulation_failed`. The runs stay as they are.
+    If several runs have judged a grasp, a verdict of a trial is preferred to `simulation_failed`.
+    The runs are not changed.
 
     Args:
         paths: folders of runs, all of one scene or all of many.
-        out: folder for the merged run; it does not exist, or is empty, or the same call was killed
-            when it had put the run there.
+        out: folder for the merged run; new, empty, or left by the same call if it was killed.
 
     Raises:
-        InvalidInputError: a folder holds no run or is being written, the runs are not of the same,
-            two disagree about a grasp, or `out` cannot be written.
+        InvalidInputError: a folder holds no run or is being written, the runs have different inputs
+            or settings, two disagree about a grasp, or `out` cannot be written.
         MissingDependencyError: runs over many scenes without pyarrow.
     """
     folders, folder = _distinct_folders(paths), Path(out)
-    left = read_unfinished(folder, folders)
+    left = read_merge_note(folder, folders)
     if left is None:
         with ExitStack() as stack:
             for path in folders:
@@ -305,7 +304,7 @@ def merge_folders(paths: Sequence[str | Path], out: str | Path) -> MergeResult:
 
 
 def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
-    """Puts a merged run where it is to be, but for what is made from its journals."""
+    """Writes a merged run to its folder, without tables, reports and parts."""
     results = [open_results(path) for path in folders]
     kinds = {type(result) for result in results}
     if len(kinds) > 1:
@@ -324,7 +323,7 @@ def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
             choice = write_merged(runs, staging, folder)
             missing = int((~choice.index.judged).sum())
             left = MissingFromMerge(missing, (), missing_shards(runs))
-        note = _note_file(staging, folders)
+        note = _merge_note_path(staging, folders)
         note.write_text(json.dumps(asdict(left)), encoding="utf-8")
         move_folder(staging, folder)
         return left
@@ -333,19 +332,19 @@ def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
 
 
 def move_folder(staging: Path, folder: Path) -> None:
-    """Puts a folder where it is to be.
+    """Moves a staging folder to its final path.
 
     Raises:
-        InvalidInputError: it cannot be.
+        InvalidInputError: the final path cannot be written.
     """
     try:
-        os.rename(staging, folder)  # also in the place of an empty one
+        os.rename(staging, folder)  # also replaces an empty folder
     except OSError as error:
         raise InvalidInputError(f"cannot write {folder}: {error.strerror}") from error
 
 
 def _distinct_folders(paths: Sequence[str | Path]) -> list[Path]:
-    """The folders, each once, however it is written."""
+    """The folders without duplicates; different paths of one folder count as the same."""
     found = {Path(path).resolve(): Path(path) for path in paths}
     if not found:
         raise InvalidInputError("no runs are given; give the folders of one or more")
@@ -353,13 +352,13 @@ def _distinct_folders(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def _staging_folder(folder: Path) -> Path:
-    """An empty folder beside another; those of merges that were killed go."""
+    """Creates an empty folder beside another, and removes those of killed merges."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise InvalidInputError(f"{folder} exists already; choose another folder").about("out")
     parent = ensure_writable_folder(folder.absolute().parent)
-    left = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{16}}")
+    staging_name = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{16}}")
     for path in parent.iterdir():
-        if left.fullmatch(path.name) and path.is_dir():
+        if staging_name.fullmatch(path.name) and path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
     staging = parent / f".{folder.name}.{secrets.token_hex(8)}"
     staging.mkdir()

@@ -1,9 +1,8 @@
-"""From a call of `evaluate` to a run that can be judged: request, folder, candidates, open grasps.
+"""Prepares runs for a call of `evaluate`: request, folder, candidates, open grasps.
 
-A balanced run samples further grasps in rounds, each when all grasps so far are judged. What a
-round samples follows from the verdicts alone, not from who judged them or in which order. A later
-round repeats the sampling with the same seed and a larger number, so it begins with the same
-grasps.
+A balanced run samples further grasps in rounds, each once all grasps so far are judged. The grasps
+of a round depend only on the verdicts, not on the executor or the order of judging. A later round
+repeats the sampling with the same seed and a larger number, so it begins with the same grasps.
 """
 
 from __future__ import annotations
@@ -89,22 +88,23 @@ if TYPE_CHECKING:
 
 ByInstance = Mapping[str, GraspSet]
 GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
-"""Grasps that a user has: a set, sets by instance, or a function that has those of a scene.
-Attributes `content` and `correction` of a function, if it has them, are a hash of all that its
-grasps come from, and the correction with which it reads them."""
+"""Grasps given by the user: a set, sets by instance, or a function that returns those of a scene.
+
+A function may have attributes `content`, a hash of the source of its grasps, and `correction`, the
+correction that it applies to them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunRequest:
-    """What is asked.
+    """A request to `evaluate`, for one scene or for many.
 
     Attributes:
-        station: where.
-        settings: as the user has them.
-        engine, mode, motion, shard: what the settings come to on this station.
+        station: the station.
+        settings: settings of the user.
+        engine, mode, motion, shard: values that follow from the settings on this station.
         only: names of objects or instances; all if empty.
-        grasps: given in place of sampled ones.
-        retry_failed: whether grasps that could not be simulated are tried again.
+        grasps: grasps given by the user; None to sample.
+        retry_failed: whether to retry grasps that could not be simulated.
     """
 
     station: Station
@@ -126,12 +126,13 @@ class RunRequest:
         *,
         retry_failed: bool = False,
     ) -> RunRequest:
-        """What settings ask for on a station.
+        """Makes the request from settings on a station.
 
         Raises:
             UnknownNameError: there is no engine of this name.
-            InvalidInputError: there is no such mode or share, the station or the engine lacks the
-                arm, or the approach is asked for of the whole arm, or without a standoff.
+            InvalidInputError: there is no such mode or shard, the mode needs an arm that the
+                station lacks or the engine does not support, or the approach is requested with the
+                whole arm or without a standoff.
             MissingDependencyError: the engine is not installed.
         """
         engine, mode = as_engine(settings.engine), mode_for(station, settings.mode)
@@ -168,10 +169,10 @@ class RunRequest:
         )
 
     def given_grasps(self, scene: Scene) -> ByInstance | None:
-        """The user's grasps on the instances of a scene; None where they are sampled.
+        """The user's grasps on the instances of a scene; None if grasps are sampled.
 
         Raises:
-            BurgError: they do not fit the scene.
+            BurgError: the grasps do not fit the scene.
         """
         if self.grasps is None:
             return None
@@ -180,15 +181,15 @@ class RunRequest:
         return select_instances(scene, found, self.only)
 
     def given_candidates(self, scene: Scene) -> Candidates | None:
-        """The same as candidates."""
+        """The user's grasps as candidates; None if grasps are sampled."""
         given = self.given_grasps(scene)
         return None if given is None else given_candidates(scene, given)
 
     def narrow_to_scene(self, scene: Scene) -> RunRequest | None:
-        """What is asked about one scene of many: `only` and grasps may be for others alone.
+        """Narrows a request for many scenes to one of them.
 
         Returns:
-            The same without what is not for this scene; None if that leaves no grasps.
+            The request with only the names and grasps of this scene; None if no grasps are left.
 
         Raises:
             BurgError: the grasps do not fit the scene.
@@ -201,10 +202,10 @@ class RunRequest:
             return replace(self, only=only) if scene.instances else None
         grasps: GraspsLike = self.grasps
         if isinstance(grasps, GraspSet):
-            by = grasps.columns.get(INSTANCE_COLUMN, grasps.object)
-            named = INSTANCE_COLUMN in grasps.columns
-            among = list(scene.instances) if named else sorted({*known, ""})
-            grasps = grasps.select(np.isin(by, among))
+            targets = grasps.columns.get(INSTANCE_COLUMN, grasps.object)
+            by_instance = INSTANCE_COLUMN in grasps.columns
+            accepted = list(scene.instances) if by_instance else sorted({*known, ""})
+            grasps = grasps.select(np.isin(targets, accepted))
         elif isinstance(grasps, Mapping):
             grasps = {name: grasps[name] for name in grasps if name in scene.instances}
         else:
@@ -219,7 +220,7 @@ class RunRequest:
         return replace(self, only=only, grasps=found) if found else None
 
     def describe_grasps(self, scene: Scene) -> Grasps:
-        """What is asked of the grasps; what comes of it is filled in when it is known.
+        """Record of the requested grasps; counts and hash are filled in later.
 
         Raises:
             UnknownNameError: `only` has a name that is not in the scene.
@@ -229,7 +230,7 @@ class RunRequest:
         return replace(self.describe_all_grasps(), only=only)
 
     def describe_all_grasps(self) -> Grasps:
-        """The same, whatever the scene."""
+        """Record of the requested grasps, independent of the scene."""
         if self.grasps is not None:
             return Grasps(origin="given", only=self.only, count=0, objects={}, content="")
         settings = self.settings
@@ -253,7 +254,7 @@ class RunRequest:
         )
 
     def document_fields(self) -> dict[str, Any]:
-        """Fields of the document of a run that do not depend on the scene."""
+        """Fields of a run's document that do not depend on the scene."""
         return {
             "command": current_command(),
             "station": input_of(self.station, "stations"),
@@ -268,7 +269,7 @@ class RunRequest:
         }
 
     def document(self, folder: Path, scene: Scene) -> RunDocument:
-        """The document of a run; what comes of the grasps is filled in later."""
+        """Document of a run; counts and hash of the grasps are filled in later."""
         instances = [*scene.instances.values(), *scene.background.values()]
         library = portable_reference(scene.library.root, folder)
         packaged = library.startswith(PACKAGE_URI)
@@ -285,7 +286,7 @@ class RunRequest:
 
     @property
     def trial(self) -> dict[str, float]:
-        """Settings of the trial's phases, and how its results are measured, by name."""
+        """Numbers of the trial's settings, and of the way its results are measured, by name."""
         return {**settings_numbers(self.phases), **MEASURE_NUMBERS}
 
     @property
@@ -302,19 +303,21 @@ class RunRequest:
 
     @property
     def arm(self) -> dict[str, float]:
-        """Settings of the search for the arm's motions, by name; none where it is not asked."""
+        """Numbers of the settings of the arm's motion search, by name; empty without an arm."""
         return {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion))
 
 
 def current_command() -> str:
-    """The command that is running, as one can type it again."""
+    """Command line of this process, quoted for a shell."""
     program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
     return shlex.join([program, *sys.argv[1:]])
 
 
 def given_content(grasps: GraspsLike | None) -> str:
-    """Hash of the grasps that are given for many scenes; empty of those of a function that does not
-    say it: each scene's run has a hash of its own."""
+    """Hash of the grasps given for many scenes.
+
+    Empty for a function without the attribute `content`; each scene's run has its own hash.
+    """
     if grasps is None or callable(grasps):
         return str(getattr(grasps, "content", ""))
     sets = {"": grasps} if isinstance(grasps, GraspSet) else grasps
@@ -326,7 +329,7 @@ def given_content(grasps: GraspsLike | None) -> str:
 
 
 def given_correction(grasps: GraspsLike | None) -> tuple[str, ...]:
-    """The correction with which the grasps that are given for many scenes were read."""
+    """Correction with which the grasps given for many scenes were read."""
     if grasps is None or callable(grasps):
         return tuple(getattr(grasps, "correction", ()))
     sets = [grasps] if isinstance(grasps, GraspSet) else grasps.values()
@@ -340,14 +343,15 @@ RequestedCounts = dict[str, tuple[int, int]]
 def sample_requested(
     scene: Scene, station: Station, document: RunDocument, before: Run | None = None
 ) -> Candidates:
-    """The grasps that a run's document asks for.
+    """Samples the grasps that a run's document asks for.
 
     Args:
-        scene: that they are sampled on.
-        station: gives hand and arm.
-        document: of the run; without `Grasps.asked` every object gets `per_object` ordinary ones.
-        before: the run with the grasps that its own document asks for; objects of which no more are
-            asked for keep theirs. None: all are sampled.
+        scene: scene to sample on.
+        station: station with hand and arm.
+        document: document of the run; without `Grasps.asked`, every object gets `per_object`
+            ordinary grasps.
+        before: the run with its grasps so far; objects whose number of grasps does not change keep
+            theirs. None to sample all.
     """
     grasps = document.grasps
     names = grasps.only or tuple(scene.instances)
@@ -357,36 +361,36 @@ def sample_requested(
         by_count: defaultdict[int, list[str]] = defaultdict(list)
         for name in (name for name in names if name not in kept):
             by_count[_requested_counts(grasps, scene.instance(name).object)[slippery]].append(name)
-        for count, those in sorted(by_count.items()):
+        for count, instances in sorted(by_count.items()):
             if count:
                 settings = SamplingSettings(
                     approach_angle_deg=grasps.approach_angle_deg,
                     blind=grasps.blind,
                     slippery=slippery,
                 )
-                sampled = sample_on_scene(scene, station, count, document.seed, settings, those)
+                sampled = sample_on_scene(scene, station, count, document.seed, settings, instances)
                 for name, part in sampled:
                     found[name].append(part)
     return join_candidates({name: _join_sets(found[name]) for name in names})
 
 
 def _kept_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
-    """The grasps of the instances that a run has as many of as are asked for now."""
-    there = before.candidates
-    provenance = there.grasps.provenance["parts"]
+    """Grasps of the instances whose requested number has not changed, by instance."""
+    candidates = before.candidates
+    provenance = candidates.grasps.provenance["parts"]
     kept = {}
     for name in provenance:
         object = scene.instance(name).object
         if _requested_counts(grasps, object) == _requested_counts(before.document.grasps, object):
-            own = there.grasps.select(there.instance == name)
+            own = candidates.grasps.select(candidates.instance == name)
             kept[name] = [replace(own, provenance=provenance[name])]
     return kept
 
 
 def next_round(run: Run) -> RunDocument | None:
-    """The document of a judged run that asks for more grasps; None if no more are needed.
+    """Document of a judged run that asks for more grasps; None if no more are needed.
 
-    None are needed if each object has enough lifted and enough failing grasps, or the maximum of
+    No more are needed if each object has enough lifted and failing grasps, or the maximum number of
     grasps. A run that a second engine has judged again gets no further round.
     """
     grasps = run.document.grasps
@@ -406,7 +410,7 @@ def _requested_counts(grasps: Grasps, object: str) -> tuple[int, int]:
 
 
 def _increase_counts(grasps: Grasps, object: str, counts: tuple[int, int]) -> tuple[int, int]:
-    """How many grasps are sampled in the next round: twice as many of what is missing."""
+    """Numbers of grasps for the next round: doubled for the kind that is missing."""
     ordinary, slippery = _requested_counts(grasps, object)
     lifted, failed = (n < grasps.until_balanced for n in counts)
     room = grasps.max_per_object - ordinary - slippery
@@ -416,18 +420,18 @@ def _increase_counts(grasps: Grasps, object: str, counts: tuple[int, int]) -> tu
 
 
 def _join_sets(parts: list[GraspSet]) -> GraspSet:
-    """Ordinary grasps, and slippery ones if there are any; provenance is that of the first."""
+    """Joins ordinary and slippery grasps without duplicates; keeps the first provenance."""
     if len(parts) == 1:
         return parts[0]
     return replace(drop_equal_grasps(GraspSet.concatenate(parts)), provenance=parts[0].provenance)
 
 
 def require_sound(scene: Scene, station: Station, mode: Mode, engine: Engine) -> None:
-    """Refuses a scene that cannot be judged, before any work is spent on it.
+    """Refuses a scene that cannot be judged.
 
     Raises:
-        InvalidInputError: unsound scene, an arm that stands in something or does not reach, or
-            objects or a hand that the engine cannot have.
+        InvalidInputError: invalid scene, an arm that overlaps it or does not reach the board, or
+            objects or a hand that the engine does not support.
     """
     from burg_drake.motion import require_usable_arm
     from burg_drake.station import require_valid_scene
@@ -445,13 +449,13 @@ def open_run(
     given: Candidates | None,
     sampling: Callable[[], None] = lambda: None,
 ) -> Run:
-    """Goes on with the run in a folder, or begins a new one there.
+    """Continues the run in a folder, or begins a new one there.
 
     Args:
-        folder: of the run.
-        scene: to judge.
-        request: what is asked about it.
-        given: the user's grasps; sampled if None.
+        folder: folder of the run.
+        scene: scene to judge.
+        request: the request for the scene.
+        given: the user's grasps; None to sample.
         sampling: called before grasps are sampled.
 
     Raises:
@@ -466,7 +470,7 @@ def open_run(
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
         if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
-            # killed between the two files of a round, of which the grasps are the newer one
+            # killed after the grasps of a round were written, but before run.yaml
             return _resample_run(run, run.document, scene, request.station)
         return run
     if candidates is None:
@@ -480,11 +484,10 @@ def open_run(
 
 
 def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
-    """Samples the grasps that a run's new document asks for, those that it has among them, of the
-    objects of which it asks for more.
+    """Samples the grasps that a run's new document asks for; they include the existing ones.
 
-    The candidates come before run.yaml, so that a call that is killed between them is found out by
-    their hash: `open_run` then samples those of the document again.
+    Writes the candidates before run.yaml: if the call is killed in between, `open_run` notices
+    their different hash and samples the grasps of run.yaml again.
     """
     return _resample_run(run, document, scene, station, before=run)
 
@@ -492,7 +495,7 @@ def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) 
 def _resample_run(
     run: Run, document: RunDocument, scene: Scene, station: Station, before: Run | None = None
 ) -> Run:
-    """With the grasps of a document; see `sample_requested`."""
+    """Samples the grasps of a document and writes both; see `sample_requested`."""
     start = time.process_time()
     candidates = sample_requested(scene, station, document, before)
     cpu = document.grasps.cpu + time.process_time() - start
@@ -522,14 +525,15 @@ def _record_grasps(
 
 
 def open_rows(run: Run, *, retry_failed: bool) -> NDArray[np.int64]:
-    """Rows of the candidates that this run judges and has no verdict about, and of those to be
-    tried again."""
-    return np.flatnonzero(run.is_mine & run.index.open(retry_failed=retry_failed))
+    """Rows of the assigned candidates that have no verdict, or are to be retried."""
+    return np.flatnonzero(run.is_assigned & run.index.open(retry_failed=retry_failed))
 
 
 def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
-    """Writes table and report, unless they are there already; where no report is wanted, one that
-    is out of date is removed."""
+    """Writes table and report unless they are up to date.
+
+    Without `report`, only removes an outdated report.
+    """
     if run.document.table != table:
         run = save_run(run.with_document(replace(run.document, table=table)))
     journal = run.path / JOURNAL_FILE
@@ -547,7 +551,7 @@ def _is_up_to_date(path: Path, journal: Path) -> bool:
 
 
 def require_judged(run: Run) -> None:
-    """Refuses a run in which grasps that are judged here are open.
+    """Refuses a run in which assigned grasps have no verdict.
 
     Raises:
         SimulationError: there are such grasps.
@@ -555,14 +559,14 @@ def require_judged(run: Run) -> None:
     left = run.left
     if len(left):
         raise SimulationError(
-            f"{len(left)} of {len(run.mine)} grasps have no verdict yet, such as"
+            f"{len(left)} of {len(run.assigned_ids)} grasps have no verdict yet, such as"
             f" {run.candidates.id[left[0]]}; the results so far are kept: run the same command to"
             " continue"
         )
 
 
 def require_scenes_judged(campaign: Campaign) -> None:
-    """Refuses a run over many scenes in which scenes are open; those that failed are not.
+    """Refuses a run over many scenes with unfinished scenes; failed scenes count as finished.
 
     Raises:
         SimulationError: there are such scenes.

@@ -44,14 +44,16 @@ STAGE_REMEDIES = {
     Stage.PLANNED: ARM_REMEDY,
     Stage.EXECUTED: "the table of results has the reason of each",
 }
-"""What would help, by the stage that stopped most grasps."""
+"""Advice by the stage that rejected most grasps."""
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
-    """A sentence for each usual mistake that given grasps show, for each instance with fewer grasps
-    than asked, or for those that no grasps were given for, and, once all of its grasps are judged,
-    for each object of which nothing could be executed, or that has too few lifted or failing ones
-    for a run that is to be balanced."""
+    """Notes on a run, one sentence each.
+
+    They name usual mistakes in given grasps, instances with fewer grasps than asked for or with
+    none given and, once its grasps are judged, each object without executed grasps, or with too few
+    lifted or failing grasps for a balanced run.
+    """
     grasps = run.document.grasps
     missing = ""
     if grasps.per_object is None:
@@ -67,13 +69,13 @@ def run_notes(run: Run) -> tuple[str, ...]:
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:
-    """Which of the objects have no given grasp; "" if all have some."""
+    """Note on the objects without given grasps; "" if there are none."""
     missing = sorted({*objects} - {*given})
     return f"there are no grasps to judge for {list_names(missing)}" if missing else ""
 
 
 def run_shortfall_notes(run: Run) -> list[str]:
-    """A sentence for each instance with fewer grasps than were to be sampled."""
+    """Notes on instances with fewer sampled grasps than asked for."""
     asked = run.document.grasps.per_object
     if asked is None:
         return []
@@ -114,7 +116,7 @@ def _remedy(stage: Stage, *, given: bool) -> str:
 
 
 def _motion_remedy(outcome: Outcome, motion: GraspMotion) -> str:
-    """Another motion of the hand that may avoid an outcome; "" if there is none."""
+    """Change of the hand's motion that may avoid an outcome; "" if there is none."""
     lift_outcomes = (Outcome.HAND_COLLISION_LIFT, Outcome.LIFT_LINE)
     retreat_outcomes = (Outcome.HAND_COLLISION_RETREAT, Outcome.RETREAT_LINE)
     motions = []
@@ -136,10 +138,10 @@ def unclear_notes(
     *,
     given: bool = False,
 ) -> tuple[str, ...]:
-    """A sentence for each object whose grasps all end because the open hand collides.
+    """Notes on objects at all of whose grasps the open hand collides.
 
     Args:
-        objects, outcomes, blockers: (N,) of each grasp.
+        objects, outcomes, blockers: (N,) object, outcome and blocker of each grasp.
         given: whether the grasps are the user's own.
     """
     clear = ~np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.CLEAR])
@@ -158,12 +160,13 @@ def unmoved_notes(
     blockers: NDArray[np.str_],
     motion: GraspMotion,
 ) -> tuple[str, ...]:
-    """A sentence for each object of which the arm can execute no grasp, where that is most often
-    because of the lift or the retreat, and another motion of the hand may help.
+    """Notes on objects without reachable grasps for which another motion of the hand may help.
+
+    That is the case if most of their grasps fail at the lift or the retreat.
 
     Args:
-        objects, outcomes, blockers: (N,) of each grasp.
-        motion: that was asked for.
+        objects, outcomes, blockers: (N,) object, outcome and blocker of each grasp.
+        motion: motion of the hand.
     """
     notes = []
     for name in dict.fromkeys(objects.tolist()):
@@ -179,7 +182,7 @@ def unmoved_notes(
 def _none_note(
     name: str, achievement: str, outcomes: NDArray[np.str_], blockers: NDArray[np.str_], remedy: str
 ) -> str:
-    """That none of an object's grasps achieves something, with the most frequent causes."""
+    """Note that none of an object's grasps gets that far, with the most frequent causes."""
     count = len(outcomes)
     named = _frequent_causes(outcomes, blockers)
     parts = [f"{_cause_words(Outcome(what), body)} in {n:,}" for (what, body), n in named]
@@ -202,7 +205,7 @@ def _most_frequent_outcome(outcomes: NDArray[np.str_], blockers: NDArray[np.str_
 
 
 def _cause_words(outcome: Outcome, blocker: str) -> str:
-    # Bodies that the open hand hits, in words.
+    # Words for the bodies that the open hand hits.
     bodies = {Outcome.COLLISION_TARGET: TARGET_WORDS, Outcome.COLLISION_TABLE: TABLE_WORDS}
     if outcome.stage is Stage.CLEAR:
         return f"the open hand hits {bodies.get(outcome, blocker)}"
@@ -210,8 +213,10 @@ def _cause_words(outcome: Outcome, blocker: str) -> str:
 
 
 def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
-    """Numbers of lifted and of failing grasps by object, among the judged grasps that the run
-    counts; see `EvaluationSettings.balanced_among`."""
+    """Numbers of lifted and of failing grasps by object.
+
+    Only counts the grasps of `EvaluationSettings.balanced_among`.
+    """
     rows, grasps = run.rows(), run.document.grasps
     stages, objects, outcomes = map(rows.codes, ("stage", "object", "outcome"))
     among = [stage.value for stage in DECIDED_STAGES[grasps.balanced_among]]
@@ -223,8 +228,10 @@ def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
 
 
 def _balance_notes(run: Run) -> list[str]:
-    """Once all grasps are judged, a sentence for each object with fewer lifted or failing grasps
-    than asked for, or that there is none."""
+    """Notes on a balanced run that is complete.
+
+    They name objects with fewer lifted or failing grasps than asked for, or say there are none.
+    """
     grasps = run.document.grasps
     if not grasps.until_balanced or not run.complete:
         return []
@@ -246,7 +253,7 @@ def _balance_notes(run: Run) -> list[str]:
 
 
 def summarize(run: Run | Campaign) -> Summary:
-    """Counts what a run, of one scene or of many, has found so far."""
+    """Summarizes the verdicts so far of a run, of one scene or of many."""
     document = run.document
     stages = STAGES_BY_MODE[document.mode]
     approached = document.mode == "arm" or bool(document.trial.get("approach"))
@@ -260,7 +267,7 @@ def summarize(run: Run | Campaign) -> Summary:
     ]
     table = run.rows(names)
     judges = table.codes("judged_again")
-    # parts of earlier releases lack the column: -1 is the last one, which is no text
+    # parts of earlier releases lack the column: code -1 selects the appended False
     settled = np.array([*(name != "" for name in judges.names), False], dtype=bool)[judges.codes]
     confidence = table.column("confidence")
     rows = _CodedRows(
@@ -294,12 +301,14 @@ def _asked_objects(run: Run | Campaign) -> Iterable[str]:
     if isinstance(run, Run):
         return run.document.grasps.objects
     only = run.document.grasps.only
-    entries = run.document.mine
-    return dict.fromkeys(object for entry in entries for object in entry.chosen(only).values())
+    entries = run.document.assigned_scenes
+    return dict.fromkeys(
+        object for entry in entries for object in entry.selected_instances(only).values()
+    )
 
 
 def _sampling_cost(run: Run | Campaign) -> list[StageCost]:
-    """CPU time of the sampling; none where grasps were given."""
+    """CPU time of the sampling; empty if grasps were given."""
     if isinstance(run, Run):
         grasps = run.document.grasps
         known = grasps.origin == "sampled" and grasps.count > 0
@@ -314,10 +323,10 @@ def _sampling_cost(run: Run | Campaign) -> list[StageCost]:
 
 @dataclass(frozen=True, eq=False)
 class _CodedRows:
-    """N judged grasps.
+    """Verdicts of N grasps as arrays.
 
     Attributes:
-        outcome, stage: (N,) places in `Outcome` and `Stage`.
+        outcome, stage: (N,) indices in `Outcome` and `Stage`.
         contested, settled: (N,) see `OutcomeCounts`.
     """
 
@@ -332,7 +341,7 @@ class _CodedRows:
         return total
 
     def count_groups(self, keys: NDArray[Any], names: Sequence[str]) -> list[OutcomeCounts]:
-        """Counts by group; `keys` (N,) are places in the names of the groups."""
+        """Counts by group; `keys` (N,) are indices in the names of the groups."""
         outcomes, stages = tuple(Outcome), tuple(Stage)
         shape = (len(names), len(outcomes), len(stages))
         flat = (keys.astype(np.int64) * shape[1] + self.outcome) * shape[2] + self.stage
@@ -359,7 +368,7 @@ class _CodedRows:
 
 
 def _campaign_notes(campaign: Campaign) -> tuple[str, ...]:
-    max_listed = 5  # Scenes with too few grasps that are listed with what is missing.
+    max_listed = 5  # Scenes with too few grasps that are listed with their notes.
     states, notes = campaign.states, [*campaign.document.hints]
     if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
         notes.append(f"{len(empty)} scenes have no grasps to judge: {list_names(empty)}")

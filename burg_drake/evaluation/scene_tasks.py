@@ -1,4 +1,4 @@
-"""Work on one scene of a run over many: prepared and finished in other processes, judged here."""
+"""Work on single scenes of a run over many: preparing, recording verdicts, writing results."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ class SceneJudging:
     """A scene that is being judged.
 
     Attributes:
-        name: in the run.
-        left: grasps that had no verdict when it was opened.
-        mine: how many grasps are judged here.
-        known: how many of them had one.
+        name: name of the scene in the run.
+        left: grasps to judge when the scene was opened.
+        assigned_count: number of grasps assigned to this run (or shard).
+        known_count: number of assigned grasps that need not be judged.
     """
 
     def __init__(self, name: str, folder: Path, request: RunRequest, workers: int) -> None:
-        """Opens the run.
+        """Opens the run of the scene.
 
         Raises:
             InvalidInputError: another process is writing it.
@@ -71,8 +71,8 @@ class SceneJudging:
         run, index = self._run, self._run.index
         left = open_rows(run, retry_failed=request.retry_failed)
         self.left: Sequence[Candidate] = run.candidates.at(left)
-        self.mine = len(run.mine)
-        self.known = self.mine - len(left)
+        self.assigned_count = len(run.assigned_ids)
+        self.known_count = self.assigned_count - len(left)
         self._before = int(index.judged.sum())
         failed = np.setdiff1d(np.flatnonzero(index.failed), left).tolist()
         ids = run.candidates.id
@@ -85,17 +85,17 @@ class SceneJudging:
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is left."""
+        """Whether all grasps are judged."""
         return self._judged == len(self.left)
 
     def begin(self) -> None:
-        """Writes into the run's document that it is worked on."""
+        """Records in the run's document that a session begins."""
         self._session = begin_session(self._workers, self._before)
         self._begun = time.monotonic()
         self._save(self._session)
 
     def add_verdict(self, id: str, verdict: Verdict) -> None:
-        """Keeps a verdict."""
+        """Writes a verdict to the journal."""
         assert self._journal is not None
         self._journal.append(id, verdict)
         self._judged += 1
@@ -103,11 +103,11 @@ class SceneJudging:
             self._failed[id] = verdict.interrupted
 
     def is_part_due(self) -> bool:
-        """Whether so many were judged again that their rows should go to a part."""
+        """Whether enough grasps were judged since the last part to write another."""
         return self._judged % PART_ROWS == 0
 
     def close(self) -> None:
-        """Writes into the run's document what was done, and closes the journal."""
+        """Records the finished session in the run's document, and closes the journal."""
         if self._journal is None:
             return
         self._journal.close()
@@ -116,7 +116,7 @@ class SceneJudging:
             self._save(self._session.finish(self._judged, self._begun))
 
     def state(self, state: Literal["open", "done"]) -> SceneState:
-        """How far it is."""
+        """Progress to record for the scene; closes it if `done`."""
         document = self._run.document
         if state == "done":
             self.close()
@@ -126,7 +126,7 @@ class SceneJudging:
             state=state,
             run=document.hash,
             grasps=self._count,
-            mine=self.mine,
+            mine=self.assigned_count,
             sampling=document.grasps.cpu,
             size=journal.stat().st_size if state == "done" else 0,
             failed=len(self._failed) if state == "done" else 0,
@@ -139,7 +139,7 @@ class SceneJudging:
 
 
 def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
-    """Whether a run's journal has this size, and its table is not older, nor its report."""
+    """Whether a run's journal has this size, and table and (if wanted) report are up to date."""
     names = [f"results.{table}", *([REPORT_FILE] if report else [])]
     try:
         journal = (folder / JOURNAL_FILE).stat()
@@ -152,12 +152,12 @@ def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class PrepareTask:
-    """A scene whose run is to be begun, or gone on with.
+    """A scene whose run is to be begun or continued.
 
     Attributes:
-        name: of the scene in the run.
-        folder: of its run.
-        scene: as loaded, or its file.
+        name: name of the scene in the run.
+        folder: folder of its run.
+        scene: the loaded scene, or its file.
     """
 
     name: str
@@ -167,11 +167,11 @@ class PrepareTask:
 
 @dataclass(frozen=True)
 class FinishTask:
-    """A scene that is judged, or so far that its rows go to a part.
+    """A scene whose new rows are to be written to a part.
 
     Attributes:
-        name: of the scene in the run.
-        judged: whether all that is judged here is; then table and report are written, too.
+        name: name of the scene in the run.
+        judged: whether all assigned grasps are judged; then table and report are written, too.
     """
 
     name: str
@@ -180,19 +180,19 @@ class FinishTask:
 
 @dataclass(frozen=True, eq=False)
 class Preparer:
-    """Prepares scenes.
+    """Prepares the runs of scenes.
 
     Attributes:
-        request: what is asked.
+        request: the request for all scenes.
     """
 
     request: RunRequest
 
     def __call__(self, work: PrepareTask) -> Scene | None:
-        """Makes the folder of a scene's run; returns the scene, or None if there are no grasps.
+        """Creates or reopens the run of a scene; returns the scene, or None without grasps.
 
         Raises:
-            BurgError: it cannot be judged.
+            BurgError: the scene cannot be judged.
         """
         try:
             return self._prepare(work)
@@ -216,7 +216,7 @@ class Preparer:
 
 @dataclass(frozen=True)
 class SceneOutputs:
-    """What is kept of the scenes.
+    """Outputs to write for each scene.
 
     Attributes:
         campaign: the run over many scenes.
@@ -230,21 +230,21 @@ class SceneOutputs:
 
 
 class SceneResultsWriter:
-    """Writes what comes of scenes: tables, reports, parts."""
+    """Writes tables, reports and parts of scenes."""
 
     def __init__(self, outputs: SceneOutputs) -> None:
         self._outputs = outputs
         self._writer: PartWriter | None = None
 
     def __call__(self, work: FinishTask | None) -> None:
-        """Writes what a scene is for, or closes the parts if None.
+        """Writes the outputs of a scene, or closes the parts if None.
 
         Raises:
             BurgError: a file cannot be written.
         """
         if work is None:
-            if self.writer.scenes_behind():
-                self.writer.catch_up()
+            if self.writer.scenes_with_new_rows():
+                self.writer.add_new_rows()
             self.writer.close()
             return
         run = load_run(self._outputs.campaign.folder(work.name))
@@ -254,40 +254,41 @@ class SceneResultsWriter:
 
     @property
     def writer(self) -> PartWriter:
-        """Opened when it is needed, as it looks at all parts."""
+        """Writer of the parts, opened on first use as it reads all parts."""
         if self._writer is None:
             self._writer = PartWriter(self._outputs.campaign)
         return self._writer
 
 
 def preparer_count(workers: int) -> int:
-    """How many processes prepare scenes. A cluster may have no workers yet."""
-    # one for 16 workers, as sampling takes about a thirtieth of the time of the trials
+    """Number of processes that prepare scenes."""
+    # One for 16 workers, as sampling takes about a thirtieth of the time of the trials. At least
+    # one, as a cluster may have no workers yet.
     return max(1, -(-workers // 16))
 
 
 class SceneProcesses:
-    """What is done about scenes but judging; a context that ends its processes."""
+    """Processes that prepare scenes and write their outputs; a context that ends them."""
 
     def __init__(self, preparer: Preparer, outputs: SceneOutputs, workers: int) -> None:
-        """Starts nothing yet.
+        """Sets up the pools; processes start when there is work.
 
         Args:
             preparer: prepares scenes.
-            outputs: what is kept of them.
-            workers: that judge.
+            outputs: outputs to write for each scene.
+            workers: number of workers that judge.
         """
         self._pools: list[WorkerPool] = []
-        self._preparer, self._preparers = preparer, self._pool(preparer_count(workers))
-        self._finisher = self._pool(1)
+        self._preparer, self._preparers = preparer, self._add_pool(preparer_count(workers))
+        self._finisher = self._add_pool(1)
         self._finishing: deque[tuple[FinishTask | None, WorkerFuture[None]]] = deque()
         self._session = Session("finish", partial(SceneResultsWriter, outputs))
-        self._here = SceneResultsWriter(outputs)
+        self._local_writer = SceneResultsWriter(outputs)
         self._used = False
         self._failed: list[FinishTask | None] = []
 
     def prepare(self, work: Iterable[PrepareTask]) -> None:
-        """Says which scenes are to be prepared, in order."""
+        """Starts preparing scenes, in the given order."""
         session = Session("prepare", partial(Preparer, self._preparer.request))
         self._ahead: Prefetcher[PrepareTask, Scene | None] = Prefetcher(
             self._preparers,
@@ -296,35 +297,38 @@ class SceneProcesses:
         )
 
     def ready(self) -> bool:
-        """Whether `prepared` returns at once."""
+        """Whether `next_prepared` returns at once."""
         return self._ahead.ready()
 
-    def prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
-        """The next scene whose run has been begun, or why it cannot be; without grasps its result
-        is None. None when there are no more scenes."""
+    def next_prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
+        """Waits for the next prepared scene; None if there are no more.
+
+        Returns:
+            Its task and the scene, an error if it cannot be judged, or None if it has no grasps.
+        """
         return self._ahead.take()
 
     def finish(self, name: str) -> None:
-        """Has table, report and rows of a judged scene written."""
-        self._give(FinishTask(name))
+        """Starts writing table, report and rows of a judged scene."""
+        self._add_task(FinishTask(name))
 
     def write_rows(self, name: str) -> None:
-        """Has rows of a scene written that is being judged."""
-        self._give(FinishTask(name, judged=False))
+        """Starts writing the new rows of a scene that is being judged."""
+        self._add_task(FinishTask(name, judged=False))
 
     def close(self) -> None:
-        """Waits until all is written.
+        """Waits until all outputs are written.
 
         Raises:
-            BurgError: something cannot be written.
+            BurgError: an output cannot be written.
         """
         if self._used:
             self._submit(None)
             self._collect_finished(wait=True)
         for work in self._failed or (() if self._used else (None,)):
-            self._here(work)  # where it fails again it is an error
+            self._local_writer(work)  # raises if it fails again
         if self._failed:
-            self._here(None)
+            self._local_writer(None)
 
     def __enter__(self) -> SceneProcesses:
         return self
@@ -333,11 +337,11 @@ class SceneProcesses:
         for pool in self._pools:
             pool.kill_workers()
 
-    def _pool(self, workers: int) -> WorkerPool:
+    def _add_pool(self, workers: int) -> WorkerPool:
         self._pools.append(WorkerPool(workers, retries=0, own_group=True))
         return self._pools[-1]
 
-    def _give(self, work: FinishTask) -> None:
+    def _add_task(self, work: FinishTask) -> None:
         self._used = True
         self._submit(work)
         self._collect_finished(wait=False)
@@ -347,7 +351,7 @@ class SceneProcesses:
         self._finishing.append((work, self._finisher.submit_task(task)))
 
     def _collect_finished(self, wait: bool) -> None:
-        """Notes what could not be written, of what is finished, or of all when that is."""
+        """Collects failures of finished writing tasks; of all tasks if `wait`."""
         while self._finishing and (wait or self._finishing[0][1].done()):
             work, future = self._finishing.popleft()
             if future.exception() is not None:

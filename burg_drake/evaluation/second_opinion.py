@@ -1,4 +1,4 @@
-"""Judges contested grasps of a run again with another engine, whose verdicts then count."""
+"""Judges contested grasps of a run again with another engine, whose verdicts replace the old."""
 
 from __future__ import annotations
 
@@ -84,12 +84,11 @@ def judge_again(
     workers: int | None = None,
     progress: bool | Listener = True,
 ) -> Run | Campaign:
-    """Has another engine execute the contested grasps of a run, and settle their verdicts.
+    """Executes the contested grasps of a run with another engine, which settles their verdicts.
 
-    The new verdict takes the place of the old one in the table and in all counts; the columns
-    `judged_again` and `outcome_before` say so. What the stages before the trial found stays as it
-    is. A grasp that was judged again is not contested any more. An interrupted call goes on where
-    it was.
+    The new verdict replaces the old one in the table and in all counts; the columns `judged_again`
+    and `outcome_before` record this. Results of the stages before the trial are kept. A grasp that
+    was judged again no longer counts as contested. The same call continues an interrupted one.
 
     Example::
 
@@ -97,21 +96,22 @@ def judge_again(
         changed = run.results["outcome"] != run.results["outcome_before"]
 
     Args:
-        run: of one scene or of many, complete; or its folder. Scenes of a run over many that could
-            not be judged are left out.
-        engine: name of a preset, not the run's own.
-        executor: who judges, in place of so many processes of this machine.
-        workers: number of processes; as many as there are processors if None.
+        run: a complete run of one scene or of many, or its folder. Scenes of a run over many that
+            could not be judged are left out.
+        engine: name of a preset other than the run's.
+        executor: executor that judges, instead of `workers` processes of this machine.
+        workers: number of processes; one per processor if None.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
         The run with the new verdicts. Grasps that the engine cannot simulate keep their old one.
 
     Raises:
-        InvalidInputError: the run is not complete, the engine is its own or cannot have the arm or
-            an object, documents have changed since, or another process is writing the folder.
-        UnknownNameError: no such engine.
-        MissingDependencyError: it is not installed.
+        InvalidInputError: the run is not complete, the engine is the run's own or does not support
+            the arm or an object, documents have changed since the run, or another process is
+            writing the folder.
+        UnknownNameError: there is no such engine.
+        MissingDependencyError: the engine is not installed.
         SimulationError: the worker processes die.
     """
     found = run if isinstance(run, (Run, Campaign)) else open_results(run)
@@ -134,10 +134,10 @@ def judge_again(
 
 
 def _require_complete(found: Run | Campaign) -> None:
-    """Refuses a run in which grasps are open, or scenes that can be judged.
+    """Refuses a run with open grasps, or with open scenes.
 
     Raises:
-        InvalidInputError: there are such.
+        InvalidInputError: the run has open grasps or scenes.
     """
     if isinstance(found, Run):
         complete, which = found.complete, ""
@@ -152,18 +152,18 @@ def _require_complete(found: Run | Campaign) -> None:
 
 
 def require_second_engine(engine: str, first: Engine, mode: Mode) -> None:
-    """Refuses an engine whose opinion of the verdicts of another one is worth nothing.
+    """Refuses an engine that is not independent of the run's engine or finer than it.
 
     Args:
         engine: name of a preset.
-        first: the engine of the run.
-        mode: of the run.
+        first: engine of the run.
+        mode: mode of the run.
 
     Raises:
-        UnknownNameError: no such preset.
-        InvalidInputError: it is the first one, or the same simulator with longer steps, or cannot
-            run trials of the mode.
-        MissingDependencyError: it is not installed.
+        UnknownNameError: there is no such preset.
+        InvalidInputError: the engine is the first one, has the same simulator with longer steps, or
+            cannot run trials of the mode.
+        MissingDependencyError: the engine is not installed.
     """
     if engine not in ENGINES:
         raise UnknownNameError(
@@ -187,7 +187,7 @@ def _is_finer(second: Engine, first: Engine) -> bool:
 def _judge_scenes(
     campaign: Campaign, engine: str, executor: Executor, reporter: Reporter
 ) -> Campaign:
-    """Judges again what is contested in each scene, and writes what is made of the verdicts."""
+    """Judges the contested grasps of each scene again, and updates tables, reports and parts."""
     with WriterLock(campaign.path / CAMPAIGN_LOCK_FILE):
         document, ledger = campaign.document, SceneStates(campaign.path)
         done = {name for name, state in ledger.states.items() if state.state == "done"}
@@ -227,13 +227,13 @@ def _judge_contested(
     reporter: Reporter,
     finish: Callable[[Run], None],
 ) -> int:
-    """Judges the contested grasps of runs again; how many have a new verdict.
+    """Judges the contested grasps of runs again; returns the number of new verdicts.
 
     Args:
-        runs: are opened when workers have nothing else to do.
-        count: of contested grasps, for the progress.
+        runs: the runs, opened when workers run out of work.
+        count: number of contested grasps, for the progress.
         engine, executor, reporter: see `judge_again`.
-        finish: is given each run with all of its verdicts, once.
+        finish: called once for each run, when all of its verdicts are written.
     """
     opened: dict[str, _ContestedRun] = {}
     pace = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
@@ -252,7 +252,7 @@ def _judge_contested(
         with closing(executor.judge(jobs())) as verdicts:
             for job, candidate, verdict in verdicts:
                 settling = opened[job.key]
-                judged += settling.keep_answer(candidate, verdict)
+                judged += settling.write_answer(candidate, verdict)
                 pace.step(outcome=verdict.outcome)
                 if not settling.open:
                     finish(opened.pop(job.key).close())
@@ -263,18 +263,19 @@ def _judge_contested(
 
 
 class _ContestedRun:
-    """A run while its contested grasps are judged again.
+    """A run whose contested grasps are being judged again.
 
     Attributes:
         left: grasps that are judged again.
-        open: how many of them have no answer yet.
+        open: number of these without an answer so far.
     """
 
     def __init__(self, run: Run, engine: str, workers: int) -> None:
         """Opens the journal.
 
         Raises:
-            InvalidInputError: another process is writing it, or the engine cannot have an object.
+            InvalidInputError: another process is writing it, or the engine does not support an
+                object.
         """
         self._journal = Journal(run.path / JOURNAL_FILE)
         self._run, self._engine = run, engine
@@ -291,7 +292,7 @@ class _ContestedRun:
 
     @property
     def job(self) -> Job:
-        """What is to be judged."""
+        """Job with the grasps that are judged again."""
         run = self._run
         mode: Mode = "arm" if run.document.mode == "arm" else "hand"
         settings = origin_of(run.document).settings()
@@ -299,8 +300,8 @@ class _ContestedRun:
         factory = StationJudgeFactory(run.scene(), run.station(), engine, mode, settings)
         return Job(str(run.path), factory, self.left)
 
-    def keep_answer(self, candidate: Candidate, verdict: Verdict) -> bool:
-        """Keeps an answer; whether it settles the grasp."""
+    def write_answer(self, candidate: Candidate, verdict: Verdict) -> bool:
+        """Writes an answer to the journal; returns False if the simulation failed."""
         self.open -= 1
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             return False
@@ -310,7 +311,7 @@ class _ContestedRun:
         return True
 
     def close(self) -> Run:
-        """Writes into the run's document what was done, and closes the journal."""
+        """Records the session in the run's document, and closes the journal."""
         self._journal.close()
         document = self._run.document
         if not self.left:
@@ -322,18 +323,18 @@ class _ContestedRun:
 def _add_second_session(
     document: OneRunDocument, session: WorkSession, engine: str
 ) -> OneRunDocument:
-    """A run's document with a session, and the versions of the engine of that session."""
+    """Document of a run with one more session and the versions of that session's engine."""
     versions = software_versions(ENGINES[engine].packages) | document.versions
     return replace(add_session(document, session), versions=versions)
 
 
 def settle_verdict(before: Verdict, verdict: Verdict, engine: str) -> Verdict:
-    """A verdict in the place of another one.
+    """Verdict of another engine, with the old verdict's results of the stages before the trial.
 
     Args:
-        before: of the run's own engine.
-        verdict: of a trial by another engine.
-        engine: the name of that.
+        before: verdict of the run's own engine.
+        verdict: verdict of a trial by another engine.
+        engine: name of the other engine.
     """
     cpu = {
         stage: before.cpu.get(stage, 0.0) + verdict.cpu.get(stage, 0.0)

@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 TableFormat = Literal["csv", "parquet"]
 
 DEFAULT_APPROACH_ANGLE_DEG = 75.0
-"""Keeps the hand above the horizontal, and leaves out pairs of an object's bottom and top for
-friction up to tan(15 deg) = 0.27: one of the two fingers would be below the table."""
+"""Keeps the hand above the horizontal. For friction up to tan(15 deg) = 0.27 it also excludes
+contacts on bottom and top of an object, for which one finger would be below the table."""
 
 SLIPPERY_FRICTION_FACTOR = 4.0
-"""Slippery grasps need up to so many times the friction that there is. On the objects of
-`tabletop_six` two thirds of them fail in simulation, where a tenth of ordinary ones do; with 2 a
-sixth fails, and none on two of the objects."""
+"""Slippery grasps need up to this many times the available friction. On the objects of
+`tabletop_six` two thirds of them fail in simulation, compared to a tenth of ordinary grasps; with a
+factor of 2 a sixth fails, and none on two of the objects."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingSettings:
-    """How grasps are sampled on each object; more on these in `grasping.antipodal_sampling`.
+    """Settings of the grasp sampling on each object; details in `grasping.antipodal_sampling`.
 
     Example::
 
@@ -48,27 +48,26 @@ class SamplingSettings:
         burg.sample_grasps("tabletop_six", "panda_tabletop", 20, settings=wide)
 
     Attributes:
-        friction: coefficient; the object's own if None.
-        approaches: approach angles for each pair of contacts.
+        friction: friction coefficient; the object's if None.
+        approaches: number of approach angles for each pair of contacts.
         approach_angle_deg: in a scene, largest angle between the approach and straight down, above
-            0 to 180; with 180 the hand comes from anywhere. `DEFAULT_APPROACH_ANGLE_DEG` if None.
-        from_arm_side: in a scene, the approach has no part that points back to the arm: its inner
-            product with the horizontal direction from the arm's base to the middle of the object
-            is not negative.
-        standoffs: distances between G and the contacts that every pose is given with [m].
+            0 and at most 180, which allows all directions. `DEFAULT_APPROACH_ANGLE_DEG` if None.
+        from_arm_side: in a scene, exclude approaches that point back to the arm: the inner product
+            with the horizontal direction from the arm's base to the middle of the object must not
+            be negative.
+        standoffs: distances between G and the contacts; every pose is returned for each [m].
         weights: density of contacts on the faces (F,) of `ObjectLibrary.surface`, by object.
-        blind: know only points of contact, not the hand, as published samplers do. Otherwise the
-            open hand overlaps nothing at the grasps, in a scene neither the object nor anything
-            else, in a library not the object; and its pads, all that they meet of the object,
-            touch it within the friction cones.
-        margin: unless `blind`, least signed clearance that a grasp has to have [m].
-        conservative: unless `blind`, the screen's mode of that name: faster, but it leaves out a
+        blind: only consider contact points, not the hand, as published samplers do. Otherwise the
+            open hand overlaps neither the object nor, in a scene, anything else at the grasps, and
+            the pads touch the object within the friction cones wherever they meet it.
+        margin: unless `blind`, smallest signed clearance of a grasp [m].
+        conservative: unless `blind`, the screen's mode of that name, which is faster but excludes a
             tenth of the clear grasps.
-        diverse: of this many times n grasps the most diverse n are kept.
-        slippery: only grasps that the friction does not hold at both points of contact: they need
-            more than there is, up to `SLIPPERY_FRICTION_FACTOR` times as much, and their scores are
-            below 0. Many of them fail in simulation. There are fewer than n, as some of the n that
-            are sampled need less.
+        diverse: sample this many times n grasps, and keep the n most diverse.
+        slippery: only grasps that friction does not hold at both contacts: they need more than the
+            available friction, up to `SLIPPERY_FRICTION_FACTOR` times as much, and their scores are
+            below 0. Many of them fail in simulation. Fewer than n are returned, as some of the n
+            sampled grasps need less.
     """
 
     friction: float | None = setting(
@@ -115,11 +114,11 @@ Shared = TypeVar("Shared")
 
 @dataclass(frozen=True)
 class Shard:
-    """One of several shares.
+    """A shard `K/N`: one of N shares of the work.
 
     Attributes:
-        number: of this one, from 1.
-        count: how many there are.
+        number: number of this shard, from 1.
+        count: number of shards.
     """
 
     number: int
@@ -137,7 +136,7 @@ class Shard:
         """Reads `K/N`.
 
         Raises:
-            InvalidInputError: it is something else.
+            InvalidInputError: the text is not a shard.
         """
         found = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text)
         if found is None:
@@ -148,34 +147,33 @@ class Shard:
         return f"{self.number}/{self.count}"
 
     def has(self, place: int) -> bool:
-        """Whether what has this place, from 0, is in it."""
+        """Whether the item with this index, from 0, belongs to the shard."""
         return place % self.count == self.number - 1
 
     def divides_scenes(self, scenes: int) -> bool:
-        """Whether scenes are shared out as wholes, as they are if there are enough; otherwise the
-        grasps of each."""
+        """Whether the shards divide scenes, as they do if there are enough; else their grasps."""
         return scenes >= self.count
 
 
 def as_shard(shard: Shard | str | None) -> Shard | None:
-    """A shard, or what `K/N` says; none if there are no others.
+    """Converts `K/N` to a shard; None for `1/1`, which is all of the work.
 
     Raises:
-        InvalidInputError: it does not exist.
+        InvalidInputError: there is no such shard.
     """
     found = Shard.parse(shard) if isinstance(shard, str) else shard
     return None if found is None or found.count == 1 else found
 
 
 def select_share(items: Sequence[Shared], shard: Shard | str | None) -> Sequence[Shared]:
-    """What of some items is in a shard; all of them without one."""
+    """Selects the items of a shard; all items without one."""
     found = as_shard(shard or None)
     return items if found is None else items[found.number - 1 :: found.count]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationSettings:
-    """Which grasps are judged, and how.
+    """Settings of `evaluate`: selection of grasps, mode, engine, limits and outputs.
 
     Example::
 
@@ -183,40 +181,42 @@ class EvaluationSettings:
         burg.evaluate("tabletop_six", "panda_tabletop", "runs/mug", settings=settings)
 
     Attributes:
-        grasps_per_object: antipodal grasps to sample for each free instance, unless grasps are
-            given; the same ones as those of `sample_grasps` with these settings. Of an object that
-            has fewer, `Summary.notes` says why.
-        until_balanced: go on sampling until so many grasps of each object are lifted, and so many
-            are not: first the grasps of a longer sampling with the same seed, then, where failures
-            are missing, slippery ones (see `SamplingSettings`). `Summary.notes` says what is still
-            missing. Of one scene only. None samples `grasps_per_object` alone.
-        balanced_among: which grasps count for that, as in `trials.SelectionSettings`.
-        max_grasps_per_object: with `until_balanced`, sample no more for each free instance.
+        grasps_per_object: number of antipodal grasps to sample for each free instance, unless
+            grasps are given; `sample_grasps` returns the same grasps for these settings. If an
+            object gets fewer, `Summary.notes` says why.
+        until_balanced: sample until this many grasps of each object are lifted, and as many are
+            not: first more grasps with the same seed, then, if failures are missing, slippery
+            grasps (see `SamplingSettings`). `Summary.notes` names objects that still have too few.
+            For one scene only. None samples `grasps_per_object` once.
+        balanced_among: grasps that count for `until_balanced`, as in `trials.SelectionSettings`.
+        max_grasps_per_object: with `until_balanced`, largest number of grasps per free instance.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
-            above 0; 90 is as far as from the side, 180 from anywhere.
+            above 0; 90 includes approaches from the side, 180 all directions.
         blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
             see `SamplingSettings`.
-        only: names of free instances, or of objects for all their instances, to judge grasps of;
-            all if None.
-        mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
-            execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
-            the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
-        engine: how trials are stepped; an engine or the name of a preset.
-        tilt_limit_deg: a target that turns in the hand by more than this since the grip, and is
-            held, ends as `lifted_turned`, above 0; 180 is no limit.
-        slip_limit_mm: likewise of one that slides; infinite is no limit.
-        approach: whether the hand alone begins at the pregrasp and goes straight to the grasp in
-            simulation, too. Otherwise it begins at the grasp, open. The whole arm does so anyway.
-        motion: how the hand goes to a grasp and away from it; as the station says if None.
-        seed: of the sampling.
-        shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
-            fewer every eighth grasp of each. `merge_runs` merges the shares.
+        only: names of free instances, or of objects for all their instances, whose grasps are
+            judged; all if None.
+        mode: `hand`: the hand alone executes clear grasps. `reach`: the same, of grasps that the
+            arm can also execute, with a path, a straight approach and a straight lift. `arm`: the
+            whole arm executes those grasps. None for `reach` if the station has an arm, else
+            `hand`.
+        engine: physics engine of the trials; an engine or the name of a preset.
+        tilt_limit_deg: a held target that turned in the hand by more than this since the grip ends
+            as `lifted_turned`, above 0; 180 for no limit.
+        slip_limit_mm: the same for a target that slid; infinite for no limit.
+        approach: whether trials of the hand alone also simulate the straight approach from the
+            pregrasp. Otherwise they begin with the open hand at the grasp. The whole arm always
+            approaches.
+        motion: approach, retreat and lift of the hand; the station's if None.
+        seed: seed of the sampling.
+        shard: a share of the work, such as `2/8`: every eighth scene, or every eighth grasp of each
+            scene if there are fewer than eight. `merge_runs` merges the shards.
         table: format of the results file.
-        scene_reports: whether each of several scenes gets a report of its own; None if they are at
-            most a hundred, as one takes some tenths of a second. `write_report` makes it later.
+        scene_reports: whether each of several scenes gets its own report; None for at most 100
+            scenes, as one takes some tenths of a second. `write_report` can make it later.
 
     Raises:
-        InvalidInputError: no grasps are asked for, or a limit is not one.
+        InvalidInputError: no grasps are asked for, or a limit is not positive.
     """
 
     grasps_per_object: int = setting(
@@ -311,7 +311,7 @@ class EvaluationSettings:
             )
 
     def _require_no_balance(self) -> None:
-        """Refuses what would have no effect without `until_balanced`."""
+        """Refuses settings that have no effect without `until_balanced`."""
         for name in ("balanced_among", "max_grasps_per_object"):
             if getattr(self, name) != getattr(EvaluationSettings, name):
                 raise InvalidInputError(
@@ -319,7 +319,7 @@ class EvaluationSettings:
                 ).about(name, "until_balanced")
 
     def _require_balance(self) -> None:
-        """Refuses what cannot be had with `until_balanced`."""
+        """Refuses settings that cannot be combined with `until_balanced`."""
         assert self.until_balanced is not None
         if self.until_balanced < 1:
             raise InvalidInputError(f"until_balanced is {self.until_balanced}; give 1 or more")
@@ -343,22 +343,22 @@ class EvaluationSettings:
 
 ROBUSTNESS_TESTS = ("tug", "shake", "friction", "noise")  # Names of the tests.
 LOADED_TESTS = ("tug", "shake")
-"""Those that put loads on a grip, which needs Drake."""
+"""Tests that apply loads to a grip, which needs Drake."""
 DEFAULT_BEST_COUNT = 3
-"""Best grasps of each object that are tested if none are named."""
+"""Number of best grasps of each object that are tested by default."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobustnessSettings:
-    """What is asked about each grasp.
+    """Settings of the robustness tests.
 
     Attributes:
-        tests: some of `ROBUSTNESS_TESTS`.
-        loads: of tug and shake.
-        friction: coefficients that are tried.
+        tests: names of the tests, from `ROBUSTNESS_TESTS`.
+        loads: loads of tug and shake.
+        friction: range of tested friction coefficients.
         noise: standard deviations of the perturbed repeats.
         repeats: number of perturbed repeats.
-        seed: of the perturbations.
+        seed: seed of the perturbations.
     """
 
     tests: tuple[str, ...] = ROBUSTNESS_TESTS
@@ -378,7 +378,7 @@ class RobustnessSettings:
             raise InvalidInputError("give at least one test, and repeats from 1")
 
     def content(self, test: str) -> list[object]:
-        """What decides about the answers of a test."""
+        """JSON values of the settings that determine the answers of a test."""
         if test == "friction":
             return [vars(self.friction)]
         return [vars(self.noise), self.seed] if test == "noise" else [vars(self.loads)]

@@ -24,22 +24,22 @@ from burg_drake.evaluation.settings import select_share
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes:
         path: its folder.
-        kind: `run` of one scene, or `campaign` of many.
-        working: whether a process is at it.
-        judged: grasps that have a verdict.
-        total: of how many; expected, as long as scenes have not been sampled.
+        kind: `run` for one scene, `campaign` for many.
+        working: whether a process is working on it.
+        judged: number of grasps with a verdict.
+        total: number of grasps; an estimate until all scenes are sampled.
         outcomes: number of grasps by outcome.
-        rate: grasps a second: lately, or of the session of work that is under way; None if unknown.
-        left: expected time left [s]; None if unknown.
+        rate: recent grasps per second, or those of the current session; None if unknown.
+        left: expected remaining time [s]; None if unknown.
         last: date of the last verdict, seconds since 1970; None if there is none.
-        shard: share that is judged here, as `K/N`; empty if all.
-        scenes: how many there are, and `done` of them.
-        failed: why scenes could not be judged, by name.
-        under_way: scenes that have been begun and are not done.
+        shard: shard of the run, as `K/N`; empty for all.
+        scenes, done: number of scenes, and of finished scenes.
+        failed: scenes that could not be judged, with the reason of each.
+        under_way: scenes in progress.
     """
 
     path: str
@@ -59,19 +59,19 @@ class Status:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is left to judge."""
+        """Whether all grasps are judged."""
         return self.done + len(self.failed) == self.scenes
 
     def plain(self) -> dict[str, Any]:
-        """As JSON values."""
+        """The status as JSON values."""
         return {**vars(self), "outcomes": dict(self.outcomes), "complete": self.complete}
 
 
 class RunWatch:
-    """Looks at a run again and again."""
+    """Reads the progress of a run repeatedly."""
 
     def __init__(self, path: str | Path) -> None:
-        """Reads what does not change.
+        """Opens the run and counts the verdicts in its parts.
 
         Raises:
             InvalidInputError: there is no run.
@@ -83,15 +83,15 @@ class RunWatch:
         self._history: list[tuple[float, int]] = []
 
     def look(self) -> Status:
-        """How far it is now."""
-        self._result = result = self._reopened()
+        """Reads the current progress."""
+        self._result = result = self._refresh_result()
         if isinstance(result, Campaign):
             return self._look_at_scenes(result)
         document = result.document
         tail = self._refresh_tail("")
         total = len(select_share(range(document.grasps.count), document.shard))
         judged = min(tail.lines, total)
-        status = self._status(
+        status = self._make_status(
             result.path / JOURNAL_FILE, judged, total, tail.outcomes, tail.modified
         )
         under_way = () if judged == total else (document.scene.name,)
@@ -109,7 +109,7 @@ class RunWatch:
         lock = campaign.path / CAMPAIGN_LOCK_FILE
         total = max(judged, campaign.expected)
         return replace(
-            self._status(lock, judged, total, outcomes, last),
+            self._make_status(lock, judged, total, outcomes, last),
             kind="campaign",
             scenes=len(campaign.names),
             done=sum(state.state in ("done", "empty") for state in states.values()),
@@ -117,13 +117,13 @@ class RunWatch:
             under_way=tuple(n for n in begun if states[n].state == "open"),
         )
 
-    def _status(
+    def _make_status(
         self, lock: Path, judged: int, total: int, outcomes: Counter[bytes], last: float
     ) -> Status:
-        """What runs of one scene and of many have in common."""
+        """Status with the fields common to runs of one scene and of many."""
         document = self._result.document
         working = is_locked(lock)
-        rate = self._rate(judged, document.stretches, working)
+        rate = self._judging_rate(judged, document.stretches, working)
         return Status(
             path=str(self._result.path),
             kind="",
@@ -137,12 +137,12 @@ class RunWatch:
             shard=document.shard,
         )
 
-    def _reopened(self) -> Run | Campaign:
-        """The run as it is now; its document is read if it has another date."""
+    def _refresh_result(self) -> Run | Campaign:
+        """The run with its current document, which is read again if its date has changed."""
         path = self._result.path
         date = _document_time(path)
         if date == self._date:
-            return replace(self._result)  # without what it remembers
+            return replace(self._result)  # drops cached properties
         self._date = date
         return open_results(path)
 
@@ -151,10 +151,11 @@ class RunWatch:
         tail.refresh()
         return tail
 
-    def _rate(self, judged: int, sessions: tuple[WorkSession, ...], working: bool) -> float | None:
-        """Grasps a second: of the time in which this was followed, if that is long enough, else
-        of the session that is under way."""
-        window = 60.0  # Seconds over which the rate is taken, once followed for that long.
+    def _judging_rate(
+        self, judged: int, sessions: tuple[WorkSession, ...], working: bool
+    ) -> float | None:
+        """Grasps per second over the last minute, else over the current session."""
+        window = 60.0  # Seconds over which the rate is taken.
         now = time.monotonic()
         self._history.append((now, judged))
         while len(self._history) > 2 and self._history[1][0] < now - window:
@@ -168,14 +169,13 @@ class RunWatch:
 
 
 def _document_time(path: Path) -> tuple[int, ...]:
-    """Of the document of a run."""
+    """Modification times of the run's documents [ns]; 0 for a missing one."""
     files = (path / CAMPAIGN_FILE, path / RUN_FILE)
     return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
 
 
 def _session_rate(session: WorkSession, judged: int) -> float | None:
-    """Grasps a second of a session that is under way; None if it does not say how many were judged
-    when it began."""
+    """Grasps per second of the current session; None if unknown."""
     if session.judged is not None or session.before is None:
         return None
     begun = datetime.fromisoformat(session.started)
@@ -185,7 +185,7 @@ def _session_rate(session: WorkSession, judged: int) -> float | None:
 
 
 def read_status(path: str | Path) -> Status:
-    """How far a run of one scene or of many is.
+    """Reads the progress of a run of one scene or of many.
 
     Raises:
         InvalidInputError: there is no run.

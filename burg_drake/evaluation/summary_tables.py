@@ -55,12 +55,12 @@ class SummaryView:
 
 
 def summary_view(summary: Summary) -> RenderableType:
-    """Stages, outcomes and CPU time as tables; where objects are too many, outcomes as a list."""
+    """Stages, outcomes and CPU time as tables; with many objects, outcomes as a list."""
     return SummaryView(summary)
 
 
 def _stage_table(summary: Summary) -> TextTable:
-    # For a narrow terminal.
+    # Short headings for narrow terminals.
     short_names = {"candidates": "grasps", "reachable": "reach", "planned": "plan"}
     names = summary.steps
     table = TextTable("Grasps that pass each stage").names("object")
@@ -85,7 +85,7 @@ def _stage_table(summary: Summary) -> TextTable:
 
 
 def _step_meanings(mode: Mode) -> dict[str, str]:
-    """What grasps that are counted in a column of the stage table have passed."""
+    """Meaning of each column of the stage table."""
     reach = "the hand comes in and out without a collision"
     if mode != "hand":
         reach += ", and the arm has a posture for the grasp that collides with nothing"
@@ -138,7 +138,7 @@ def _outcome_list(summary: Summary) -> TextTable:
 
 
 def _outcome_meanings(summary: Summary) -> str:
-    """A line for each outcome that occurs; what lifted means is told below the stages."""
+    """Meanings of the outcomes that occur, except `lifted`, which the stage table explains."""
     seen = [outcome for outcome in _occurring_outcomes(summary) if outcome is not Outcome.LIFTED]
     return "\n".join(f"{outcome}: {outcome.meaning}" for outcome in seen)
 

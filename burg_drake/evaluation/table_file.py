@@ -1,4 +1,4 @@
-"""The results table as a file for other tools, CSV or Parquet. Numbers keep every bit."""
+"""Reads and writes results tables as CSV or Parquet files; numbers keep every bit."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ from burg_drake.evaluation.table_parts import require_arrow
 
 T = TypeVar("T", int, float)
 CSV_ROWS = 2048
-"""Rows that become text at a time."""
+"""Rows that are formatted at a time."""
 PARQUET_REMEDY = ", or choose csv"
 
 RUN_METADATA_KEY = b"burg_drake.run"
-"""Parquet files carry the contents of run.yaml as JSON under this key."""
+"""Metadata key of Parquet files for the contents of run.yaml as JSON."""
 
 
 def require_writer(table: str) -> None:
-    """Finds out before any work whether a table format can be written.
+    """Refuses a table format that cannot be written.
 
     Raises:
         InvalidInputError: there is no such format.
@@ -61,10 +61,10 @@ def require_writer(table: str) -> None:
 
 
 def require_table(path: Path) -> None:
-    """Finds out before any work whether a table can be written to a file.
+    """Refuses a file to which no table can be written.
 
     Raises:
-        InvalidInputError: the suffix tells no format, or the place cannot be written to.
+        InvalidInputError: the suffix is not that of a format, or the file cannot be written.
         MissingDependencyError: Parquet without pyarrow.
     """
     if path.suffix not in (".csv", ".parquet"):
@@ -80,21 +80,21 @@ def require_table(path: Path) -> None:
 def write_table(
     path: Path, columns: Columns | ResultRows, metadata: Mapping[str, Any] | None = None
 ) -> None:
-    """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
+    """Writes a table atomically; the suffix (.csv or .parquet) gives the format.
 
-    Beside a CSV file what its columns are goes to a file, see `core.describe_column`.
+    The columns of a CSV file are described in a file beside it, see `core.describe_column`.
 
     Args:
         path: the file.
         columns: equally long arrays by name; rows of a run are written piece by piece.
-        metadata: JSON values that Parquet files carry along; of those of a CSV file the shard is
-            told in the file beside it.
+        metadata: JSON values that are stored in Parquet files; of these, the file beside a CSV file
+            only has the shard.
 
     Raises:
         MissingDependencyError: Parquet without pyarrow.
         InvalidInputError: the file cannot be written.
     """
-    # Of CSV on the Web, by the kind of an array.
+    # Types of CSV on the Web, by the kind of an array.
     datatypes = {"U": "string", "f": "double", "i": "integer", "u": "integer", "O": "integer"}
     pieces = columns.parts() if isinstance(columns, ResultRows) else iter([columns])
     first = next(pieces)
@@ -102,21 +102,21 @@ def write_table(
     if path.suffix == ".parquet":
         atomic_write(path, partial(_write_parquet, pieces, metadata or {}))
     else:
-        meant = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in first.items()}
+        described = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in first.items()}
         shard = (metadata or {}).get("shard")
         note = f"shard {shard}: only these grasps of the run are judged here"
         notes = [{"dc:description": note}] if shard else []
-        description = json.dumps(csv_metadata(path.name, meant, notes), indent=1) + "\n"
+        description = json.dumps(csv_metadata(path.name, described, notes), indent=1) + "\n"
         atomic_write_all({metadata_path(path): description, path: partial(_write_csv, pieces)})
 
 
 def read_table(path: Path) -> Columns:
-    """Reads a file that `write_table` wrote, or rows of one; numbers come back bit for bit.
+    """Reads a file that `write_table` wrote, or some rows of it; numbers keep every bit.
 
-    Columns that others have added are numbers if all their cells are, else texts.
+    Additional columns become numbers if all their cells are numbers, else texts.
 
     Raises:
-        InvalidInputError: the file is missing or something else.
+        InvalidInputError: the file is missing, or not a results table.
         MissingDependencyError: Parquet without pyarrow.
     """
     try:
@@ -141,10 +141,10 @@ def read_table(path: Path) -> Columns:
 
 
 def _read_bounded(path: Path, file: Any) -> Any:
-    """The table of a Parquet file, which can be a thousand times as large as the file.
+    """Reads a Parquet file within size limits: the table may be a thousand times as large.
 
     Raises:
-        InvalidInputError: it is beyond the limits of tables.
+        InvalidInputError: the table exceeds the limits.
     """
     arrow = require_arrow("Parquet", PARQUET_REMEDY)
     cells = file.metadata.num_rows * file.metadata.num_columns
@@ -160,7 +160,7 @@ def _read_bounded(path: Path, file: Any) -> Any:
 
 
 def is_table(path: Path) -> bool:
-    """Whether a file is a table of results, by its name or its first line."""
+    """Whether a file is a results table, by its suffix or its first line."""
     if path.suffix == ".parquet":
         return path.is_file()
     try:
@@ -197,10 +197,10 @@ def _write_csv(pieces: Iterable[Columns], stream: BinaryIO) -> None:
 
 
 def _cells(values: NDArray[Any]) -> list[Any]:
-    """Python values of a column, an empty text for NaN; csv writes floats by repr: lossless.
+    """Values of a column for csv, which writes floats by `repr`, without loss.
 
-    Infinity is `INF`, as XML and with it CSV on the Web have it. Whole numbers with gaps are
-    objects, None in the gaps, which csv leaves empty.
+    NaN becomes an empty text, infinity `INF` as in XML and CSV on the Web. Columns of integers with
+    missing values are object arrays with None, which csv writes as empty cells.
     """
     special = {math.inf: "INF", -math.inf: "-INF"}
     if values.dtype.kind != "f" or np.isfinite(values).all():
@@ -211,7 +211,7 @@ def _cells(values: NDArray[Any]) -> list[Any]:
 def _write_parquet(
     pieces: Iterator[Columns], metadata: Mapping[str, Any], stream: BinaryIO
 ) -> None:
-    """Writes groups of rows, each of a few pieces."""
+    """Writes row groups of a few pieces each."""
     arrow = require_arrow("Parquet", PARQUET_REMEDY)
     writer = None
     while group := [_parquet_table(columns, metadata) for columns in islice(pieces, 4)]:

@@ -1,4 +1,4 @@
-"""Parts of a table as Parquet files, each with the segments of journals that it was made from."""
+"""Parts of a table as Parquet files, each with the journal segments that it was made from."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ if TYPE_CHECKING:
     import pandas
 
 SEGMENT_TAIL = 4096
-"""Bytes at the end of a segment that are compared each time."""
+"""Bytes at the end of a segment that are always compared."""
 
 
 @dataclass(frozen=True)
 class JournalSegment:
-    """Rows of a part that were made of a stretch of a journal.
+    """A range of bytes of a journal from which rows of a part were made.
 
     Attributes:
         scene: name of the journal's scene in the run; empty in a run of one scene.
-        begin, end: bytes of the journal.
-        rows: of the part.
-        whole, last: hashes of these bytes, and of the last of them.
-        modified: date of the journal at that time [ns], if it ended there.
+        begin, end: range of bytes of the journal.
+        rows: number of rows in the part.
+        whole, last: hashes of these bytes, and of the last `SEGMENT_TAIL` of them.
+        modified: date of the journal when the part was made [ns]; 0 if it was longer.
     """
 
     scene: str
@@ -56,7 +56,7 @@ class JournalSegment:
 
 
 def segment_of(scene: str, journal: Path, begin: int, end: int, rows: int) -> JournalSegment:
-    """The segment of bytes that rows have just been made of."""
+    """Segment for a range of bytes from which rows have just been made."""
     with open_regular(journal) as stream:
         status = os.fstat(stream.fileno())
         modified = status.st_mtime_ns if status.st_size == end else 0
@@ -66,7 +66,7 @@ def segment_of(scene: str, journal: Path, begin: int, end: int, rows: int) -> Jo
 
 
 def valid_segments(segments: Sequence[JournalSegment], journal: Path) -> list[JournalSegment]:
-    """Segments that follow on each other from the beginning of a journal, as far as they hold."""
+    """Consecutive segments from the beginning of a journal that still match its contents."""
     try:
         with open_regular(journal) as stream:
             return _follow_segments(segments, stream)
@@ -90,7 +90,7 @@ def _follow_segments(segments: Sequence[JournalSegment], stream: BinaryIO) -> li
 
 
 def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bool) -> bool:
-    """Whether a journal still has the bytes that a segment is made of."""
+    """Whether a journal still has the bytes of a segment; checks only its end if `untouched`."""
     if untouched:
         begin = max(segment.begin, segment.end - SEGMENT_TAIL)
         return _stream_hash(stream, begin, segment.end) == segment.last
@@ -98,7 +98,7 @@ def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bo
 
 
 def whole_lines(journal: Path) -> int:
-    """Bytes of a journal up to its last whole line."""
+    """Number of bytes up to the end of the last complete line of a journal."""
     if not journal.exists():
         return 0
     with open_regular(journal) as stream:
@@ -114,7 +114,7 @@ def whole_lines(journal: Path) -> int:
 
 
 def line_end(journal: Path, place: int) -> int:
-    """Where the line ends that a byte of a journal is in."""
+    """End of the journal line that contains the byte at `place`."""
     with open_regular(journal) as stream:
         stream.seek(place)
         return place + len(stream.readline())
@@ -131,9 +131,9 @@ def _stream_hash(stream: BinaryIO, begin: int, end: int) -> str:
 
 
 CANDIDATE_COLUMN = "candidate"
-"""Column of a row's place among the candidates of its run."""
+"""Column with the index of each row's candidate in its run."""
 UNIQUE_TEXT_COLUMNS = ("id", "X_OG")
-"""Texts that differ from row to row; others repeat, and each is kept once."""
+"""Text columns stored as plain strings, as they differ in every row; others as dictionaries."""
 SEGMENTS_KEY = b"burg_drake.segments"
 PART_NAME_PATTERN = re.compile(r"part-(\d+)-([0-9a-f]{16})\.parquet")
 
@@ -144,8 +144,8 @@ class TablePart:
 
     Attributes:
         path: the file.
-        number: by which they are sorted.
-        segments: what its rows are made of, in order.
+        number: number of the part, for sorting.
+        segments: journal segments that its rows were made from, in order.
     """
 
     path: Path
@@ -154,10 +154,14 @@ class TablePart:
 
 
 def require_arrow(what: str, remedy: str = "") -> Any:
-    """The module pyarrow.
+    """Imports pyarrow.
+
+    Args:
+        what: feature that needs it, for the message.
+        remedy: alternative to installing it, for the message.
 
     Raises:
-        MissingDependencyError: it is not installed; says what needs it, and another remedy.
+        MissingDependencyError: pyarrow is not installed.
     """
     try:
         import pyarrow
@@ -170,13 +174,13 @@ def require_arrow(what: str, remedy: str = "") -> Any:
 
 
 def arrow_table(columns: Columns) -> Any:
-    """Columns as an Arrow table; NaN becomes null, and texts that repeat are kept once."""
+    """Converts columns to an Arrow table; NaN becomes null, and repeated texts are stored once."""
     arrow = require_arrow("a columnar table")
     return arrow.table({name: _arrow_column(name, values) for name, values in columns.items()})
 
 
 def empty_column(name: str, rows: int) -> Any:
-    """A column of nulls, of the type that columns of this name have."""
+    """A column of nulls with the type of columns of this name."""
     arrow = require_arrow("a columnar table")
     text = arrow.string()
     if name not in TEXT_COLUMNS:
@@ -188,15 +192,15 @@ def empty_column(name: str, rows: int) -> Any:
 def write_part(
     folder: Path, number: int, table: Any, segments: Sequence[JournalSegment]
 ) -> TablePart:
-    """Writes a part, whole or not at all.
+    """Writes a part atomically.
 
     Raises:
         InvalidInputError: the folder cannot be written.
     """
     arrow = require_arrow("a columnar table")
-    meant = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
+    fields = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
     stored = json.dumps([list(asdict(segment).values()) for segment in segments])
-    table = table.cast(arrow.schema(meant, {SEGMENTS_KEY: stored}))
+    table = table.cast(arrow.schema(fields, {SEGMENTS_KEY: stored}))
     sink = arrow.BufferOutputStream()
     arrow.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
     data = bytes(sink.getvalue())
@@ -206,7 +210,7 @@ def write_part(
 
 
 def open_part(path: Path) -> TablePart | None:
-    """A part, from its footer; None if it is damaged or something else."""
+    """Reads the footer of a part; None if the file is damaged or not a part."""
     name = PART_NAME_PATTERN.fullmatch(path.name)
     if name is None:
         return None
@@ -233,18 +237,18 @@ def open_part(path: Path) -> TablePart | None:
 
 
 def read_part(part: TablePart, names: Sequence[str]) -> Any | None:
-    """Columns of a part, as an Arrow table; None if it is damaged.
+    """Reads columns of a part as an Arrow table; None if it is damaged.
 
     Args:
         part: the part.
-        names: of the columns; those that it does not have are nulls.
+        names: names of the columns; missing ones are filled with nulls.
     """
     arrow = require_arrow(f"reading {part.path}")
     try:
         with open_regular(part.path) as stream:
             file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
-            there = [name for name in names if name in file.schema_arrow.names]
-            table = file.read(columns=there, use_threads=True)
+            present = [name for name in names if name in file.schema_arrow.names]
+            table = file.read(columns=present, use_threads=True)
     except (InvalidInputError, OSError, ValueError, arrow.ArrowException):
         return None
     rows = sum(segment.rows for segment in part.segments)
@@ -254,7 +258,7 @@ def read_part(part: TablePart, names: Sequence[str]) -> Any | None:
 
 
 def select_columns(table: Any, names: Sequence[str]) -> Any:
-    """Columns of an Arrow table; those that it does not have are nulls."""
+    """Selects columns of an Arrow table; missing ones are filled with nulls."""
     for name in names:
         if name not in table.column_names:
             table = table.append_column(name, empty_column(name, table.num_rows))
@@ -269,7 +273,7 @@ def column_names(part: TablePart) -> list[str]:
 
 
 def to_numpy(name: str, column: Any) -> NDArray[Any]:
-    """A column as `Columns` have it: nulls are NaN, or empty texts."""
+    """Converts an Arrow column to an array; nulls become NaN or empty texts."""
     arrow = require_arrow("a columnar table")
     if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or _is_text(column.type):
         if not arrow.types.is_dictionary(column.type):
@@ -285,7 +289,7 @@ def to_numpy(name: str, column: Any) -> NDArray[Any]:
 
 
 def to_codes(column: Any) -> TextValues:
-    """A column of texts as numbers and the texts that they stand for; null is -1."""
+    """Converts an Arrow column of texts to codes and texts; the code of null is -1."""
     arrow = require_arrow("a columnar table")
     if not arrow.types.is_dictionary(column.type):
         column = column.dictionary_encode()
@@ -326,11 +330,11 @@ def _data_hash(data: bytes) -> str:
 
 @dataclass(frozen=True, eq=False)
 class StoredRows:
-    """Judged grasps of several runs, one after the other, in the order of their candidates.
+    """Judged grasps of several runs, run by run, each in the order of its candidates.
 
     Attributes:
         table: Arrow table.
-        counts: (S,) how many rows each run has.
+        counts: (S,) number of rows of each run.
     """
 
     table: Any
@@ -340,11 +344,11 @@ class StoredRows:
         return int(self.counts.sum())
 
     def column(self, name: str) -> NDArray[Any]:
-        """A column as `Columns` has it."""
+        """A column as an array."""
         return to_numpy(name, self.table.column(name))
 
     def codes(self, name: str) -> TextValues:
-        """A column of texts as numbers, and the texts that they stand for."""
+        """A column of texts as codes and texts."""
         return to_codes(self.table.column(name))
 
     def columns(self, names: Iterable[str]) -> Columns:
@@ -353,7 +357,7 @@ class StoredRows:
 
     @property
     def run(self) -> NDArray[np.int64]:
-        """(N,) which run each row is of, by its place."""
+        """(N,) index of the run of each row."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
 
@@ -362,7 +366,7 @@ COLUMN_MEMBERS: Mapping[str, Sequence[str]] = {
     for one in RecordedFields.verdict
     if isinstance(one, TextField) and issubclass(one.of, StrEnum)
 }
-"""All texts that a column can have, where they are known."""
+"""Allowed texts of columns with a fixed set of values."""
 
 
 def results_frame(
@@ -371,13 +375,13 @@ def results_frame(
     texts: Collection[str],
     scenes: Sequence[str] | None = None,
 ) -> pandas.DataFrame:
-    """Results as a data frame; texts that repeat are categories.
+    """Converts results to a data frame; repeated texts become categories.
 
     Args:
-        rows: of a run.
-        names: of the columns.
-        texts: names of the columns that have texts.
-        scenes: of a run over many scenes: their names, which become a column `name` in front.
+        rows: rows of a run.
+        names: names of the columns.
+        texts: names of the text columns.
+        scenes: names of the scenes of a run over many, which become a first column `name`.
 
     Raises:
         MissingDependencyError: pandas is not installed.
@@ -397,7 +401,7 @@ def results_frame(
 
 
 def _fill_null(codes: Any, texts: Sequence[str]) -> tuple[Any, Sequence[str]]:
-    """Nulls as empty texts."""
+    """Replaces the code of null by that of an empty text."""
     if not (codes < 0).any():
         return codes, texts
     if "" not in texts:
@@ -406,7 +410,7 @@ def _fill_null(codes: Any, texts: Sequence[str]) -> tuple[Any, Sequence[str]]:
 
 
 def _category_column(name: str, codes: Any, texts: Sequence[str]) -> Any:
-    """Codes as categories: all members of what has members, else those that there are, sorted."""
+    """Categorical of codes; categories are the allowed texts if fixed, else the sorted texts."""
     pandas = _pandas()
     members = list(COLUMN_MEMBERS.get(name, texts if name == "name" else sorted(texts)))
     place = np.array([members.index(text) for text in texts], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Scene, station, engine and settings of trials, as each row of a table records them."""
+"""Origin of trials (scene, station, engine, settings), as each row of a table records it."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ if TYPE_CHECKING:
     from burg_drake.simulation import TrialSettings
 
 MEASURE_NUMBERS = {"farthest_point": 1.0}
-"""Numbers by which a run of this release records how it measures."""
+"""Recorded numbers that identify how runs of this release measure displacements."""
 
 
 def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
-    """Fields of `EvaluationSettings` that recorded numbers ask for. What is not recorded, as in
-    runs of releases before there were limits, is no limit.
+    """Limits and approach as fields of `EvaluationSettings`, from recorded numbers.
+
+    A limit that is not recorded, as by releases before there were limits, is no limit.
 
     Args:
-        values: settings of the trial's phases.
+        values: recorded settings of the trial's phases.
     """
     return {
         "tilt_limit_deg": _limit_degrees(values.get("tilt_limit", math.pi)),
@@ -43,12 +44,12 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
 
 
 def measure_text(values: Mapping[str, float]) -> str:
-    """Of what point it is measured how far others were moved, for people."""
+    """Point whose displacement is measured for other objects, in words."""
     return "of farthest points" if values.get("farthest_point") else "of centres of mass"
 
 
 def limits_text(values: Mapping[str, float]) -> str:
-    """The limits for people."""
+    """Limits on tilt and slip, in words."""
     asked = limit_settings(values)
     tilt, slip = asked["tilt_limit_deg"], asked["slip_limit_mm"]
     parts = [f"tilt {tilt:.12g} degrees"] if tilt < 180.0 else []
@@ -57,7 +58,7 @@ def limits_text(values: Mapping[str, float]) -> str:
 
 
 def _limit_degrees(angle: float) -> float:
-    """An angle [rad] in few digits, if they are the same angle."""
+    """Converts an angle [rad] to degrees, rounded to 12 digits if that restores the same angle."""
     short = float(f"{math.degrees(angle):.12g}")
     return short if math.radians(short) == angle else math.degrees(angle)
 
@@ -69,11 +70,11 @@ def _limit_millimetres(length: float) -> float:
 
 DIRECTION_FIELD = "lift_direction"  # Field of `GraspMotion` that is recorded as three numbers.
 DIRECTION_NUMBERS = tuple(f"{DIRECTION_FIELD}_{k}" for k in (1, 2, 3))
-"""Names of these numbers in a record."""
+"""Names of the three recorded numbers of `DIRECTION_FIELD`."""
 
 
 def join_direction(values: Mapping[str, object]) -> dict[str, object]:
-    """Recorded values with the direction as one list, if its three numbers are there."""
+    """Recorded values with the three numbers of the lift direction, if any, joined to a list."""
     if not all(name in values for name in DIRECTION_NUMBERS):
         return dict(values)
     others = {name: value for name, value in values.items() if name not in DIRECTION_NUMBERS}
@@ -81,11 +82,12 @@ def join_direction(values: Mapping[str, object]) -> dict[str, object]:
 
 
 def read_motion(values: Mapping[str, float]) -> GraspMotion:
-    """The motion among recorded numbers. What releases before motions could be chosen did not
-    record was as it is by default.
+    """Reads the motion from recorded numbers.
+
+    Values that are not recorded, as by releases without a choice of motion, are the defaults.
 
     Raises:
-        FieldError: a number cannot be used.
+        FieldError: a number is not valid.
     """
     known = {field.name for field in fields(GraspMotion)}
     found = {k: v for k, v in join_direction(values).items() if k in known}
@@ -95,19 +97,19 @@ def read_motion(values: Mapping[str, float]) -> GraspMotion:
 
 
 def without_motion(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers of other settings."""
+    """Recorded numbers without those of the motion."""
     known = {field.name for field in fields(GraspMotion)}.union(DIRECTION_NUMBERS)
     return {name: value for name, value in values.items() if name not in known}
 
 
 def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers but those of the motion, of limits and of measures."""
+    """Recorded numbers without those of the motion, the limits, the approach and the measures."""
     known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
 
 
 def motion_text(motion: GraspMotion) -> str:
-    """A motion for people."""
+    """Describes a motion in words."""
     parts = [f"standoff {_mm(motion.standoff)} mm"]
     if motion.retreat:
         parts.append(f"retreat {_mm(motion.retreat)} mm")
@@ -120,7 +122,7 @@ def motion_text(motion: GraspMotion) -> str:
 
 
 def motion_options(motion: GraspMotion, usual: GraspMotion) -> list[str]:
-    """Words of a command line that ask for a motion where a station's usual one is another."""
+    """Command-line options for the values in which a motion differs from a station's usual one."""
     words: list[str] = []
     for name in declared_fields(GraspMotion):
         option = option_name(GraspMotion, name)
@@ -129,13 +131,13 @@ def motion_options(motion: GraspMotion, usual: GraspMotion) -> list[str]:
             continue
         if name == DIRECTION_FIELD:
             words += [option, *(repr(part) for part in value)]
-        else:  # that nothing less than the whole lift is allowed has no option of its own
+        else:  # None, which allows only the whole lift, has no option: give the lift height
             words += [option, _millimetres(motion.lift_height if value is None else value)]
     return words
 
 
 def _millimetres(length: float) -> str:
-    """What the option reads as this length [m], in few digits where there are."""
+    """Value in mm of an option for a length [m], rounded if that restores the same length."""
     text = _mm(length)
     return text if float(text) / 1000.0 == length else repr(1000.0 * length)
 
@@ -145,7 +147,7 @@ def _mm(length: float) -> str:
 
 
 def _rounded_key(value: float) -> str:
-    """What tells two values apart, but not the rounding of one."""
+    """A number with 12 digits, without rounding errors."""
     return f"{value:.12g}"
 
 
@@ -162,23 +164,23 @@ ORIGIN_TEXT = (
     "trial_settings",
     "versions",
 )
-"""Columns of texts beside `engine` and `run`."""
+"""Text columns of the origin besides `engine` and `run`."""
 CUSTOM_SUFFIX = " (custom)"
-"""Follows the name of an engine that differs from the preset of this name."""
+"""Suffix of the name of an engine that differs from the preset of that name."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrialOrigin:
-    """What made the trials of a table.
+    """Origin of the trials of a table.
 
     Attributes:
-        scene, station: where the documents were, or names of built-in ones.
+        scene, station: paths of the documents, or names of built-in ones.
         scene_content, station_content: first digits of their content hashes.
-        mode: what was asked about each grasp.
-        engine: how time was stepped.
+        mode: mode of the run.
+        engine: physics engine.
         trial: settings of the trial's phases; see `TrialSettings`.
-        versions: of the software and the machine.
-        seed: of the run.
+        versions: versions of the software and the machine.
+        seed: seed of the run.
         run: hash of the run.
     """
 
@@ -194,19 +196,19 @@ class TrialOrigin:
     run: str = ""
 
     def judged_by(self, engine: str) -> TrialOrigin:
-        """The same with another preset, which has judged a grasp again; itself if it has no name.
+        """Origin with the preset that has judged a grasp again; unchanged if the name is empty.
 
         Raises:
-            UnknownNameError: no such preset.
+            UnknownNameError: there is no such preset.
         """
         return replace(self, engine=as_engine(engine)) if engine else self
 
     def settings(self, where: str = "trial settings") -> TrialSettings:
-        """The trial's settings; see `read_trial_settings`."""
+        """Settings of the trial; see `read_trial_settings`."""
         return read_trial_settings(self.trial, where)
 
     def cells(self) -> dict[str, str]:
-        """The texts `ORIGIN_TEXT` by column."""
+        """Texts of the columns `ORIGIN_TEXT`."""
         settings = {name: value for name, value in vars(self.engine).items() if name != "name"}
         return {
             **{name: getattr(self, name) for name in ORIGIN_TEXT[:5]},
@@ -217,14 +219,14 @@ class TrialOrigin:
 
 
 def read_origin(row: Mapping[str, Any], where: str) -> TrialOrigin:
-    """The origin that a row of a table tells.
+    """Reads the origin from a row of a table.
 
     Args:
         row: cells by column.
-        where: names the row in messages.
+        where: name of the row, for messages.
 
     Raises:
-        InvalidInputError: a cell cannot be read, or tells a setting that this release lacks.
+        InvalidInputError: a cell cannot be read, or has a setting that this release lacks.
     """
     trial = _read_pairs(row["trial_settings"], where)
     origin = TrialOrigin(
@@ -244,16 +246,17 @@ def read_origin(row: Mapping[str, Any], where: str) -> TrialOrigin:
 
 
 def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings:
-    """Settings of trials from their recorded numbers; those that were not recorded have their
-    defaults, and so has the motion, whatever the station says. Limits that were not recorded are
-    none.
+    """Settings of trials from their recorded numbers.
+
+    Settings that are not recorded have their defaults, also those of the motion, whatever the
+    station's. Limits that are not recorded are none.
 
     Args:
-        trial: as documents of runs have it.
-        where: names them in messages.
+        trial: recorded numbers, as in the documents of runs.
+        where: name of the record, for messages.
 
     Raises:
-        InvalidInputError: one of them is unknown or cannot be used.
+        InvalidInputError: a setting is unknown or not valid.
     """
     from burg_drake.simulation import NO_GRIP_LIMITS, TrialSettings
 
@@ -268,21 +271,21 @@ def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings
 
 
 def engine_label(engine: Engine) -> str:
-    """Name of an engine for tables and reports. One that is no preset is marked as custom."""
+    """Name of an engine for tables and reports, with a suffix if it is not a preset."""
     return engine.name if ENGINES.get(engine.name) == engine else engine.name + CUSTOM_SUFFIX
 
 
 def pairs_text(values: Mapping[str, object]) -> str:
-    """`name=value` pairs as one text; floats keep every bit."""
+    """Formats `name=value` pairs as one text; floats keep every bit."""
     words = {name: str(value).replace(" ", "_") for name, value in values.items()}
     return " ".join(f"{name}={word}" for name, word in words.items())
 
 
 def read_choice(text: str, choices: Sequence[Choice], where: str) -> Choice:
-    """The one of some choices that a text says; `where` names it in messages.
+    """The choice that equals a text; `where` names the text in messages.
 
     Raises:
-        InvalidInputError: it is none of them.
+        InvalidInputError: the text is none of the choices.
     """
     for choice in choices:
         if choice == text:
@@ -294,7 +297,7 @@ def read_choice(text: str, choices: Sequence[Choice], where: str) -> Choice:
 
 
 def _read_engine(label: str, settings: str, where: str) -> Engine:
-    """The engine of a row, if its name and its settings agree; see `engine_label`."""
+    """Reads the engine of a row; its name and settings must agree, see `engine_label`."""
     name = label.removesuffix(CUSTOM_SUFFIX)
     engine = _read_typed(
         {"name": name, **_read_pairs(settings, where)}, Engine, f"{where}, engine_settings"
@@ -315,7 +318,7 @@ def _read_engine(label: str, settings: str, where: str) -> Engine:
 
 
 def _changed_settings(preset: Engine, engine: Engine) -> str:
-    """Settings of a preset that an engine does not share."""
+    """Values of a preset in which an engine differs from it, as `name=value` pairs."""
     return pairs_text({k: v for k, v in vars(preset).items() if getattr(engine, k) != v})
 
 
@@ -337,13 +340,13 @@ def _read_pairs(text: str, where: str) -> dict[str, str]:
 
 
 def _restore_booleans(values: Mapping[str, float], schema: type[Any]) -> dict[str, object]:
-    """Recorded numbers with those of fields that are true or false as such."""
-    of_truth = {field.name for field in fields(schema) if field.type in (bool, "bool")}
-    return {k: str(bool(v)).lower() if k in of_truth else v for k, v in values.items()}
+    """Recorded numbers with those of boolean fields as `true` or `false`."""
+    flags = {field.name for field in fields(schema) if field.type in (bool, "bool")}
+    return {k: str(bool(v)).lower() if k in flags else v for k, v in values.items()}
 
 
 def _yaml_text(value: object) -> str:
-    """A text, or a list of texts, as the reader takes them."""
+    """YAML of a value or of a list of values, as texts."""
     return json.dumps([str(v) for v in value] if isinstance(value, list) else str(value))
 
 
@@ -352,7 +355,7 @@ class _CellReader(Reader):
 
 
 def _read_typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
-    """A dataclass from texts or numbers by field, checked as if it came from a document."""
+    """Makes a dataclass from texts or numbers by field, with the checks of a document."""
     known = {field.name for field in fields(schema)}  # type: ignore[arg-type]
     unknown = [name for name in values if name not in known]
     if unknown:

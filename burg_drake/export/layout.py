@@ -16,11 +16,11 @@ from burg_drake.station import FixedBox, Station, obstacle_boxes, table_box
 
 @dataclass(frozen=True, eq=False)
 class PlacedObject:
-    """An instance of a scene.
+    """A placed instance of a scene.
 
     Attributes:
         name: of the instance.
-        object: its name in the library.
+        object: name of the object in the library.
         entry: of the library.
         X_WO: (4, 4) pose in the world.
         fixed: whether it is background, which does not move.
@@ -42,7 +42,7 @@ class Layout:
         library: of its objects.
         objects: free ones first, in the document's order.
         boxes: table and obstacles by name; none without a station.
-        packages: where packages that the objects' models name are looked for.
+        packages: where to look for packages that the objects' models name.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Layout:
 
     @property
     def entries(self) -> dict[str, ObjectEntry]:
-        """Entries of the objects that are placed, each once, by their names in the library."""
+        """Library entries of the placed objects by name, without repetition."""
         return {placed.object: placed.entry for placed in self.objects}
 
 
@@ -65,7 +65,7 @@ def lay_out(scene: Scene, station: Station | None = None) -> Layout:
         station: where it stands; without one the world is the scene frame S, and there is no table.
 
     Raises:
-        InvalidInputError: an instance is called as the table or an obstacle of the station.
+        InvalidInputError: an instance has the name of the table or of an obstacle of the station.
     """
     if station is None:
         return Layout(scene.name, scene.library, _place_objects(scene, np.eye(4)))
@@ -98,7 +98,7 @@ _RESERVED_NAMES = re.compile(r"world|__.*__|(?:World|Default)ModelInstance")
 
 
 def legal_model_name(name: str) -> str:
-    """A name that SDFormat, Drake and MuJoCo have no use for themselves."""
+    """A name that is not reserved by SDFormat, Drake or MuJoCo."""
     return f"{name}_1" if _RESERVED_NAMES.fullmatch(name) else name
 
 
@@ -113,7 +113,7 @@ def prim_names(layout: Layout) -> dict[str, str]:
 
 
 def renaming_notes(names: Mapping[str, str]) -> tuple[str, ...]:
-    """Which names are others in the export, one sentence each."""
+    """Notes on names that differ in the export, one sentence each."""
     return tuple(
         f"{name!r} is called {legal!r} in the export, as the format does not allow the name"
         for name, legal in names.items()
@@ -122,7 +122,7 @@ def renaming_notes(names: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def _make_unique(layout: Layout, legal: Callable[[str], str]) -> dict[str, str]:
-    """Legal names stay; the others get one that none has."""
+    """Keeps legal names, and makes unique ones for the others."""
     names = [*(placed.name for placed in layout.objects), *layout.boxes]
     by_name = {name: name for name in names if legal(name) == name}
     for name in names:

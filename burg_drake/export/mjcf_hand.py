@@ -56,16 +56,16 @@ OBJECT_BIT, HAND_BIT, TABLE_BIT = 1, 2, 4
 
 @dataclass(frozen=True)
 class CarrierJoint:
-    """A joint of the carrier with its servos, which have its name.
+    """A joint of the carrier and its servos, which share its name.
 
     Attributes:
-        name: of the joint, and of the servo of its position.
-        axis: (3,) in the world at the carrier's start.
-        speed: name of the servo of its speed.
+        name: name of the joint and of its position servo.
+        axis: (3,) axis in the world at the carrier's start pose.
+        speed: name of the velocity servo.
         inertia: of the drive [kg].
-        rate: of the critically damped servos [1/s]. As contact is solved before servos are made
-            implicit, what the hand holds is ahead of it while the hand speeds up, and creeps, the
-            faster the higher the rate: at 50 by 2 mm/s in a usual lift.
+        rate: rate of the critically damped servos [1/s]. As contact is solved before servos are
+            made implicit, a held object is ahead of the hand while the hand accelerates, and
+            creeps, faster at higher rates: at 50 by 2 mm/s in a usual lift.
     """
 
     name: str
@@ -76,20 +76,21 @@ class CarrierJoint:
 
 
 def link_name(link: str) -> str:
-    """Name of the body of a link; joints and servos of fingers have the joint's, likewise."""
+    """Name of the body of a link; names of finger joints and servos are made likewise."""
     return f"{HAND_PREFIX} {link}"
 
 
 def add_trial_options(root: Element, step: float = MUJOCO_TIME_STEP) -> None:
-    """Time step and solver that the hand is laid out for."""
+    """Adds the time step and solver options for which the hand is tuned."""
     SubElement(
         root, "option", timestep=repr(step), integrator="implicitfast", cone="elliptic",
         # Friction creep is inversely proportional to the impedance ratio. The tolerance is relative
         # to the mean inertia, which is that of the carrier: tons.
         impratio="1000.0", tolerance="1e-14",
-        # So that scenes of any size are solved alike: from 60 degrees of freedom on MuJoCo would
-        # take sparse factors. In MuJoCo 4.0.0 these give the same accelerations (within 2e-11, in
-        # 6,000 steps of trials and in piles of 20) and save 9 % in a scene of twelve objects.
+        # So that scenes of any size are solved alike: MuJoCo would use sparse factors from
+        # 60 degrees of freedom on. In MuJoCo 4.0.0 these give the same accelerations
+        # (within 2e-11, in 6,000 steps of trials and in piles of 20) and save 9 % in a
+        # scene of twelve objects.
         jacobian="dense",
     )  # fmt: skip
 
@@ -101,15 +102,15 @@ def add_moved_hand(
     parts: HandDescription,
     mobilities: Sequence[float],
 ) -> str:
-    """Adds the hand where the diagram has it, open, to be moved by three actuators.
+    """Adds the open hand at its pose in the diagram, with three actuators that move it.
 
     Args:
         root, world, asset: elements of the model.
         parts: the hand.
-        mobilities: of what there is to grasp, over their masses [1/kg].
+        mobilities: inverse masses of the objects to grasp, by mass [1/kg].
 
     Returns:
-        How it is moved, in a sentence.
+        A sentence on how to move it.
     """
     # 1/kg, mean over the three directions in which the hand moves.
     finger_mobility = (1.0 / FINGER_DRIVE_INERTIA + 3.0 / 100.0) / 3.0
@@ -142,12 +143,12 @@ def add_hand(
     parts: HandDescription,
     joints: Sequence[CarrierJoint],
 ) -> None:
-    """Adds the hand on a carrier, with its servos; nothing of it has weight.
+    """Adds the hand on a carrier, with its servos, without gravity.
 
     Args:
         root, world, asset: elements of the model.
-        parts: the hand; at first it is where the diagram has it, open.
-        joints: of the carrier.
+        parts: the hand; it starts open, at its pose in the diagram.
+        joints: joints of the carrier.
     """
     X_WH = parts.X_WH
     carrier = add_body(world, HAND_CARRIER_BODY, make_pose(p_AB=X_WH[:3, 3]))
@@ -175,10 +176,11 @@ def add_hand(
 
 
 def pad_spheres(front: PadFront) -> tuple[Array, Array]:
-    """Spheres of a pad: one amid each share of the front, touching its plane from behind.
+    """Spheres of a pad: one at the centre of each grid cell of the front, touching its plane from
+    behind.
 
-    Those at the rim are smaller, so that none sticks out of the pad: the screen of the open hand
-    takes the pad as it is, and what it calls clear must be clear here.
+    Spheres at the rim are smaller, so that none sticks out of the pad: the collision check of the
+    open hand uses the pad itself, and poses that it calls free must be free here.
 
     Returns:
         Their centers (N, 3) in the pad's frame P and radii (N,) [m].
@@ -201,15 +203,15 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
 
 
 def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[float, float], float]:
-    """How a sphere touches, so that it bears its share of the pad's front.
+    """Contact parameters with which a sphere bears its share of the load on the pad's front.
 
-    MuJoCo's stiffness is one of acceleration: a force is that over a regularization R, which
-    follows from the impedance d and from what the two bodies together would accelerate by. With a
+    MuJoCo's stiffness is one of acceleration: the force is that acceleration over a regularization
+    R, which follows from the impedance d and the combined inverse mass of the two bodies. With a
     constant impedance MuJoCo divides stiffness and damping by it.
 
     Args:
         front: the pad's.
-        mobility: of finger and object together [1/kg].
+        mobility: combined inverse mass of finger and object [1/kg].
         step: time step [s].
 
     Returns:
@@ -236,7 +238,7 @@ def _add_link(parent: Element, asset: Element, link: HandLink, X_PB: Array) -> E
 
 
 def _add_pad(body: Element, asset: Element, link: str, pad: HandShape, front: PadFront) -> None:
-    """Soft spheres along the front, and what is rigid behind them."""
+    """Adds soft spheres along the front, and a rigid backing."""
     backing_depth = 0.002  # Metres behind the pad's front; closer, it stops objects from pivoting.
     for k, (center, radius) in enumerate(zip(*pad_spheres(front), strict=True)):
         X_BS = front.X_BP @ make_pose(p_AB=center)
@@ -264,8 +266,8 @@ def _add_mesh(body: Element, asset: Element, name: str, X_BG: Array, points: Arr
 
 
 def _add_geom(body: Element, name: str, X_BG: Array, **shape: str) -> None:
-    """A geom of the hand, which says how objects are touched (`solmix`), and by itself has no
-    friction: MuJoCo takes the higher coefficient of two."""
+    """Adds a geom of the hand. It determines contact parameters (`solmix`) and has no friction
+    itself, as MuJoCo takes the higher of two coefficients."""
     touching = {
         "contype": f"{HAND_BIT}",
         "conaffinity": f"{OBJECT_BIT}",
@@ -280,8 +282,8 @@ def _add_geom(body: Element, name: str, X_BG: Array, **shape: str) -> None:
 
 
 def _add_servos(root: Element, parts: HandDescription, joints: Sequence[CarrierJoint]) -> None:
-    """Servos of speed with limited force for the fingers, of position and speed for the carrier,
-    and the coupling of the fingers."""
+    """Adds velocity servos with limited force for the fingers, position and velocity servos for the
+    carrier, and the coupling of the fingers."""
     actuator, hand = SubElement(root, "actuator"), parts.document
     for joint in joints:
         stiffness = joint.inertia * joint.rate**2
@@ -297,7 +299,7 @@ def _add_servos(root: Element, parts: HandDescription, joints: Sequence[CarrierJ
         )  # fmt: skip
     if hand.coupled:
         first, second = (link_name(finger.joint) for finger in hand.fingers)
-        # From where both are open, as `ref` says.
+        # Relative to the open position of both, see `ref`.
         SubElement(
             SubElement(root, "equality"), "joint", joint1=second, joint2=first,
             polycoef=format_numbers((0, parts.coupling, 0, 0, 0)),

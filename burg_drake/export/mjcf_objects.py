@@ -16,15 +16,15 @@ from burg_drake.objects import ObjectEntry, ObjectLibrary
 
 
 def add_body(world: Element, name: str, X_WB: Array) -> Element:
-    """A body at a pose (4, 4)."""
+    """Adds a body at a pose (4, 4)."""
     return SubElement(world, "body", {"name": name, **pose_attributes(X_WB)})
 
 
 def add_object(world: Element, name: str, placed: PlacedObject, *, free: bool) -> Element:
-    """The body of an object, at first without geoms.
+    """Adds the body of an object, without geoms.
 
     Args:
-        world: to add it to.
+        world: element to add the body to.
         name: of body and joint.
         placed: the object.
         free: whether it can move.
@@ -41,7 +41,7 @@ def add_object(world: Element, name: str, placed: PlacedObject, *, free: bool) -
 
 
 def collision_shapes(placed: PlacedObject, assets: MjcfAssets) -> list[dict[str, str]]:
-    """Attributes of the geoms by which an object collides: its primitive, or its pieces."""
+    """Attributes of an object's collision geoms: its primitive, or its pieces."""
     entry = placed.entry
     primitive = entry.contact.primitive
     if entry.contact.kind == "primitive" and primitive is not None:
@@ -55,18 +55,18 @@ def collision_shapes(placed: PlacedObject, assets: MjcfAssets) -> list[dict[str,
 
 
 class MjcfAssets:
-    """Writes the files of objects and declares them, each object once.
+    """Writes the mesh files of objects and declares them as assets, each object once.
 
-    Names of assets are `OBJECT:visual_0`, `OBJECT:piece_000`, which no two objects share.
+    Names of assets are unique: `OBJECT:visual_0`, `OBJECT:piece_000`.
     """
 
     def __init__(self, asset: Element, library: ObjectLibrary, folder: Path | None) -> None:
         """
         Args:
             asset: element that the assets are declared in.
-            library: has the objects.
-            folder: of the MJCF file; if None nothing is written, pieces are read where they are,
-                and there is nothing to look at.
+            library: library with the objects.
+            folder: folder of the MJCF file; if None, nothing is written, pieces are read from the
+                library, and there are no visuals.
         """
         self._asset = asset
         self._library = library
@@ -75,14 +75,14 @@ class MjcfAssets:
         self._pieces: dict[str, list[str]] = {}
 
     def visuals(self, name: str, entry: ObjectEntry) -> list[str]:
-        """Meshes of what is looked at of an object; their materials have the same names."""
+        """Names of an object's visual meshes; their materials have the same names."""
         if name not in self._visuals:
             parts = visual_parts(self._library, entry)
             self._visuals[name] = [self._add_visual(name, i, part) for i, part in enumerate(parts)]
         return self._visuals[name]
 
     def pieces(self, name: str, entry: ObjectEntry) -> list[str]:
-        """Meshes of the convex pieces of an object."""
+        """Names of the meshes of an object's convex pieces."""
         if name not in self._pieces:
             pieces = collision_meshes(entry)
             self._pieces[name] = [self._add_piece(name, i, piece) for i, piece in enumerate(pieces)]
@@ -92,7 +92,7 @@ class MjcfAssets:
         assert self._folder is not None
         mesh, file = f"{name}:visual_{i}", f"objects/{name}/visual_{i}.obj"
         atomic_write(self._folder / file, obj_text(part))
-        # The walls of what is looked at may be open: no volume is needed, a surface is.
+        # Visual meshes may be open, so that only their surface is used, not their volume.
         SubElement(self._asset, "mesh", {"name": mesh, "file": file, "inertia": "shell"})
         appearance = {"rgba": " ".join(f"{v:g}" for v in part.rgba)}
         if part.image is not None:

@@ -53,15 +53,15 @@ def write_mjcf(
     Args:
         layout: what to write.
         folder: empty.
-        hand: to float above the scene.
+        hand: hand to add above the scene.
 
     Returns:
-        What became other than it is in the scene, and how the hand is moved, one sentence each.
+        Notes on differences from the scene and on how to move the hand, one sentence each.
 
     Raises:
         UnknownNameError: a mesh is missing.
         MeshError: it is damaged.
-        InvalidInputError: a place cannot be written to.
+        InvalidInputError: a file cannot be written.
     """
     names = model_names(layout)
     root = Element("mujoco", {"model": legal_model_name(layout.name)})
@@ -110,7 +110,7 @@ def _add_geoms(body: Element, placed: PlacedObject, assets: MjcfAssets) -> None:
 
 
 def _add_box(body: Element, box: FixedBox) -> None:
-    """One geom that is drawn and collides, in the group that is drawn."""
+    """Adds one geom for display and collision, in the displayed group."""
     shape = {"class": "collision", **box_attributes(box.size), "friction": repr(box.friction)}
     SubElement(body, "geom", {**shape, "rgba": format_numbers(box.color), "group": "2"})
 
@@ -120,7 +120,7 @@ LIFT_JOINT = CarrierJoint("hand lift", (0.0, 0.0, 1.0), "hand lift speed", 1e5, 
 
 
 class MjcfBodyNames:
-    """Names of bodies in the model of grasp trials, or how they start."""
+    """Names, or starts of names, of bodies in the model of grasp trials."""
 
     object = "object"  # Start of the names of movable bodies; the name in the scene follows.
     fixed = "fixed"  # Start of the names of fixed bodies.
@@ -136,14 +136,14 @@ def trial_mjcf(
     on_table: Collection[str],
     alone: str | None = None,
 ) -> str:
-    """The model as text; meshes are read where they are.
+    """The model of grasp trials as text; meshes are read from the library.
 
     Args:
         layout: with table and boxes.
-        hand: at first it is where its diagram has it.
+        hand: the hand; it starts at its pose in its diagram.
         step: time step [s].
-        on_table: names of objects that have the plane under them, in place of the table's box.
-        alone: the one object that can move; all that could if None.
+        on_table: names of objects that stand on the ground plane in place of the table's box.
+        alone: name of the only movable object; if None, all objects that are not fixed can move.
     """
     root = Element("mujoco")
     SubElement(root, "compiler", angle="radian", autolimits="true")

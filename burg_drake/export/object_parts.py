@@ -49,7 +49,7 @@ def visual_parts(library: ObjectLibrary, entry: ObjectEntry) -> list[VisualPart]
         scene = trimesh.load_scene(path, process=False)
         named = sorted(scene.geometry.items())
         parts = [_make_part(mesh) for _, mesh in named if len(mesh.faces)]
-    except Exception as error:  # the reader raises whatever it stumbles over
+    except Exception as error:  # the reader raises errors of any type
         raise library.damaged(path) from error
     if not parts or not all(np.isfinite(part.vertices).all() for part in parts):
         raise library.damaged(path)
@@ -57,7 +57,8 @@ def visual_parts(library: ObjectLibrary, entry: ObjectEntry) -> list[VisualPart]
 
 
 def collision_meshes(entry: ObjectEntry) -> tuple[str, ...]:
-    """Mesh files whose convex hulls collide: the pieces, or without any the whole object."""
+    """Mesh files whose convex hulls are the collision geometry: the pieces, or the whole object if
+    it has none."""
     return entry.pieces or (entry.contact.mesh or entry.surface or entry.mesh,)
 
 
@@ -76,7 +77,7 @@ def _make_part(mesh: trimesh.Trimesh) -> VisualPart:
 
 
 def _material_color(material: Any) -> Rgba:
-    """The diffuse colour and opacity that an MTL file has."""
+    """Diffuse colour and opacity of a material of an MTL file."""
     kwargs = getattr(material, "kwargs", {})
     if "kd" not in kwargs:
         return DEFAULT_RGBA

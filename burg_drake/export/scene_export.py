@@ -41,7 +41,7 @@ class SceneFormat:
     Attributes:
         writer: MODULE:NAME, in this room, of a function of a layout and a folder that returns
             notes; imported when needed.
-        main: the file to open.
+        main: file to open.
         about: what it is, and for whom.
         hydroelastic: whether it has Drake's contact properties.
         with_hand: whether the station's hand can be above the scene.
@@ -87,9 +87,9 @@ class Exported:
     """An export.
 
     Attributes:
-        main: the file to open.
-        layout: what is in it.
-        notes: what became other than it is in the scene, one sentence each.
+        main: file to open.
+        layout: exported layout.
+        notes: differences from the scene, one sentence each.
     """
 
     main: Path
@@ -105,7 +105,7 @@ def export_scene(
     *,
     hand: bool = False,
 ) -> Exported:
-    """Writes a scene for another program: a folder that can be moved or zipped as it is.
+    """Exports a scene for another program, to a folder that can be moved or zipped.
 
     Example::
 
@@ -113,8 +113,7 @@ def export_scene(
 
     Args:
         scene: what stands on the board. The board itself, which is paper, is left out.
-        folder: new, empty, or an earlier export, which is replaced as a whole when the new one is
-            complete.
+        folder: new, empty, or an earlier export, which is replaced when the new one is complete.
         to: one of `SCENE_FORMATS`.
         station: its table and obstacles are exported, too, and the world is the station's. Without
             one the world is the scene frame S, and nothing is under the objects.
@@ -179,7 +178,7 @@ def _load_writer(to: str) -> Callable[..., tuple[str, ...]]:
 
 
 def _contact_notes(layout: Layout, to: str) -> list[str]:
-    """What of the objects' contact a format without Drake's properties does not have."""
+    """Notes on contact properties that a format without Drake's properties lacks."""
     notes = []
     for name, entry in layout.entries.items():
         if entry.contact.kind == "primitive":
@@ -222,16 +221,16 @@ class ExportRecord:
 
 
 def require_own_folder(folder: str | Path) -> Path:
-    """Where an export goes.
+    """Checks the target folder of an export.
 
     Args:
-        folder: new, empty, or the outcome of an earlier export with nothing else in it.
+        folder: new, empty, or with an earlier export and nothing else in it.
 
     Returns:
         Its real path, through links.
 
     Raises:
-        InvalidInputError: it is a file, or has anything else in it.
+        InvalidInputError: it is a file, or contains anything else.
     """
     path = Path(os.path.realpath(folder))
     if not os.path.lexists(path):
@@ -258,16 +257,16 @@ def require_own_folder(folder: str | Path) -> Path:
 
 @contextmanager
 def replace_folder(path: Path) -> Iterator[Path]:
-    """A new folder beside `path`, which takes its place when the block ends without an error.
+    """Yields a new folder beside `path` that replaces `path` when the block ends without an error.
 
     Args:
-        path: of `require_own_folder`.
+        path: result of `require_own_folder`.
 
     Yields:
         The folder to write into.
 
     Raises:
-        InvalidInputError: the place cannot be written to; what was there is there still.
+        InvalidInputError: the folder cannot be written; earlier contents stay.
     """
     token = secrets.token_hex(8)
     fresh, old = (path.with_name(f".{path.name}.{token}{end}") for end in ("", ".old"))
@@ -282,7 +281,7 @@ def replace_folder(path: Path) -> Iterator[Path]:
 
 
 def _swap_folders(fresh: Path, path: Path, old: Path) -> None:
-    """Puts `fresh` in the place of `path`, which is moved to `old` until that has worked."""
+    """Replaces `path` by `fresh`; `path` is kept as `old` until that has succeeded."""
     if path.exists():
         path.rename(old)
     try:
@@ -295,16 +294,16 @@ def _swap_folders(fresh: Path, path: Path, old: Path) -> None:
 
 
 def write_record(folder: Path, record: ExportRecord) -> None:
-    """Writes `export.yaml` with the names of all files that are in the folder.
+    """Writes `export.yaml` with the names of all files in the folder.
 
     Args:
-        folder: all else is written.
-        record: without files.
+        folder: folder of the export, otherwise complete.
+        record: record without file names.
     """
     save_document(replace(record, files=tuple(_list_files(folder))), folder / EXPORT_RECORD_FILE)
 
 
 def _list_files(folder: Path) -> list[str]:
-    """What is in a folder and in those in it, relative to it."""
+    """Relative paths of everything in a folder and its subfolders."""
     found = (p for p in folder.rglob("*") if p.is_symlink() or not p.is_dir())
     return sorted(p.relative_to(folder).as_posix() for p in found)

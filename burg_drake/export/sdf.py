@@ -129,11 +129,12 @@ def write_directives(layout: Layout, folder: Path) -> tuple[str, ...]:
 
 
 class _AngleAxis(dict[str, Any]):
-    """A rotation as Drake's schema has it, exact for any."""
+    """A rotation in Drake's schema, exact for any rotation."""
 
 
 class _DirectivesDumper(yaml.SafeDumper):
-    """Writes rotations with their tag, and repeats values rather than giving them anchors."""
+    """YAML dumper that writes rotations with their tag, and repeats values instead of using
+    anchors."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -156,7 +157,7 @@ def _weld_directive(name: str, X_WB: Array) -> dict[str, Any]:
 
 
 def _pose_mapping(X_WB: Array) -> dict[str, Any]:
-    """A pose in Drake's schema, which knows no quaternions."""
+    """A pose in Drake's schema, which does not support quaternions."""
     turn = Rotation.from_matrix(X_WB[:3, :3]).as_rotvec()
     angle = float(np.linalg.norm(turn))
     axis = (turn / angle if angle else np.array([0.0, 0.0, 1.0])).tolist()
@@ -170,21 +171,21 @@ DRAKE_NAMESPACE = "http://drake.mit.edu"  # XML namespace of Drake's SDFormat ex
 def object_sdf_model(
     library: ObjectLibrary, name: str, entry: ObjectEntry, folder: Path, packages: Packages
 ) -> Element:
-    """The model of an object, self-contained.
+    """Makes the self-contained model of an object.
 
     Args:
         library: has the object.
         name: of the object.
         entry: of the object.
-        folder: gets copies of its meshes.
-        packages: where packages that it names are looked for.
+        folder: folder for copies of its meshes.
+        packages: where to look for packages that the model names.
 
     Returns:
         The element `model`, whose URIs are relative to `folder`.
 
     Raises:
-        InvalidInputError: the SDF includes other models or has another mass than the library says;
-            or a mesh names files elsewhere.
+        InvalidInputError: the SDF includes other models or its mass differs from the library's; or
+            a mesh names files outside its folder.
         UnknownNameError: a file is missing.
     """
     path = library.path(entry.sdf)
@@ -213,7 +214,7 @@ def sdf_document(*children: Element) -> str:
 
 
 def add_friction(collision: Element, static: str, dynamic: str) -> None:
-    """Gives a collision element Coulomb coefficients that Gazebo and Drake know."""
+    """Adds Coulomb friction coefficients for Gazebo and Drake to a collision element."""
     surface = SubElement(collision, "surface")
     ode = SubElement(SubElement(surface, "friction"), "ode")
     SubElement(ode, "mu").text, SubElement(ode, "mu2").text = static, dynamic
@@ -228,7 +229,7 @@ def _resolve_uri(uri: str, model: Path, packages: Packages) -> Path:
 
 
 def _require_mass(model: Element, entry: ObjectEntry, path: Path) -> None:
-    """Refuses a model that weighs something else than the library says, as Drake would have it."""
+    """Refuses a model whose mass, as in Drake, differs from the library's."""
     text = (model.findtext("link/inertial/mass") or "nan").strip()
     try:
         mass = float(text)
@@ -242,7 +243,7 @@ def _require_mass(model: Element, entry: ObjectEntry, path: Path) -> None:
 
 
 def _move_friction(collision: Element) -> None:
-    """Moves friction from Drake's properties to those of SDFormat, unless it has its own there."""
+    """Moves friction from Drake's properties to SDFormat's, unless these have friction already."""
     properties = collision.find(f"{{{DRAKE_NAMESPACE}}}proximity_properties")
     if properties is None or collision.find("surface") is not None:
         return
@@ -263,11 +264,11 @@ def _read_sdf(path: Path) -> Element:
 
 
 def box_sdf_model(name: str, box: FixedBox) -> Element:
-    """The element `model` of a box; as `station.surroundings` has it in Drake.
+    """The element `model` of a box, the same as `station.surroundings` adds in Drake.
 
     Args:
         name: of the model.
-        box: the box; its pose is left to whoever places the model.
+        box: the box; its pose is not used, as the caller places the model.
     """
     model = Element("model", {"name": name})
     link = SubElement(model, "link", {"name": LINK_NAME})
@@ -312,16 +313,16 @@ class MeshCopies:
     def __init__(self, folder: Path) -> None:
         """
         Args:
-            folder: for the copies; made when there is something to copy.
+            folder: folder for the copies; made for the first copy.
         """
         self.folder = folder
         self._copied: dict[Path, str] = {}
 
     def add(self, source: Path) -> str:
-        """Copies a mesh, unless it is there already, and all that it names beside it.
+        """Copies a mesh and the files beside it that it names, unless they are there already.
 
         Args:
-            source: obj, gltf, or a file that names no others.
+            source: obj, gltf, or a file that names no other files.
 
         Returns:
             The copy, relative to the folder.
@@ -335,7 +336,7 @@ class MeshCopies:
         return self._copied[source]
 
     def _place(self, source: Path) -> str:
-        """Copies to the folder itself, or to one of its own if another mesh has a name there."""
+        """Copies to the folder itself, or to a subfolder if another mesh uses one of the names."""
         named = [source.name, *_referenced_files(source)]
         for name in named:
             if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
@@ -358,13 +359,13 @@ class MeshCopies:
         return (place / source.name).as_posix()
 
     def _differs(self, relative: Path, source: Path) -> bool:
-        """Whether there is something else by the name already."""
+        """Whether a different file of this name exists."""
         target = self.folder / relative
         return target.exists() and target.read_bytes() != source.read_bytes()
 
 
 def _referenced_files(mesh: Path) -> Iterator[str]:
-    """Files that a mesh file names, relative to it; those of materials, too."""
+    """Files that a mesh file and its material files name, relative to the mesh file."""
     suffix = mesh.suffix.lower()
     if suffix == ".obj":
         for library in _find_names(_MATERIAL_LIBRARY, mesh):
@@ -379,6 +380,6 @@ def _referenced_files(mesh: Path) -> Iterator[str]:
 
 
 def _find_names(pattern: re.Pattern[bytes], file: Path) -> list[str]:
-    """What a pattern finds in a file, each once."""
+    """Matches of a pattern in a file, without repetition."""
     found = pattern.findall(read_bytes(file, FileLimits.image_bytes))
     return list(dict.fromkeys(name.decode(errors="replace") for name in found))

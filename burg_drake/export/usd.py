@@ -30,7 +30,7 @@ def write_usd(layout: Layout, folder: Path) -> tuple[str, ...]:
         folder: empty.
 
     Returns:
-        What became other than it is in the scene, one sentence each.
+        Notes on differences from the scene, one sentence each.
 
     Raises:
         UnknownNameError: a mesh is missing.
@@ -62,7 +62,7 @@ def _add_object(stage: Usd.Stage, path: str, placed: PlacedObject) -> None:
 
 
 def _add_mass(prim: Usd.Prim, properties: MassProperties) -> None:
-    """Mass and inertia, which USD has by principal axes."""
+    """Adds mass and inertia, which USD takes as principal moments and axes."""
     ixx, iyy, izz, ixy, ixz, iyz = properties.inertia
     moments, axes = np.linalg.eigh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     axes[:, 2] *= np.linalg.det(axes)  # right-handed
@@ -75,7 +75,7 @@ def _add_mass(prim: Usd.Prim, properties: MassProperties) -> None:
 
 
 def _add_box(stage: Usd.Stage, path: str, name: str, box: FixedBox) -> None:
-    """A body that does not move, as it is no rigid body."""
+    """Adds a static box, without the rigid-body API."""
     prim = UsdGeom.Xform.Define(stage, path).GetPrim()
     prim.SetDisplayName(name)
     cube = add_box_prim(stage, f"{path}/box", box.X_WB, box.size)
@@ -88,7 +88,7 @@ def write_usd_object(library: ObjectLibrary, entry: ObjectEntry, file: Path) -> 
     """Writes the file of an object, whose default prim has the object frame O.
 
     Args:
-        library: has the object.
+        library: library with the object.
         entry: of the object.
         file: to write; textures lie beside it.
 
@@ -147,7 +147,7 @@ def _add_mesh(
 
 
 def _add_primitive(stage: Usd.Stage, path: str, primitive: Primitive) -> Usd.Prim:
-    """The shape in O; the axis of a cylinder is its z."""
+    """Adds a primitive at its pose in O; the axis of a cylinder is its z."""
     X_OP, size = primitive.X_OP.matrix(), primitive.size
     if primitive.shape == "box":
         return add_box_prim(stage, path, X_OP, size)
@@ -169,10 +169,10 @@ def _vector_array(rows: Array) -> Vt.Vec3fArray:
 
 
 def new_stage(path: Path, root: str) -> Usd.Stage:
-    """A stage in metres and kilograms, z up, with an Xform as its default prim.
+    """Makes a stage in metres and kilograms, z up, with an Xform as its default prim.
 
     Args:
-        path: of its file; the folder is made.
+        path: file of the stage; its folder is made.
         root: path of the default prim.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -185,7 +185,7 @@ def new_stage(path: Path, root: str) -> Usd.Stage:
 
 
 def set_pose(prim: Usd.Prim, X_AB: Array) -> None:
-    """Gives a prim a pose (4, 4) in its parent."""
+    """Sets the pose (4, 4) of a prim in its parent."""
     shape = UsdGeom.Xformable(prim)
     w, *xyz = quaternion_from_rotation(X_AB[:3, :3]).tolist()
     shape.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(*X_AB[:3, 3].tolist()))
@@ -193,7 +193,7 @@ def set_pose(prim: Usd.Prim, X_AB: Array) -> None:
 
 
 def add_box_prim(stage: Usd.Stage, path: str, X_AB: Array, size: Sequence[float]) -> Usd.Prim:
-    """A box with a pose (4, 4) of its centre in its parent and extents [m]."""
+    """Adds a box by the pose (4, 4) of its centre in its parent and its extents [m]."""
     cube = UsdGeom.Cube.Define(stage, path)
     cube.CreateSizeAttr(1.0)
     cube.CreateExtentAttr([Gf.Vec3f(-0.5), Gf.Vec3f(0.5)])
@@ -203,13 +203,13 @@ def add_box_prim(stage: Usd.Stage, path: str, X_AB: Array, size: Sequence[float]
 
 
 def bind_color(path: str, prim: Usd.Prim, rgba: Rgba, texture: str = "") -> None:
-    """Lets a prim be looked at in a colour, or with a texture.
+    """Gives a prim a colour or a texture.
 
     Args:
         path: of the new material.
-        prim: gets it.
-        rgba: colour as pictures and MTL files have it (sRGB), and opacity.
-        texture: image file relative to the stage's own; its place is by the primvar `st`.
+        prim: prim to colour.
+        rgba: sRGB colour, as in images and MTL files, and opacity.
+        texture: image file relative to the stage's file; the primvar `st` has its coordinates.
     """
     stage = prim.GetStage()
     material = UsdShade.Material.Define(stage, path)
@@ -228,7 +228,7 @@ def bind_color(path: str, prim: Usd.Prim, rgba: Rgba, texture: str = "") -> None
 
 
 def bind_friction(path: str, prim: Usd.Prim, coefficient: float) -> None:
-    """Lets colliders at a prim and under it have a friction coefficient; they do not bounce."""
+    """Sets the friction coefficient of colliders at and below a prim, without restitution."""
     material = UsdShade.Material.Define(prim.GetStage(), path)
     physics = UsdPhysics.MaterialAPI.Apply(material.GetPrim())
     physics.CreateStaticFrictionAttr(coefficient)

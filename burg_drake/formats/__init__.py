@@ -1,4 +1,4 @@
-"""Documents of other projects, read into plain data; needs nothing but `core`.
+"""Reads documents of other projects into plain data; depends only on `core`.
 
 Read `grasp_format` and `grasp_files` first; each grasp format is a module. `burg_toolkit` and `ycb`
 read object libraries and scenes.

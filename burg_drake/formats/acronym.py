@@ -78,7 +78,7 @@ ACRONYM_OBJECT_PROPERTIES: dict[str, tuple[ArrayShape, ...]] = {
 
 
 def recognise_acronym(path: Path) -> bool:
-    """An HDF5 file with `grasps/transforms`."""
+    """Whether a file is HDF5 with `grasps/transforms`."""
     try:
         if not is_hdf5(path):
             return False
@@ -89,10 +89,10 @@ def recognise_acronym(path: Path) -> bool:
 
 
 def read_acronym(path: Path, gripper: Gripper) -> ImportedGrasps:
-    """The grasps of a file; `score` is `object_in_gripper`.
+    """Reads the grasps of a file; `score` is `object_in_gripper`.
 
     Raises:
-        InvalidInputError: no such file, or a value that cannot be used; the message says where.
+        InvalidInputError: no such file, or an invalid value; the message says where.
     """
     with report_read_errors(path, "a readable HDF5 file"), open_hdf5(path) as file:
         return _read_tree(path, file, gripper)
@@ -142,7 +142,8 @@ def _read_poses(file: Hdf5File) -> NDArray[Any]:
 
 
 def _read_qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
-    """(n,) values by column: of FleX and of us under their names, of others as `WHO.NAME`."""
+    """(n,) values by column: results of FleX and of burg_drake by their names, others as
+    `SIMULATOR.NAME`."""
     columns: dict[str, NDArray[Any]] = {}
     if QUALITIES not in file:
         return columns
@@ -173,7 +174,7 @@ def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, 
     """Writes the grasps of one object.
 
     Raises:
-        InvalidInputError: grasps of several objects, or the place cannot be written to.
+        InvalidInputError: grasps of several objects, or the file cannot be written.
     """
     import h5py
 
@@ -200,7 +201,7 @@ def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, 
 
 
 def _quality_arrays(grasps: GraspSet, success: Array) -> dict[str, NDArray[Any]]:
-    """Values by dataset below `grasps/qualities`."""
+    """Values by data set below `grasps/qualities`."""
     flags = success if np.isnan(success).any() else success.astype(np.int64)
     result: dict[str, NDArray[Any]] = {f"flex/{GRASP_SUCCESS_COLUMN}": flags}
     if not np.array_equal(grasps.score, success, equal_nan=True):

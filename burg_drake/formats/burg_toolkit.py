@@ -62,10 +62,10 @@ Matrix = tuple[MatrixRow, MatrixRow, MatrixRow, MatrixRow]
 
 
 class BurgReader(Reader):
-    """Leaves aside keys that the schema lacks.
+    """Document reader that ignores keys that the schema lacks.
 
     Attributes:
-        notes: what was left aside, one sentence each.
+        notes: ignored keys, one sentence each.
     """
 
     def __init__(self, name: str) -> None:
@@ -91,7 +91,7 @@ class BurgReader(Reader):
         return super().read_dataclass(node, kind, where)
 
     def item_lines(self, node: yaml.Node, key: str) -> list[int]:
-        """Where the items of a list of the document begin."""
+        """Lines on which the items of a list of the document begin."""
         entries = self.entries(node, "")
         items = entries[key][1].value if key in entries else []
         return [item.start_mark.line + 1 for item in items]
@@ -102,12 +102,12 @@ class BurgReader(Reader):
         Args:
             node: the document.
             type: expected `yaml_file_type`.
-            title: what such a file is, for people.
+            title: kind of file in words.
             other: the other `yaml_file_type` of BURG-Toolkit.
             hint: what to do about files of that type.
 
         Raises:
-            DocumentError: it is no such file, or of another version.
+            DocumentError: the file has another type or version.
         """
         entries = self.entries(node, "")
         for key, expected in (("yaml_file_type", type), ("yaml_file_version", "1.0")):
@@ -126,11 +126,11 @@ class BurgReader(Reader):
 
 
 def locate_file(given: str | None, folder: Path) -> Path | None:
-    """A file that a document in `folder` names; where it is not, the longest end of its path that
-    there is.
+    """Finds a file that a document in `folder` names; if it is missing, the longest tail of its
+    path that exists.
 
-    A library that was moved without what lay outside of its folder, or that names files of another
-    machine, still finds `/home/someone/library/meshes/mug.obj` as `meshes/mug.obj`.
+    So a library that was moved, or that names files of another machine, still finds
+    `/home/someone/library/meshes/mug.obj` as `meshes/mug.obj`.
     """
     if not given:
         return None
@@ -148,7 +148,7 @@ class BurgStablePose:
     """A resting pose as BURG-Toolkit recorded it.
 
     Attributes:
-        probability: as trimesh estimated it.
+        probability: estimate of trimesh.
         X_SO: object in a frame whose xy plane is the support.
     """
 
@@ -162,13 +162,13 @@ class BurgObject:
 
     Attributes:
         identifier: unique in its library.
-        name: for people.
+        name: display name.
         mesh: the mesh file; it need not exist.
         scale: factor from the mesh file's unit to metres.
         mass: [kg]; None for an object that BURG-Toolkit fixes in space (mass 0 or absent).
         friction: coefficient; None where BURG-Toolkit uses its default of 0.24.
         stable_poses: most probable first.
-        line: where the object begins in the document.
+        line: line on which the object begins in the document.
     """
 
     identifier: str
@@ -187,10 +187,10 @@ class BurgLibrary:
 
     Attributes:
         path: the document.
-        name: for people.
+        name: display name.
         description: for people.
         objects: in the document's order.
-        notes: what in the document was not understood and left aside, one sentence each.
+        notes: parts of the document that were not understood and ignored, one sentence each.
     """
 
     path: Path
@@ -275,7 +275,7 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
         path: the `object_library.yaml`, or the folder that has it.
 
     Returns:
-        Its contents. Keys that version 1.0 does not have are left aside, with a note.
+        Its contents. Keys that version 1.0 does not have are ignored, with a note.
 
     Raises:
         DocumentError: it is no such file or of another version, or a value cannot be used; the
@@ -332,7 +332,7 @@ class BurgInstance:
     Attributes:
         object_type: identifier in the object library.
         X_SO: pose of its scaled mesh in the scene.
-        line: where it begins in the document.
+        line: line on which it begins in the document.
     """
 
     object_type: str
@@ -389,9 +389,9 @@ class BurgScene:
         ground_area: extents along x and y [m].
         objects: free objects, in the document's order.
         bg_objects: fixed objects.
-        library: the object library's document; it need not exist. None if the scene names none.
+        library: document of the object library, which need not exist; None if the scene names none.
         printout: the printed board; None if the scene has none.
-        notes: what in the document was left aside or changed, one sentence each.
+        notes: parts of the document that were ignored or changed, one sentence each.
     """
 
     path: Path
@@ -436,7 +436,7 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     """Reads a scene of BURG-Toolkit.
 
     Returns:
-        Its contents. Keys that version 1.0 does not have are left aside, with a note.
+        Its contents. Keys that version 1.0 does not have are ignored, with a note.
 
     Raises:
         DocumentError: it is no such file or of another version, or a value cannot be used; the

@@ -34,10 +34,10 @@ HAND_ALIASES = {"panda": "panda_hand", "franka_panda": "panda_hand"}
 
 
 def require_single_object(grasps: GraspSet, kind: str) -> str:
-    """The object that all grasps are of.
+    """Name of the only object of the grasps.
 
     Raises:
-        InvalidInputError: there are none, or of several objects.
+        InvalidInputError: there are no grasps, or grasps of several objects.
     """
     names = sorted(set(grasps.object.tolist()))
     if not names:
@@ -53,9 +53,9 @@ def require_single_object(grasps: GraspSet, kind: str) -> str:
 
 
 def object_name(file: str) -> str:
-    """What an object is called whose mesh or prim has this path, such as `meshes/Mug/1a2b.obj`.
+    """Object name from the path of its mesh or prim, such as `meshes/Mug/1a2b.obj`.
 
-    Meshes of our libraries are called alike and lie in a folder an object: `mug/mesh.obj`.
+    Meshes of burg_drake's libraries have the same name in a folder for each object: `mug/mesh.obj`.
     """
     *folders, last = file.replace("\\", "/").rstrip("/").split("/")
     if last in (MESH_FILE, "surface.obj") and folders and folders[-1]:
@@ -66,19 +66,20 @@ def object_name(file: str) -> str:
 
 
 def object_description(grasps: GraspSet, name: str) -> dict[str, Any]:
-    """What is told of an object: its mesh `file`, its `scale` and more; empty if nothing is."""
+    """Description of an object in the grasps: its mesh `file`, `scale` and more; empty if there is
+    none."""
     found = _find_description(grasps.provenance, name)
     return {key: value for key, value in found.items() if _is_description(key, value)}
 
 
 def shareable_description(grasps: GraspSet, name: str, path: Path) -> dict[str, Any]:
-    """The same, with the mesh as a file at `path` refers to it."""
+    """Object description with the mesh path relative to a file at `path`."""
     description = object_description(grasps, name)
     return dict(with_shareable_references(description, path.absolute().parent))
 
 
 def _is_description(key: str, value: Any) -> bool:
-    """Whether it is a name of a file, or else finite numbers; provenances come from anywhere."""
+    """Whether a value is a file name or finite numbers; provenances come from anywhere."""
     if key == "file":
         return isinstance(value, str) and bool(value)
     try:
@@ -100,8 +101,8 @@ def _find_description(provenance: Mapping[str, Any], name: str) -> dict[str, Any
 def success_labels(grasps: GraspSet) -> Array:
     """(N,) 1 for success, 0 for failure, NaN if unknown.
 
-    From the column `object_in_gripper`, or else from `outcome`, or else from scores if they are
-    nothing but 0 and 1.
+    From the column `object_in_gripper`, or else from `outcome`, or else from scores if these are
+    all 0 or 1.
     """
     if GRASP_SUCCESS_COLUMN in grasps.columns:
         return grasps.columns[GRASP_SUCCESS_COLUMN].astype(float)
@@ -115,10 +116,10 @@ def success_labels(grasps: GraspSet) -> Array:
 
 
 def check_gripper_name(given: str, gripper: Gripper, where: str) -> tuple[str, ...]:
-    """Compares what a file says of its hand; a note if the name tells nothing.
+    """Checks the hand that a file names; returns a note if the name is unknown.
 
     Raises:
-        InvalidInputError: the name is that of another hand.
+        InvalidInputError: the file names another hand.
     """
     known = HAND_ALIASES.get(given, given)
     if known == gripper.name:
@@ -132,7 +133,7 @@ def check_gripper_name(given: str, gripper: Gripper, where: str) -> tuple[str, .
 
 
 def scale_note(name: str, file: str, scale: float) -> str:
-    """What the scale of an object means for its grasps."""
+    """Note on the meaning of an object's scale for its grasps."""
     return (
         f"The grasps are in metres, for {name!r} made of {file!r} scaled by {scale:g};"
         " they fit an object of a library only if it was built at that size."
@@ -140,16 +141,15 @@ def scale_note(name: str, file: str, scale: float) -> str:
 
 
 def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet:
-    """The same grasps with some of their objects called otherwise; identifiers change with them.
+    """Returns the grasps with objects renamed; identifiers change with them.
 
     Args:
         grasps: the grasps.
-        names: new names by old ones; the one by the empty text is for all grasps, if they are of
-            one object.
+        names: new names by old names; an empty old name stands for the only object of the grasps.
 
     Raises:
-        InvalidInputError: one name is given for grasps of several objects.
-        UnknownNameError: there are no grasps of an object of an old name.
+        InvalidInputError: a name for all grasps, which are of several objects.
+        UnknownNameError: there are no grasps of an object with an old name.
     """
     known = distinct_texts(grasps.object)
     if not names or not known:
@@ -177,7 +177,7 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
 
 
 def _rename_in_provenance(provenance: Any, names: Mapping[str, str]) -> Any:
-    """A provenance whose `object_files`, and those of its parts, go by the new names."""
+    """A provenance with the objects renamed in its `object_files` and those of its parts."""
     if not isinstance(provenance, Mapping):
         return provenance
     result = dict(provenance)
@@ -192,7 +192,7 @@ def _rename_in_provenance(provenance: Any, names: Mapping[str, str]) -> Any:
 
 
 def with_success(grasps: GraspSet, above: float) -> GraspSet:
-    """The same grasps, of which those succeed whose score is above a limit."""
+    """Returns the grasps with success for scores above a limit."""
     success = np.where(np.isnan(grasps.score), np.nan, (grasps.score > above).astype(float))
     return grasps.with_columns(**{GRASP_SUCCESS_COLUMN: success})
 
@@ -200,13 +200,13 @@ def with_success(grasps: GraspSet, above: float) -> GraspSet:
 def write_each_object(
     grasps: GraspSet, folder: Path, format: GraspFormat, gripper: Gripper
 ) -> dict[Path, tuple[str, ...]]:
-    """Writes a file for each object into a folder.
+    """Writes one grasp file for each object into a folder.
 
     Returns:
-        What each file cannot carry.
+        Notes on the data that each file cannot carry.
 
     Raises:
-        InvalidInputError: files of two objects would share a name, or see `GraspFormat.write`.
+        InvalidInputError: files of two objects would share a name; also see `GraspFormat.write`.
     """
     paths: dict[Path, str] = {}
     for name in dict.fromkeys(grasps.object.tolist()):

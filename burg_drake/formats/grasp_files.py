@@ -1,4 +1,4 @@
-"""Reads and writes grasp files in all formats, recognises them, and has burg_drake's own one."""
+"""Reads, writes and recognises grasp files in all formats; defines burg_drake's own format."""
 
 from __future__ import annotations
 
@@ -40,28 +40,29 @@ def read_grasp_file(
 
     Args:
         path: the file.
-        format: its format; None to tell by the content.
+        format: its format; None to recognise it by the content.
         gripper: the hand that the grasps were made for.
 
     Raises:
-        InvalidInputError: the file cannot be read or is of none of the formats.
+        InvalidInputError: the file cannot be read or has none of the formats.
         UnknownNameError: there is no such format.
     """
     path = Path(path)
     if path.is_dir() or not path.exists():
         kind = "is a folder" if path.is_dir() else "does not exist"
         raise InvalidInputError(f"cannot read grasps: {path} {kind}; give a file")
-    open_regular(path).close()  # formats are recognised by reading the file again and again
+    open_regular(path).close()  # fails for files that cannot be read several times
     chosen = format_named(format) if format is not None else format_of(path)
     with report_read_errors(path, f"a file of {chosen.title} that can be read"):
         return chosen.read(path, gripper)
 
 
 def format_of(path: str | Path) -> GraspFormat:
-    """The format of a file, by its content.
+    """Recognises the format of a file by its content.
 
     Raises:
-        InvalidInputError: it is of none; of `.npz`, YAML and JSON that cannot be read, why.
+        InvalidInputError: the file has none of the formats; the message says why `.npz`, YAML or
+            JSON cannot be read.
     """
     path = Path(path)
     for format in GRASP_FORMATS.values():
@@ -70,7 +71,7 @@ def format_of(path: str | Path) -> GraspFormat:
     if path.suffix in (".yaml", ".yml"):
         text, limits = read_text(path, FileLimits.grasp_file), FileLimits.grasp_file
         for _ in checked_yaml_events(text, str(path), limits):
-            pass  # says what is wrong with a file that is damaged or beyond the limits
+            pass  # raises the error of a file that is damaged or beyond the limits
     if path.suffix == ".json":
         load_json(path, FileLimits.grasp_file)
     if path.suffix.lower() == ".npz":
@@ -90,21 +91,21 @@ def format_of(path: str | Path) -> GraspFormat:
 def write_grasp_file(
     grasps: GraspSet, path: str | Path, format: str | None = None, gripper: Gripper = PANDA_GRIPPER
 ) -> tuple[str, ...]:
-    """Writes grasps in any format, whole or not at all.
+    """Writes grasps in any format; on an error no partial file remains.
 
     Args:
-        grasps: `X_OG` has the poses of G in the frame that the format wants, see
+        grasps: `X_OG` has the poses of G in the reference frame of the format, see
             `GraspFormat.frame`.
         path: the file.
-        format: None for the one that the suffix of `path` stands for.
+        format: None for the format of the suffix of `path`.
         gripper: the hand of the grasps.
 
     Returns:
-        What the file cannot carry, one sentence each.
+        Notes on the data that the file cannot carry, one sentence each.
 
     Raises:
-        InvalidInputError: the format cannot hold such grasps, the suffix stands for several formats
-            or none, or the place cannot be written to.
+        InvalidInputError: the format cannot hold such grasps, the suffix belongs to several formats
+            or none, or the file cannot be written.
         UnknownNameError: there is no such format.
     """
     path = Path(path)
@@ -113,10 +114,10 @@ def write_grasp_file(
 
 
 def format_by_suffix(path: str | Path) -> GraspFormat:
-    """The format that a file's name stands for; of several, our own.
+    """The format of a file name's suffix; burg_drake's own format if several share it.
 
     Raises:
-        InvalidInputError: none, or several that are not ours.
+        InvalidInputError: no format has the suffix, or several others have it.
     """
     suffix = Path(path).suffix.lower()
     fitting = [format for format in GRASP_FORMATS.values() if suffix in format.suffixes]
@@ -180,7 +181,7 @@ GRASP_FORMATS: Mapping[str, GraspFormat] = {
 
 
 def format_named(name: str) -> GraspFormat:
-    """The format of a name.
+    """The format with this name.
 
     Raises:
         UnknownNameError: there is no such format.

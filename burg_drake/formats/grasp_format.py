@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from burg_drake.core import Array, GraspSet, inverse, list_names, make_pose, rot_z
 
 PoseFrame = Literal["object", "world", "camera"]
-"""What grasp poses of a file are measured in."""
+"""Reference frame of the grasp poses of a file."""
 
 PREGRASP_WIDTH_COLUMN = "pregrasp_width"
 """Column: opening of the hand on arrival, in metres; NaN if unknown."""
@@ -41,15 +41,15 @@ class GripperJoint:
 
 @dataclass(frozen=True, eq=False)
 class Gripper:
-    """What formats have to know of a parallel hand.
+    """Properties of a parallel hand that formats need.
 
     Attributes:
         name: the hand's name.
         body: link of the hand whose frame is H.
         X_HG: (4, 4) grasp frame in H.
-        tip: how far the finger tips reach beyond G along the approach [m].
+        tip: distance from G to the finger tips along the approach [m].
         opening: smallest and largest distance between the pads [m].
-        joints: of the fingers; each position follows the distance of the pads in proportion.
+        joints: finger joints; their positions are linear in the distance between the pads.
     """
 
     name: str
@@ -61,24 +61,25 @@ class Gripper:
 
     @property
     def X_GH(self) -> Array:
-        """(4, 4) the hand's body in G."""
+        """(4, 4) pose of the hand's body in G."""
         return inverse(self.X_HG)
 
     @property
     def X_GB(self) -> Array:
-        """(4, 4) the hand's base as several projects have it: the origin of H, the axes of G."""
+        """(4, 4) pose in G of the hand's base as defined by several projects: the origin of H, the
+        axes of G."""
         return make_pose(p_AB=self.X_GH[:3, 3])
 
     def positions(self, width: ArrayLike) -> dict[str, Array]:
-        """Joint positions (...) [m] by joint that put the pads `width` (...) [m] apart."""
+        """Positions (...) [m] by joint at which the pads are `width` (...) [m] apart."""
         low, high = self.opening
         share = (np.asarray(width, dtype=float) - low) / (high - low)
         return {j.name: j.closed + share * (j.open - j.closed) for j in self.joints}
 
     def width(self, positions: Mapping[str, ArrayLike]) -> Array:
-        """Distance between the pads (...) [m] with some of the joints at these positions (...).
+        """Distance between the pads (...) [m] at positions (...) of some of the joints.
 
-        The mean over the joints that are given; there has to be one.
+        It is the mean over the given joints, at least one.
         """
         low, high = self.opening
         shares = [
@@ -105,12 +106,12 @@ PANDA_GRIPPER = Gripper(
 
 @dataclass(frozen=True, eq=False)
 class ImportedGrasps:
-    """What was read of a file.
+    """Grasps read from a file.
 
     Attributes:
-        grasps: `X_OG` has the poses of G in `frame`, whatever that is.
-        frame: what the poses are measured in.
-        notes: what of the file was left behind or changed, one sentence each.
+        grasps: `X_OG` has the poses of G in `frame`.
+        frame: reference frame of the poses.
+        notes: data of the file that were ignored or changed, one sentence each.
     """
 
     grasps: GraspSet
@@ -123,19 +124,19 @@ class GraspFormat:
     """A kind of grasp file.
 
     Attributes:
-        name: as options have it, such as `acronym`.
-        title: for people.
-        suffixes: of its files, such as `.h5`; the first one is what is written.
-        frame: what grasp poses are measured in.
-        source: who defines it: repository and file, or paper.
-        carries: what it has of a grasp besides the pose.
-        cannot_carry: what gets lost when written.
-        X_GF: (4, 4) its grasp frame in ours, for a gripper.
-        recognises: whether a file is of this kind, by its content; False for what cannot be read.
-        read: the grasps of a file made for a gripper.
-        write: writes grasps of a gripper and returns what the file cannot carry, one sentence each.
-        one_object: a file holds the grasps of one object.
-        X_GF_each: (N, 4, 4) the same for each grasp of a set that was read, where they differ.
+        name: name in options, such as `acronym`.
+        title: display name.
+        suffixes: suffixes of its files, such as `.h5`; files are written with the first one.
+        frame: reference frame of grasp poses.
+        source: definition of the format: repository and file, or paper.
+        carries: data of a grasp that it has besides the pose.
+        cannot_carry: data that are lost on writing.
+        X_GF: (4, 4) pose of its grasp frame F in our grasp frame G, for a gripper.
+        recognises: whether a file has this format, by its content; False for unreadable files.
+        read: reads the grasps of a file made for a gripper.
+        write: writes grasps of a gripper and returns notes on data that the file cannot carry.
+        one_object: whether a file holds the grasps of only one object.
+        X_GF_each: (N, 4, 4) the same for each grasp of a set that was read, if they differ.
     """
 
     name: str
@@ -153,24 +154,24 @@ class GraspFormat:
     X_GF_each: Callable[[GraspSet, Gripper], Array] | None = None
 
     def frames(self, grasps: GraspSet, gripper: Gripper) -> Array:
-        """(N, 4, 4) the format's grasp frame in ours, for each grasp that was read of a file."""
+        """(N, 4, 4) poses of the format's grasp frame F in G, for each grasp read from a file."""
         if self.X_GF_each is not None:
             return self.X_GF_each(grasps, gripper)
         return np.broadcast_to(self.X_GF(gripper), (len(grasps), 4, 4))
 
 
 def file_provenance(format: GraspFormat, path: Path, **more: Any) -> dict[str, Any]:
-    """Provenance of grasps that are read of a file."""
+    """Provenance of grasps read from a file."""
     return {"format": format.name, "file": str(path.absolute()), **more}
 
 
 def conversion_losses(grasps: GraspSet, carried: Collection[str], title: str) -> tuple[str, ...]:
-    """A sentence about the columns that get lost, `id` among them; none if nothing gets lost.
+    """A sentence about the columns that are lost, including `id`; empty if none is lost.
 
     Args:
-        grasps: what is written.
-        carried: columns that the file has a place for.
-        title: of the format.
+        grasps: grasps to write.
+        carried: columns that the file can hold.
+        title: display name of the format.
     """
     lost = [
         name
@@ -191,10 +192,10 @@ class Convention:
     """The grasp frame F of a format for a hand.
 
     Attributes:
-        approach: the axis of its frame F that points where the hand moves, such as `+z`.
-        closing: the axis of F along which the fingers close, such as `x`; either way, as fingers
+        approach: the axis of F along which the hand approaches, such as `+z`.
+        closing: the axis of F along which the fingers close, such as `x`; without sign, as fingers
             are exchangeable.
-        origin: where F has its origin.
+        origin: origin of F in words.
     """
 
     approach: str
@@ -215,7 +216,7 @@ def convention_of(format: GraspFormat, gripper: Gripper) -> Convention:
 def group_by_convention(
     formats: Iterable[GraspFormat], gripper: Gripper
 ) -> list[tuple[GraspFormat, ...]]:
-    """Formats that say where a grasp is in the same way, put together."""
+    """Groups formats with the same grasp frame convention."""
     groups: list[list[GraspFormat]] = []
     for format in formats:
         for group in groups:
@@ -236,7 +237,7 @@ def axis_along(X_GF: Array, direction: tuple[float, float, float]) -> str:
         direction: (3,) of unit length, in G.
 
     Returns:
-        Such as `+z`, or `+z, 12 deg off`.
+        Axis such as `+z`, or `+z, 12 deg off`.
     """
     along = X_GF[:3, :3].T @ np.asarray(direction)
     k = int(np.argmax(np.abs(along)))
@@ -248,11 +249,11 @@ def axis_along(X_GF: Array, direction: tuple[float, float, float]) -> str:
 
 
 def origin_in_words(p_GF: Array, gripper: Gripper) -> str:
-    """Where a point is, from G.
+    """Describes the position of a point relative to G.
 
     Args:
         p_GF: (3,) [m].
-        gripper: whose landmarks are named: H and the finger tips.
+        gripper: gripper whose landmarks, H and the finger tips, are named.
     """
     x, y, z = p_GF
     places = []

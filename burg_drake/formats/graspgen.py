@@ -64,7 +64,7 @@ _GRASPS_KEY = re.compile(rb'"grasps"\s*:\s*\{')  # The key `grasps` with a mappi
 
 
 def recognise_graspgen(path: Path) -> bool:
-    """JSON with `grasps` as a mapping."""
+    """Whether a file is JSON with `grasps` as a mapping."""
     try:
         with open(path, "rb") as stream:
             head = stream.read(1 << 16)
@@ -74,10 +74,10 @@ def recognise_graspgen(path: Path) -> bool:
 
 
 def read_graspgen(path: Path, gripper: Gripper) -> ImportedGrasps:
-    """The grasps of a file; `score` is `object_in_gripper`.
+    """Reads the grasps of a file; `score` is `object_in_gripper`.
 
     Raises:
-        InvalidInputError: no such file, or a value that cannot be used; the message says where.
+        InvalidInputError: no such file, or an invalid value; the message says where.
     """
     document = load_json(path, FileLimits.grasp_file)
     if not isinstance(document, dict):
@@ -116,7 +116,7 @@ def _require_mapping(path: Path, document: dict[str, Any], key: str) -> dict[str
 
 
 def _read_success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
-    """(N,) 1 or 0; None if the file does not say."""
+    """(N,) success, 1 or 0; None if the file does not have it."""
     if GRASP_SUCCESS_COLUMN not in grasps:
         return None
     where = f"{path}: grasps.{GRASP_SUCCESS_COLUMN}"
@@ -135,7 +135,7 @@ def _read_success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
 def _read_object(
     path: Path, document: dict[str, Any]
 ) -> tuple[str, dict[str, Any], tuple[str, ...]]:
-    """Its name, what the file says of it, and a note about its scale."""
+    """The object's name, its description in the file, and a note about its scale."""
     if "object" not in document:
         note = f"The file names no object; the object is called {path.stem!r}, like the file."
         return path.stem, {}, (note,)
@@ -157,7 +157,7 @@ def _read_object(
 def _gripper_offset(
     path: Path, document: dict[str, Any], gripper: Gripper
 ) -> tuple[tuple[str, ...], Array]:
-    """Notes about the gripper, and (4, 4) what transforms are multiplied by."""
+    """Notes about the gripper, and the (4, 4) offset by which transforms are multiplied."""
     key = "transform_offset_from_asset_to_graspgen_convention"
     if "gripper" not in document:
         return (), np.eye(4)
@@ -185,8 +185,8 @@ def write_graspgen(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str,
     """Writes the grasps of one object.
 
     Raises:
-        InvalidInputError: grasps of several objects, some known to succeed or fail and others not,
-            or the place cannot be written to.
+        InvalidInputError: grasps of several objects, success known for some grasps only, or the
+            file cannot be written.
     """
     name = require_single_object(grasps, "a GraspGen file")
     described = shareable_description(grasps, name, path)

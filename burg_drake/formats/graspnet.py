@@ -51,11 +51,11 @@ DEFAULT_HEIGHT = 0.02
 DEFAULT_DEPTH = 0.02
 """Metres; labels and networks have depths of 0.01 to 0.04."""
 NO_OBJECT_ID = -1
-"""Object number of grasps without one."""
+"""Object number of grasps of unknown objects."""
 
 
 def graspnet_X_FG(depth: ArrayLike, gripper: Gripper) -> Array:
-    """Our grasp frame (..., 4, 4) in theirs, for depths (...) [m]."""
+    """Poses (..., 4, 4) of our grasp frame G in GraspNet's frame F, for depths (...) [m]."""
     # Axes of G in the format's frame F: z, the approach, is x of F; x is y of F.
     rotation = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     beyond = np.asarray(depth, dtype=float) - gripper.tip
@@ -123,7 +123,7 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
 
 
 def _arrival_openings(grasps: GraspSet, gripper: Gripper) -> tuple[Array, tuple[str, ...]]:
-    """(N,) distance of the pads on arrival [m], and notes about those that had to be assumed."""
+    """(N,) distance between the pads on arrival [m], and notes about assumed values."""
     arrival_clearance = 0.01  # Assumed metres between each finger and its contact on arrival.
     widest = gripper.opening[1]
     given = _column_or_default(grasps, PREGRASP_WIDTH_COLUMN, np.nan)
@@ -144,7 +144,7 @@ def _arrival_openings(grasps: GraspSet, gripper: Gripper) -> tuple[Array, tuple[
 
 
 def _column_or_default(grasps: GraspSet, name: str, default: float) -> Array:
-    """A column of numbers, with a default where there are none."""
+    """A column of numbers, with a default for missing values."""
     values = grasps.columns.get(name)
     if values is None:
         return np.full(len(grasps), default)

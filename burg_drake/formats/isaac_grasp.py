@@ -69,15 +69,15 @@ OBJECT_KEYS = ("object_file", "object_frame_link", "object_frame")
 
 
 def read_isaac_grasp(format: GraspFormat, path: Path, gripper: Gripper) -> ImportedGrasps:
-    """The grasps of a file; `score` is the confidence.
+    """Reads the grasps of a file; `score` is the confidence.
 
     Args:
-        format: of the file, Isaac Sim's or GraspGen's.
+        format: format of the file, Isaac Sim's or GraspGen's.
         path: the file.
         gripper: the hand of the grasps.
 
     Raises:
-        DocumentError: no such file, or a value that cannot be used; the message says where.
+        DocumentError: no such file, or an invalid value; the message says where.
     """
     document = load_plain_yaml(path)
     _check_format_version(path, document)
@@ -141,7 +141,7 @@ def _check_gripper_link(path: Path, document: Mapping[str, Any], gripper: Grippe
 
 
 def _read_object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Its name, and what the file says of it."""
+    """The object's name, and its description in the file."""
     file = next((str(document[key]) for key in OBJECT_KEYS if document.get(key)), "")
     described: dict[str, Any] = {"file": file} if "object_file" in document else {}
     if "object_file" in document and "object_scale" in document:
@@ -153,7 +153,7 @@ def _read_object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str
 
 
 def _read_poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
-    """(N, 4, 4) poses as written."""
+    """(N, 4, 4) poses as in the file."""
     positions = {
         name: _require_field(path, name, g, "position", list) for name, g in grasps.items()
     }
@@ -168,7 +168,7 @@ def _read_poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
     p = _parse_numbers(path, positions, (3,), "position")
     q = _parse_numbers(path, quaternions, (4,), "orientation")
     length = np.linalg.norm(q, axis=1)
-    off = np.abs(length - 1.0) > 1e-3  # as of five decimals
+    off = np.abs(length - 1.0) > 1e-3  # allows five decimals
     if off.any():
         i = int(np.argmax(off))
         raise DocumentError(
@@ -186,7 +186,7 @@ def _require_field(path: Path, name: str, grasp: Mapping[str, Any], key: str, ki
 
 
 def _read_confidences(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
-    """(N,); NaN where there is none."""
+    """(N,) confidences; NaN for grasps without one."""
     given = {name: g["confidence"] for name, g in grasps.items() if "confidence" in g}
     unknown = {name for name, text in given.items() if text in (".nan", ".NaN", ".NAN", "null")}
     known = {name: text for name, text in given.items() if name not in unknown}
@@ -197,7 +197,7 @@ def _read_confidences(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Ar
 def _widths_from_joints(
     path: Path, grasps: Mapping[str, Mapping[str, Any]], key: str, gripper: Gripper
 ) -> tuple[Array, tuple[str, ...]]:
-    """(N,) distance between the pads, NaN where no joint of the hand is given, and notes."""
+    """(N,) distance between the pads, NaN for grasps without a joint of the hand, and notes."""
     given = {joint.name: np.full(len(grasps), np.nan) for joint in gripper.joints}
     unknown: set[str] = set()
     for i, (name, grasp) in enumerate(grasps.items()):
@@ -221,7 +221,7 @@ def _widths_from_joints(
 def _extra_columns(
     grasps: Mapping[str, Mapping[str, Any]],
 ) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
-    """Columns of single values under foreign keys, and a note about the rest."""
+    """Columns for unknown keys with single values, and a note about the other keys."""
     interpreted = ("confidence", "position", "orientation", CLOSED_JOINTS_KEY, OPEN_JOINTS_KEY)
     reserved_columns = (*FIXED_COLUMNS, "name", PREGRASP_WIDTH_COLUMN)
     keys = dict.fromkeys(key for g in grasps.values() for key in g if key not in interpreted)
@@ -242,7 +242,7 @@ def _extra_columns(
 def _parse_numbers(
     path: Path, given: Mapping[str, Any], shape: tuple[int, ...], key: str
 ) -> NDArray[np.float64]:
-    """(N, *shape) finite numbers from texts; the error names the first value that is none."""
+    """(N, *shape) finite numbers from texts; the error names the first invalid value."""
     expected = (len(given), *shape)
     try:
         values = np.array(list(given.values()) or np.empty(expected), dtype=float)
@@ -282,7 +282,7 @@ def _value_error(path: Path, where: str, given: Any, expected: str) -> DocumentE
 def write_isaac_grasp(
     format: GraspFormat, grasps: GraspSet, path: Path, gripper: Gripper
 ) -> tuple[str, ...]:
-    """Writes the grasps of one object; returns what the file cannot carry.
+    """Writes the grasps of one object; returns notes on data that the file cannot carry.
 
     Args:
         format: of the file; GraspGen's has neither frames nor joints.
@@ -291,7 +291,7 @@ def write_isaac_grasp(
         gripper: the hand of the grasps.
 
     Raises:
-        InvalidInputError: grasps of several objects, or the place cannot be written to.
+        InvalidInputError: grasps of several objects, or the file cannot be written.
     """
     object = require_single_object(grasps, f"a file of {format.title}")
     X_OF = grasps.X_OG @ format.X_GF(gripper)
@@ -329,7 +329,7 @@ def write_isaac_grasp(
 
 
 def _notes_on_widths(width: Array, opening: Array, gripper: Gripper) -> tuple[str, ...]:
-    """A note if the hand cannot open or close so far."""
+    """A note if the hand cannot open or close to these widths."""
     low, high = gripper.opening
     tolerance = 1e-6  # metres, for widths in single precision
     off = [(w < low - tolerance) | (w > high + tolerance) for w in (width, opening)]
@@ -355,7 +355,7 @@ def _notes_on_losses(grasps: GraspSet, format: GraspFormat) -> tuple[str, ...]:
 
 
 def _grasp_names(grasps: GraspSet) -> list[str]:
-    """Those that the grasps have, if they differ; else numbers."""
+    """Names of the grasps if these are unique, else numbers."""
     given = grasps.columns.get("name", np.array([], dtype=str))
     names = [str(name) for name in given.tolist()]
     if all(names) and len(set(names)) == len(grasps):
@@ -368,7 +368,7 @@ def _yaml_list(values: Array) -> str:
 
 
 def _yaml_number(value: float) -> str:
-    """A number that YAML 1.1 takes for one: `1e-05` would be text, `1.0e-05` is not."""
+    """A number in a form that YAML 1.1 reads as a number: `1.0e-05`, as `1e-05` would be text."""
     text = repr(float(value))
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
@@ -381,9 +381,9 @@ _GRIPPER_KEY = re.compile(
 
 
 def describes_gripper(path: Path) -> bool | None:
-    """Whether text with the line `format: isaac_grasp` has a gripper frame, a gripper's file or
-    joints, which GraspGen does not write; None for other files."""
-    block_size = 1 << 16  # read at each end: sorted keys have the gripper after the grasps
+    """Whether an `isaac_grasp` file has a gripper frame, gripper file or joints, which GraspGen
+    does not write; None for files without the line `format: isaac_grasp`."""
+    block_size = 1 << 16  # read at both ends, as sorted keys have the gripper after the grasps
     try:
         with path.open("rb") as stream:
             text = stream.read(block_size)

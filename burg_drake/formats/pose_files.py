@@ -29,18 +29,19 @@ from burg_drake.core import (
 
 
 def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
-    """Poses of a file with rotations that are orthonormal to double precision.
+    """Orthonormalises the rotations of poses from a file to double precision.
 
     Args:
         X: (N, 4, 4) numbers.
         where: file and key, such as `mug.h5: grasps/transforms`.
 
     Returns:
-        (N, 4, 4) poses, each with the rotation nearest to what was given (Kabsch 1976, by singular
-        values), and a note if they were further off than rounding of single precision.
+        (N, 4, 4) poses, each with the rotation nearest to the given one (Kabsch 1976, by singular
+        values), and a note if the correction exceeds rounding of single precision.
 
     Raises:
-        InvalidInputError: wrong shape, not finite, not rigid; the message names the first one.
+        InvalidInputError: wrong shape, not finite, not rigid; the message names the first such
+            pose.
     """
     max_rounding = 1e-3  # of R' R from identity, as of files with 3 to 4 decimals
     note_threshold = 1e-6
@@ -91,8 +92,9 @@ def read_poses(references: Sequence[str]) -> Array:
         (4, 4) pose.
 
     Raises:
-        InvalidInputError: a file holds no pose, several without an index, or none of that index.
-        DocumentError: a YAML file that is no pose.
+        InvalidInputError: a file holds no pose, several poses without an index given, or no pose of
+            the given index.
+        DocumentError: a YAML file is not a pose.
     """
     X = make_pose()
     for reference in references:

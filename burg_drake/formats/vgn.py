@@ -114,7 +114,7 @@ def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
 
 
 def _contact_widths(width: Array, label: NDArray[Any] | None) -> tuple[Array, tuple[str, ...]]:
-    """(N,) widths without those of failures, and a note if there were some."""
+    """(N,) widths, NaN for failed grasps, and a note if there were some."""
     if label is None or label.dtype.kind != "f":
         return width, ()
     left = ~np.isnan(width) & (label == 0.0)
@@ -123,7 +123,7 @@ def _contact_widths(width: Array, label: NDArray[Any] | None) -> tuple[Array, tu
 
 
 def _read_cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
-    """The texts of a CSV file by column, and the lines that they end on."""
+    """Texts of a CSV file by column, and the line numbers on which they end."""
     numbered = read_rows(path)
     if not numbered:
         raise InvalidInputError(
@@ -144,7 +144,7 @@ def _read_cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
 
 
 def _parse_numbers(path: Path, name: str, texts: Sequence[str], lines: Sequence[int]) -> Array:
-    """A column of finite numbers; NaN is fine for a width."""
+    """A column of finite numbers; widths may be NaN."""
     values = np.empty(len(texts))
     for i, text in enumerate(texts):
         try:
@@ -162,7 +162,7 @@ def _parse_numbers(path: Path, name: str, texts: Sequence[str], lines: Sequence[
 
 
 def _parse_column(texts: Sequence[str]) -> NDArray[Any]:
-    """Numbers if all of the cells are, NaN for empty ones; else texts."""
+    """Numbers if all cells are numbers or empty (NaN); else texts."""
     try:
         return np.array([float(text) if text else np.nan for text in texts])
     except ValueError:
@@ -199,8 +199,8 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
 
 
 def _success_labels(grasps: GraspSet) -> list[Any] | None:
-    """1 for a success, 0 for a failure, an empty text where that is not known; None without any:
-    the label that came with the grasps, else the outcome of their trials."""
+    """Labels 1 for success, 0 for failure and empty if unknown, from the label that came with the
+    grasps or else the outcome of their trials; None if all are unknown."""
     if "label" in grasps.columns:
         return [_label_text(value) for value in grasps.columns["label"].tolist()]
     if "outcome" in grasps.columns:

@@ -59,14 +59,14 @@ _NUMBERED_NAME = re.compile(r"(?:ycb_)?(\d{3})(?:[-_]([a-z]))?_(.+)")
 
 @dataclass(frozen=True, kw_only=True)
 class YcbObject:
-    """An object of the YCB set that is on this disk.
+    """An object of the YCB set on this disk.
 
     Attributes:
         number: such as `003` or `065-a`.
         name: such as `003_cracker_box`.
-        mesh: the best mesh file that was found; YCB meshes are in metres.
-        variant: the scan it is of, such as `google_16k`; empty if its path does not tell.
-        mass: as published [kg]; None if no mass is published for what the mesh shows.
+        mesh: the best mesh file found; YCB meshes are in metres.
+        variant: scan of the mesh, such as `google_16k`; empty if its path does not name it.
+        mass: published mass [kg]; None if no mass is published for the object of the mesh.
         mass_source: where the mass was published; empty without one.
     """
 
@@ -85,8 +85,8 @@ def find_ycb(folder: str | Path) -> list[YcbObject]:
         folder: where the downloads were unpacked.
 
     Returns:
-        One entry an object, by number; of several meshes of an object the one that suits best, see
-        `YCB_VARIANTS` and `_identify_mesh`.
+        One entry per object, by number, with its best mesh, see `YCB_VARIANTS` and
+        `_identify_mesh`.
 
     Raises:
         InvalidInputError: there is no such folder, or no object of the set in it.
@@ -140,7 +140,7 @@ def _walk_files(folder: Path) -> Iterator[Path]:
 
 
 def _identify_mesh(file: Path) -> tuple[str, tuple[int | str, ...]] | None:
-    """The object that a file shows, and a rank (lower is better); None for any other file."""
+    """The object of a mesh file, and a rank (lower is better); None for any other file."""
     stems = ("textured", "", "textured_simple", "nontextured")  # best first; "": the object's name
     suffixes = (".obj", ".ply", ".stl", ".glb", ".gltf")  # best first
     suffix = file.suffix.lower()
@@ -158,7 +158,7 @@ def _identify_mesh(file: Path) -> tuple[str, tuple[int | str, ...]] | None:
         kind = next((s for s in stems if s and stem.endswith(f"_{s}")), "")
     if name is None:
         return None
-    # the nearest folder that tells the variant; above the object's own folder none does
+    # the nearest folder that names the variant, up to the object's own folder
     near = [stem.removesuffix(f"_{kind}"), *reversed(parts)][:4]
     variant = next(
         (v for p in near for v in YCB_VARIANTS if v and (p == v or p.endswith(f"_{v}"))), ""

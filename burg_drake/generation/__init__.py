@@ -1,4 +1,4 @@
-"""Scenes by the thousand: drawn from a recipe, settled, accepted or not, kept in a folder.
+"""Samples scenes in bulk: draws them from a recipe, settles, accepts and stores them in a folder.
 
 Read `scene_sampling` first, then `scene_folder`.
 """

@@ -1,4 +1,4 @@
-"""Settles a heap of objects; what lies beyond the board's edge, or creeps, is dropped again."""
+"""Settles a heap of objects; drops objects again that lie off the board or creep."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from burg_drake.simulation import (
 from burg_drake.station import SceneCheck, Station, build_station_diagram, obstacle_corners
 
 BOARD_EDGE_MARGIN = 0.003
-"""Metres within the board's edge for objects that relax or are dropped again."""
+"""Margin inside the board's edge for objects that relax or are dropped again, in metres."""
 
 
 @dataclass(frozen=True)
 class SettledHeap:
-    """What became of a heap.
+    """Result of settling a heap.
 
     Attributes:
         scene: the heap.
-        faulty: objects that creep, or lie where they may not; none if it is a good heap.
-        drops: how often something was dropped once more.
+        faulty: objects that creep or are misplaced; empty for a good heap.
+        drops: number of times that objects were dropped again.
     """
 
     scene: Scene
@@ -46,19 +46,19 @@ def settle_heap(
     shapes: ObjectShapes,
     rng: np.random.Generator,
 ) -> SettledHeap:
-    """Lets a heap fall, and come to rest on the board.
+    """Drops a heap onto the board and lets it come to rest.
 
     Args:
-        scene: objects that hang above the board.
-        station: table and boxes.
-        check: of that station.
-        shapes: of the library's objects.
-        rng: draws where something is dropped once more.
+        scene: objects above the board.
+        station: station with table and obstacles.
+        check: scene check of that station.
+        shapes: shapes of the library's objects.
+        rng: random numbers for the positions of objects that are dropped again.
 
     Raises:
         SimulationError: Drake cannot step the scene.
     """
-    max_drops = 10  # Times that objects are dropped again.
+    max_drops = 10
     settler = _HeapSettler(station, check, shapes)
     falling: Collection[str] = scene.instances
     # Objects still shift when they relax.
@@ -85,15 +85,15 @@ def settle_heap(
 
 @dataclass(frozen=True)
 class _HeapSettler:
-    """Brings one heap to rest, and says what is wrong with it."""
+    """Brings one heap to rest, and finds its faulty objects."""
 
     station: Station
     check: SceneCheck
     shapes: ObjectShapes
 
     def settle(self, scene: Scene) -> tuple[Scene, Collection[str]]:
-        """A heap that was relaxed, and what is wrong with it, if anything."""
-        # Shares of friction while objects relax: at first, and when they creep.
+        """The relaxed heap, and its faulty objects."""
+        # Factors of friction while objects relax: at first, and when they creep.
         friction_shares = (0.25, 0.15, 0.1)
         faulty = self._misplaced_objects(scene)
         if faulty:
@@ -114,8 +114,7 @@ class _HeapSettler:
     def raise_faulty_objects(
         self, scene: Scene, faulty: Collection[str], rng: np.random.Generator
     ) -> Scene:
-        """The scene with its faulty objects where there is room above the others, large ones
-        first."""
+        """Moves faulty objects to free space above the others, large ones first."""
         heap = Heap(
             OccupiedBoard(scene.board, obstacle_corners(self.station)),
             [self.shapes[one.object] for one in scene.instances.values()],
@@ -126,28 +125,27 @@ class _HeapSettler:
                 heap.add(self.shapes[one.object], scene.X_SO(name))
         sizes = {n: np.prod(np.ptp(self.shapes[found[n].object].corners, axis=0)) for n in faulty}
         for name in sorted(faulty, key=lambda name: (-sizes[name], name)):
-            X_SO = heap.place_low(self.shapes[found[name].object], rng)
+            X_SO = heap.place_lowest(self.shapes[found[name].object], rng)
             if X_SO is not None:
                 found[name] = replace(found[name], X_SO=Pose.readable(X_SO))
         document = replace(scene.document, instances=tuple(found.values()))
         return Scene(document, scene.library, scene.path)
 
     def _relax(self, scene: Scene, slack: Mapping[str, float], moving: Collection[str]) -> Scene:
-        """A scene whose objects have come to rest with shares of their friction."""
+        """The scene after its objects have come to rest with reduced friction."""
         built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING_ENGINE)
         reduce_friction_of(built, {built.free[name]: share for name, share in slack.items()})
-        # The guard stops what gets slower.
+        # The guard stops objects that slow down.
         guard = BoardEdgeGuard(built, self.shapes, margin=BOARD_EDGE_MARGIN, share=1.0)
         relaxed = relax(built, moving, 1.0, before_window=guard.push_back)
         return _restore_missing(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 
     def _misplaced_objects(self, scene: Scene) -> set[str]:
-        """Objects that are where a scene may have nothing."""
+        """Objects in places where a scene may have none."""
         return {issue.instance for issue in self.check.issues(scene) if issue.is_error}
 
 
 def _restore_missing(scene: Scene, before: Scene) -> Scene:
-    """A scene with all objects of an earlier one: what fell off the table hangs where it did, and
-    in the order of that."""
+    """Restores objects that fell off the table at their earlier poses, in the earlier order."""
     instances = tuple(scene.instances.get(name, one) for name, one in before.instances.items())
     return Scene(replace(scene.document, instances=instances), scene.library, scene.path)

@@ -39,16 +39,16 @@ from burg_drake.station import StationLike, as_station
 
 @dataclass(frozen=True)
 class SceneRow:
-    """What the table tells of a number.
+    """Row of a scene in the table.
 
     Attributes:
-        scene: its number.
-        accepted: there is a file of it.
-        objects: in it; of the best attempt if none was accepted.
-        missing: objects that found no place there.
-        attempts: scenes that were drawn.
-        tries: places that were looked at.
-        refused: how many attempts were refused, by reason.
+        scene: number of the scene.
+        accepted: whether the scene was accepted and has a file.
+        objects: number of objects, of the best attempt if none was accepted.
+        missing: names of objects without a free place.
+        attempts: number of scenes drawn.
+        tries: number of object poses tried.
+        refused: number of refused attempts, by reason.
     """
 
     scene: int
@@ -61,7 +61,7 @@ class SceneRow:
 
     @classmethod
     def of(cls, sampled: SampledScene) -> SceneRow:
-        """The row of a scene."""
+        """The row of a sampled scene."""
         return cls(
             sampled.number,
             sampled.accepted,
@@ -73,7 +73,7 @@ class SceneRow:
         )
 
     def text(self) -> str:
-        """A line of the table."""
+        """The row as a line of the table."""
         line = io.StringIO()
         accepted, missing = "yes" if self.accepted else "no", " ".join(self.missing)
         reasons = "; ".join(f"{count} x {reason}" for reason, count in sorted(self.refused.items()))
@@ -84,10 +84,10 @@ class SceneRow:
 
     @classmethod
     def read(cls, cells: Mapping[str, str]) -> SceneRow:
-        """Reads a line.
+        """Reads a line of the table.
 
         Raises:
-            ValueError, KeyError, TypeError: it was not written by `text`.
+            ValueError, KeyError, TypeError: the line was not written by `text`.
         """
         refused = {}
         for part in filter(None, cells["refused"].split("; ")):
@@ -105,14 +105,15 @@ class SceneRow:
 
 
 class SceneFolder:
-    """A folder opened for sampling; one process at a time can hold it."""
+    """A folder opened for sampling, locked against other processes."""
 
     def __init__(self, path: str | Path, provenance: SamplingProvenance) -> None:
-        """Opens or makes the folder.
+        """Opens or creates the folder.
 
         Raises:
-            InvalidInputError: it cannot be written to, another process is writing it, it holds
-                scenes that are made with other things, or something that is none of this.
+            InvalidInputError: the folder cannot be written to, another process is writing it, its
+                scenes were made with another recipe, library, station or versions, or it holds
+                other files.
             DocumentError: its recipe or a scene is damaged.
         """
         self.path = ensure_writable_folder(path)
@@ -152,7 +153,7 @@ class SceneFolder:
         self.sort()
 
     def file(self, number: int) -> Path:
-        """The file of a scene."""
+        """Path of a scene's file."""
         return self.path / f"scene_{number:04d}.yaml"
 
     def add(self, sampled: SampledScene) -> None:
@@ -196,10 +197,10 @@ def _require_readable(path: Path) -> None:
 
 
 def read_scene_table(path: Path) -> list[SceneRow]:
-    """The rows of a table; lines that cannot be read, such as a torn last one, count as not there.
+    """Reads the rows of a table; skips unreadable lines, such as an incomplete last one.
 
     Raises:
-        InvalidInputError: it is not a file, or cannot be read.
+        InvalidInputError: the path is no file, or cannot be read.
     """
     if not path.exists():
         return []
@@ -217,13 +218,13 @@ def read_scene_table(path: Path) -> list[SceneRow]:
 
 @dataclass(frozen=True)
 class SampledFolder:
-    """What is in a folder after sampling.
+    """Contents of a folder after sampling.
 
     Attributes:
-        rows: of all scenes that were asked for and came to an end, by number.
-        new: numbers of those that were sampled now.
-        failed: one line for each scene that could not be sampled, by number: they are tried again
-            the next time.
+        rows: rows of the requested scenes that were sampled, accepted or not, by number.
+        new: numbers of the scenes that were sampled now.
+        failed: error message of each scene that could not be sampled, by number. The next call
+            tries these scenes again.
     """
 
     rows: dict[int, SceneRow]
@@ -242,7 +243,7 @@ def sample_scenes(
     progress: Callable[[SampledScene], None] | None = None,
     known: Callable[[int], None] | None = None,
 ) -> SampledFolder:
-    """Samples scenes 0 to `count` - 1 of a recipe, but for those that the folder has.
+    """Samples scenes 0 to `count` - 1 of a recipe; skips scenes that the folder has.
 
     Example::
 
@@ -251,13 +252,13 @@ def sample_scenes(
         burg.sample_scenes(recipe, library, station, "scenes", 100, workers=4)
 
     Args:
-        recipe: how scenes are drawn; what it refers to is relative to the folder.
-        library, station: those of the recipe.
-        folder: where to write.
+        recipe: recipe of the scenes; its paths are relative to the folder.
+        library, station: library and station of the recipe.
+        folder: folder to write to.
         count: number of scenes.
-        workers: number of processes; with one this process does it.
+        workers: number of processes; with one, this process samples the scenes.
         progress: called after each scene.
-        known: called at the beginning with the number of scenes that the folder has.
+        known: called at the start with the number of scenes that the folder has.
 
     Raises:
         InvalidInputError, UnknownNameError: see `SceneFolder` and `require_possible_recipe`.
@@ -293,15 +294,15 @@ def run_scene_task(
     """Samples the scene of a number, in a worker.
 
     Args:
-        provenance: what all scenes are made with.
-        library, station: where they are.
-        folder: that the scene is to be written to.
-        number: of the scene.
+        provenance: recipe, library, station and versions of all scenes.
+        library, station: paths of library and station.
+        folder: folder of the scene's file.
+        number: number of the scene.
 
     Raises:
-        InvalidInputError: library or station are not any more what they were.
-        SimulationError: Drake ended by a failed condition.
-        Exception: what cannot be simulated is one failure.
+        InvalidInputError: the library or the station has changed.
+        SimulationError: an assertion of Drake failed.
+        Exception: the scene cannot be simulated.
     """
     with convert_drake_errors():
         sampler = kept_sampler(provenance.recipe, library, station)

@@ -1,7 +1,7 @@
 """Samples single scenes of a recipe until one is accepted, and reproduces sampled scenes.
 
 A scene is accepted if its objects are at rest on the board and it fulfils the recipe's rules.
-Reasons of refused attempts are counted.
+Refused attempts are counted by reason.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ HIDDEN_REASON = "the camera does not see half of an object"
 
 
 def require_possible_rules(recipe: SceneRecipe, station: Station) -> None:
-    """Refuses rules that cannot be asked on a station.
+    """Refuses rules that cannot be checked on a station.
 
     Raises:
         UnknownNameError: the station has no such camera.
-        InvalidInputError: it has no arm, whose reach is asked for.
+        InvalidInputError: a rule requires an arm, and the station has none.
     """
     cameras = station.document.cameras
     if recipe.visible_from and recipe.visible_from not in cameras:
@@ -77,7 +77,7 @@ def require_possible_rules(recipe: SceneRecipe, station: Station) -> None:
 
 
 def find_broken_rule(scene: Scene, station: Station, recipe: SceneRecipe) -> str:
-    """The first of a recipe's rules that a scene breaks, as a reason to refuse it; "" if none.
+    """The first rule of a recipe that a scene breaks, as a reason to refuse it; "" if none.
 
     Raises:
         BurgError: the arm collides in its home posture, for example; see
@@ -107,16 +107,16 @@ ISSUE_REASONS = {
 
 @dataclass(frozen=True)
 class SampledScene:
-    """What came of a number.
+    """Result of sampling the scene of a number.
 
     Attributes:
-        scene: the accepted scene; if none was, the attempt with the most objects, without origin.
-        number: of the scene.
-        accepted: it fulfils all that the recipe asks for.
-        missing: names of objects that found no place in it.
-        attempts: scenes that were drawn.
-        tries: places that were looked at.
-        refused: how many attempts were refused, by reason.
+        scene: the accepted scene; or else the attempt with the most objects, without origin.
+        number: number of the scene.
+        accepted: whether the scene fulfils the recipe.
+        missing: names of objects without a free place.
+        attempts: number of scenes drawn.
+        tries: number of object poses tried.
+        refused: number of refused attempts, by reason.
     """
 
     scene: Scene
@@ -134,7 +134,7 @@ class SampledScene:
 
 
 class SceneSampler:
-    """Samples scenes of a recipe, with the library's shapes at hand."""
+    """Samples scenes of a recipe; keeps the library's shapes in memory."""
 
     def __init__(self, recipe: SceneRecipe, library: ObjectLibrary, station: Station) -> None:
         """
@@ -157,12 +157,12 @@ class SceneSampler:
         *,
         refused: Callable[[], None] | None = None,
     ) -> SampledScene:
-        """The scene of a number.
+        """Samples the scene of a number.
 
         Args:
-            number: from 0.
-            folder: of the file that the scene is to be written to.
-            refused: called when an attempt was.
+            number: number of the scene, from 0.
+            folder: folder of the scene's file.
+            refused: called after each refused attempt.
 
         Raises:
             BurgError: the station or an object cannot be built.
@@ -196,7 +196,7 @@ class SceneSampler:
     def _draw_scene(
         self, number: int, attempt: int, folder: Path
     ) -> tuple[Scene, tuple[str, ...], int]:
-        """An attempt before it is settled, what is missing in it, and the tries that it took."""
+        """An attempt before settling, the names of missing objects, and the number of tries."""
         recipe = self.recipe
         first = 1 if attempt <= attempts_with_same_objects(recipe) else attempt
         rng = rng_from("sampled scene", self._content, number, first)
@@ -243,9 +243,9 @@ class SceneSampler:
         return find_broken_rule(scene, self.station, self.recipe), scene
 
     def _find_issue_reason(self, scene: Scene) -> str:
-        """What keeps a scene from being built as its document says; "" if nothing does.
+        """Reason why a scene cannot be built as its document says; "" if there is none.
 
-        A heap is too dear to be dropped again for surfaces that overlap.
+        Ignores overlaps in a heap, as dropping it again takes too long.
         """
         kinds = {issue.kind for issue in self._check.issues(scene) if issue.is_error}
         if not kinds and self.recipe.layout != "heap" and surface_issues(scene):
@@ -259,25 +259,25 @@ class SceneSampler:
 
 @lru_cache(maxsize=1)
 def kept_sampler(recipe: SceneRecipe, library: Path, station: Path) -> SceneSampler:
-    """The sampler that a process keeps from scene to scene.
+    """The sampler of a worker process, cached from scene to scene.
 
     Args:
-        recipe: how scenes are drawn.
-        library: folder of the objects.
+        recipe: recipe of the scenes.
+        library: folder of the library.
         station: file of the station.
 
     Raises:
-        BurgError: one of them cannot be read; and see `SceneSampler`.
+        BurgError: library or station cannot be read; and see `SceneSampler`.
     """
     return SceneSampler(recipe, load_library(library), load_station(station))
 
 
 @contextmanager
 def convert_drake_errors() -> Iterator[None]:
-    """Around what Drake does: a failed condition of its own ends this alone.
+    """Converts failed assertions of Drake within the block to errors.
 
     Raises:
-        SimulationError: in the place of `SystemExit`.
+        SimulationError: in place of `SystemExit`.
     """
     try:
         yield
@@ -286,7 +286,7 @@ def convert_drake_errors() -> Iterator[None]:
 
 
 def attempts_with_same_objects(recipe: SceneRecipe) -> int:
-    """Number of attempts in which a scene keeps the objects that were drawn for it."""
+    """Number of attempts that use the same objects."""
     return max(1, round(0.8 * recipe.attempts))  # so that often refused objects do not get rare
 
 
@@ -307,13 +307,13 @@ def sample_scene(
             burg.save_scene(sampled.scene.document, "close.yaml")
 
     Args:
-        recipe: how scenes are drawn.
+        recipe: recipe of the scene.
         library: the object library; that of the recipe, from the current folder, if None.
-        station: likewise.
-        number: of the scene: another one for each, from 0.
+        station: the station; that of the recipe, from the current folder, if None.
+        number: number of the scene, from 0; each gives another scene.
 
     Raises:
-        UnknownNameError, InvalidInputError: the recipe asks for what is not there.
+        UnknownNameError, InvalidInputError: see `require_possible_recipe`.
         BurgError: the station or an object cannot be built.
     """
     library = library or load_library(recipe.library)
@@ -324,7 +324,7 @@ def sample_scene(
 def sampling_provenance(
     recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> SamplingProvenance:
-    """What scenes of a recipe are made with here and now."""
+    """Provenance of scenes sampled now: recipe, library, station and versions."""
     return SamplingProvenance(
         recipe=recipe,
         library_content=content_hash(library.content)[:HASH_DIGITS],
@@ -334,12 +334,12 @@ def sampling_provenance(
 
 
 def require_possible_recipe(recipe: SceneRecipe, library: ObjectLibrary, station: Station) -> None:
-    """Refuses a recipe that no scene can come of, before anything is built.
+    """Refuses a recipe that no scene can fulfil, before anything is built.
 
     Raises:
-        UnknownNameError: it asks for objects or for a camera that are not there.
-        InvalidInputError: there are fewer objects than it asks for; or it asks for the reach of an
-            arm, and the station has none.
+        UnknownNameError: the recipe names objects or a camera that do not exist.
+        InvalidInputError: there are fewer objects than the recipe needs; or it requires an arm, and
+            the station has none.
     """
     _choose_objects(recipe, library, station, rng_from("who is there"))
     require_possible_rules(recipe, station)
@@ -360,14 +360,14 @@ def _choose_objects(
 
 @dataclass(frozen=True)
 class ReproducedScene:
-    """A scene that was made again.
+    """Result of reproducing a scene.
 
     Attributes:
-        scene: as it comes out now; None if no attempt was accepted.
-        station: that it was sampled for.
-        same: it has the same content, bit for bit, and so has its origin.
-        differences: what is not as it was when the scene was made, in words; and, if it does not
-            come out the same though all is as it was, that its file was changed.
+        scene: the reproduced scene; None if no attempt was accepted.
+        station: station of the scene.
+        same: whether content and origin are equal, bit for bit.
+        differences: changes of library, station or versions since the scene was made, in words; or,
+            if the scene differs without any such change, that its file was changed.
     """
 
     scene: Scene | None
@@ -377,15 +377,15 @@ class ReproducedScene:
 
 
 def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
-    """Makes a scene again.
+    """Reproduces a sampled scene.
 
     Args:
-        scene: a sampled one, with its library.
-        force: try even though library, station or versions are others.
+        scene: a sampled scene, with its library.
+        force: try even if library, station or versions have changed.
 
     Raises:
-        InvalidInputError: it does not say how it was made; or, without `force`, what it was made
-            with is not there any more: the message names every difference.
+        InvalidInputError: the scene has no origin; or, without `force`, library, station or
+            versions have changed: the message names every difference.
         UnknownNameError: there is no such station.
     """
     origin = scene.document.origin

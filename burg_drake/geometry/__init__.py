@@ -1,6 +1,6 @@
 """Exact geometry of convex shapes in batches, without Drake: distances, overlaps, rays.
 
-Read `convex_shapes` first, then `convex_distance` and `bodies`; `hand_screen` puts them to use.
+Read `convex_shapes` first, then `convex_distance` and `bodies`; `hand_screen` uses them.
 """
 
 import lazy_loader

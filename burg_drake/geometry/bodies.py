@@ -58,7 +58,7 @@ class HandBodyPairs:
 
 
 class Body:
-    """Convex pieces that stand somewhere in the world, rigid to each other.
+    """A rigid body of convex pieces at a pose in the world.
 
     Args:
         X_WB: (4, 4) pose of the body.
@@ -69,7 +69,7 @@ class Body:
         size: number of pieces.
         pieces: the pieces.
         center, half: (size, 3) boxes around the pieces along the body's axes [m].
-        low, high: (3,) corners of the box around all of them [m].
+        low, high: (3,) corners of the box around all pieces, in the body's frame [m].
     """
 
     def __init__(self, X_WB: Array, pieces: Sequence[Shape]) -> None:
@@ -96,10 +96,10 @@ class Body:
     def depths(
         self, hand: HandParts, pairs: HandBodyPairs, n: int, *, faces_only: bool = False
     ) -> Array:
-        """Depth of the deepest overlap in each of n grasps (n,) [m]; 0 where there is none.
+        """Depth of the deepest overlap in each of n grasps (n,) [m]; 0 without an overlap.
 
-        With `faces_only` it is an upper bound, above 0 where no face of a part or piece separates
-        the two; see `penetration_depths`.
+        With `faces_only` it is an upper bound that is above 0 if no face of a part or piece
+        separates the two; see `penetration_depths`.
         """
         depth = np.zeros(n)
         pair, piece, bound = self._overlapping_boxes(hand, pairs)
@@ -120,7 +120,7 @@ class Body:
     def _overlapping_boxes(
         self, hand: HandParts, pairs: HandBodyPairs
     ) -> tuple[Indices, Indices, Array]:
-        """Pairs and pieces (L,) whose bounding boxes are not told apart by the axes of body and
+        """Pairs and pieces (L,) whose bounding boxes are not separated along the axes of body and
         part, and upper bounds of their depth (L,) [m]."""
         half = hand.half[pairs.part]
         X_BH = pairs.X_HB.inverse()
@@ -141,23 +141,23 @@ class Body:
     def _exact_depths(
         self, hand: HandParts, pairs: HandBodyPairs, piece: Indices, floor: Array, faces_only: bool
     ) -> Array:
-        """(L,) depths of pairs with one piece each [m]; below the floor (L,) some number that is
-        not above it."""
+        """(L,) depths of pairs with one piece each [m]; for depths below the floor (L,), any number
+        up to the floor."""
         found = np.empty(len(piece))
         alone = ~hand.is_box[pairs.part] | self._curved[piece]
         group = piece * (len(hand.shapes) + 1) + np.where(alone, pairs.part + 1, 0)
         for chosen in _group_indices(group):
             block = max(1, NARROW_PHASE_BLOCK // self._edges[piece[chosen[0]]])
             for k in range(0, len(chosen), block):
-                some = chosen[k : k + block]
-                one = int(piece[some[0]])
-                found[some] = self._piece_depths(hand, pairs[some], one, floor[some], faces_only)
+                part = chosen[k : k + block]
+                one = int(piece[part[0]])
+                found[part] = self._piece_depths(hand, pairs[part], one, floor[part], faces_only)
         return found
 
     def _piece_depths(
         self, hand: HandParts, pairs: HandBodyPairs, piece: int, floor: Array, faces_only: bool
     ) -> Array:
-        """The same for one piece, and for one part or any number of boxes."""
+        """`_exact_depths` for one piece, and for one part of the hand or any number of boxes."""
         target, one = self.pieces[piece], self._polytopes[piece]
         part = hand.shapes[pairs.part[0]]
         other = Boxes(hand.half[pairs.part]) if hand.is_box[pairs.part[0]] else part.convex
@@ -174,7 +174,7 @@ class Body:
 
 
 def _group_indices(key: Indices) -> Iterator[Indices]:
-    """Places of equal keys, group by group."""
+    """Yields the indices of equal keys, group by group."""
     order = np.argsort(key, kind="stable")
     return iter(np.split(order, np.flatnonzero(np.diff(key[order])) + 1) if len(key) else ())
 
@@ -184,15 +184,15 @@ SWEPT_CYLINDER_SIDES = 64
 
 
 def swept_shape(shape: Shape, shift_B: Array) -> list[Shape]:
-    """The shapes whose union is what a shape sweeps.
+    """Shapes whose union is the swept volume of a shape along a straight segment.
 
     Args:
         shape: the shape, in a body's frame B.
-        shift_B: (3,) from where it starts to where it ends [m].
+        shift_B: (3,) translation from start to end [m].
 
     Returns:
         One shape in B, or three for a ball: a cylinder and the balls at its ends. They are exact,
-        but for a cylinder that is swept across its axis: see `SWEPT_CYLINDER_SIDES`.
+        except for a cylinder that is swept across its axis: see `SWEPT_CYLINDER_SIDES`.
     """
     length = float(np.linalg.norm(shift_B))
     if length == 0.0:
@@ -216,20 +216,20 @@ def swept_shape(shape: Shape, shift_B: Array) -> list[Shape]:
 
 
 def swept_body(body: Body, shift_W: Array) -> Body:
-    """What a body sweeps along `shift_W` (3,) [m], given in the world."""
+    """The swept volume of a body along `shift_W` (3,) [m] in the world, as a body."""
     X_WB = make_pose(body.X_WB.R, body.X_WB.p)
     placed = [replace(piece, X_BP=X_WB @ piece.X_BP) for piece in body.pieces]
     return Body(np.eye(4), [shape for piece in placed for shape in swept_shape(piece, shift_W)])
 
 
 def _swept_hull(points: Array, X_BP: Array, shift_B: Array) -> Shape:
-    """The hull of points (N, 3) in P and of the same at the end of the way."""
+    """The hull of points (N, 3) in P and of the points shifted by `shift_B`."""
     p_B = transform_points(X_BP, points)
     return Shape.hull(np.eye(4), np.concatenate([p_B, p_B + shift_B]))
 
 
 def _rotation_to_axis(u: Array) -> Array:
-    """(3, 3) some rotation with a unit vector (3,) for its z axis."""
+    """(3, 3) a rotation whose z axis is the unit vector `u` (3,)."""
     x = np.cross(u, np.eye(3)[np.abs(u).argmin()])
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(u, x), u])

@@ -13,7 +13,8 @@ from burg_drake.geometry.convex_shapes import Ball, Cylinder, Shape, dot
 from burg_drake.geometry.poses import Poses
 
 DISTANCE_TOLERANCE = 1e-9
-"""Metres. Only rims of cylinders reach it; boxes and hulls are exact to rounding."""
+"""Metres. Only pairs with the rim of a cylinder can be off by this much; others are exact to
+rounding."""
 
 
 VERTEX_BLOCK = 2**16
@@ -22,13 +23,13 @@ VERTEX_BLOCK = 2**16
 
 @dataclass(frozen=True, eq=False)
 class ShapeBatch:
-    """S convex shapes in one frame, each the sum of a polytope, a disc and a ball.
+    """S convex shapes in one frame, each the Minkowski sum of a polytope, a disc and a ball.
 
     Attributes:
-        x, y, z: (S, V) vertices [m]; rows are filled up with their first one.
+        x, y, z: (S, V) vertices [m]; rows are filled up with their first vertex.
         count: (S,) numbers of vertices.
         center: (S, 3) middles of the shapes [m].
-        across: two directions (3, S) each that span the discs.
+        disc_axes: two orthogonal unit vectors (3, S) in the plane of each disc.
         disc, ball: (S,) radii [m]; 0 where there is none.
     """
 
@@ -37,13 +38,13 @@ class ShapeBatch:
     z: Array
     count: Indices
     center: Array
-    across: tuple[Array, Array]
+    disc_axes: tuple[Array, Array]
     disc: Array
     ball: Array
 
     @classmethod
     def of(cls, shapes: Sequence[Shape]) -> ShapeBatch:
-        """Of at least one shape."""
+        """A batch of at least one shape."""
         vertices = [transform_points(shape.X_BP, _core_vertices(shape)) for shape in shapes]
         count = np.array([len(v) for v in vertices])
         corners = np.arange(count.max())
@@ -63,15 +64,15 @@ class ShapeBatch:
         )
 
     def support(self, shape: Indices, d: Array) -> Array:
-        """Points (3, L) of polytopes and discs, one of each shape (L,), that are farthest along
-        directions d (3, L)."""
+        """Support points (3, L) of the shapes (L,) without their balls, along directions `d`
+        (3, L)."""
         width = self.count[shape].max()
         x, y, z = (v[shape, :width] for v in (self.x, self.y, self.z))
         best = (x * d[0, :, None] + y * d[1, :, None] + z * d[2, :, None]).argmax(axis=1)
         found = np.stack([v[shape, best] for v in (self.x, self.y, self.z)])
         discs = np.flatnonzero(self.disc[shape])
         if len(discs):
-            u1, u2 = (u[:, shape[discs]] for u in self.across)
+            u1, u2 = (u[:, shape[discs]] for u in self.disc_axes)
             h1, h2 = dot(d[:, discs], u1), dot(d[:, discs], u2)
             length = np.sqrt(h1 * h1 + h2 * h2)
             length[length == 0.0] = np.inf
@@ -80,7 +81,7 @@ class ShapeBatch:
 
 
 def _core_vertices(shape: Shape) -> Array:
-    """Vertices (V, 3) of the polytope that is left of a shape without disc and ball, in P."""
+    """Vertices (V, 3) of a shape's polytope, without its disc and ball, in P."""
     match shape.convex:
         case Ball():
             return np.zeros((1, 3))
@@ -92,9 +93,9 @@ def _core_vertices(shape: Shape) -> Array:
 
 def shape_distances(
     one: ShapeBatch,
-    shape: Indices,
+    one_index: Indices,
     other: ShapeBatch,
-    piece: Indices,
+    other_index: Indices,
     X_BA: Poses,
     ceiling: Array | float = np.inf,
 ) -> Array:
@@ -102,26 +103,26 @@ def shape_distances(
 
     Args:
         one: shapes given in A.
-        shape: (L,) which of them is the first of each pair.
+        one_index: (L,) index of the first shape of each pair, in `one`.
         other: shapes given in B.
-        piece: (L,) which of them is the second.
+        other_index: (L,) index of the second shape of each pair, in `other`.
         X_BA: (L,) poses of A in B.
-        ceiling: (L,) distances above it need not be known [m].
+        ceiling: (L,) distances above it may be returned as inf [m].
 
     Returns:
-        (L,) distances [m], to within `DISTANCE_TOLERANCE`; inf for some that are above the ceiling.
-        Shapes that touch or overlap are at most `DISTANCE_TOLERANCE` apart.
+        (L,) distances [m], to within `DISTANCE_TOLERANCE`; may be inf if above the ceiling.
+        Shapes that touch or overlap get a distance from 0 to `DISTANCE_TOLERANCE`.
     """
-    found = np.empty(len(shape))
+    found = np.empty(len(one_index))
     limit = np.broadcast_to(ceiling, found.shape)
-    for some in _vertex_blocks(np.maximum(one.count[shape], other.count[piece])):
-        search = _DistanceSearch(one, shape[some], other, piece[some], X_BA[some])
-        found[some] = search.distances(limit[some])
+    for block in _vertex_blocks(np.maximum(one.count[one_index], other.count[other_index])):
+        search = _DistanceSearch(one, one_index[block], other, other_index[block], X_BA[block])
+        found[block] = search.distances(limit[block])
     return found
 
 
 def _vertex_blocks(count: Indices) -> list[Indices]:
-    """Places of pairs with similar numbers of vertices (L,), to be looked at together."""
+    """Blocks of indices of pairs with similar numbers of vertices (L,)."""
     if not len(count):
         return []
     order = np.argsort(count, kind="stable")
@@ -130,20 +131,30 @@ def _vertex_blocks(count: Indices) -> list[Indices]:
 
 
 class _DistanceSearch:
-    """The search for the nearest points of L pairs. Vectors have their components first."""
+    """GJK on the Minkowski differences of L pairs at once. Arrays of vectors are (3, L)."""
 
     def __init__(
-        self, one: ShapeBatch, shape: Indices, other: ShapeBatch, piece: Indices, X_BA: Poses
+        self,
+        one: ShapeBatch,
+        one_index: Indices,
+        other: ShapeBatch,
+        other_index: Indices,
+        X_BA: Poses,
     ) -> None:
-        self._one, self._shape, self._other, self._piece = one, shape, other, piece
+        self._one, self._one_index, self._other, self._other_index = (
+            one,
+            one_index,
+            other,
+            other_index,
+        )
         self._R = np.ascontiguousarray(np.moveaxis(X_BA.R, 0, -1))
         self._p = np.ascontiguousarray(X_BA.p.T)
-        self._direction = X_BA.apply(one.center[shape]).T - other.center[piece].T
+        self._direction = X_BA.apply(one.center[one_index]).T - other.center[other_index].T
 
     def distances(self, ceiling: Array) -> Array:
         """(L,) distances [m]; inf above the ceiling (L,)."""
         max_steps = 200  # Random boxes and hulls need 2 (at most 8), cylinders 9 (at most 36).
-        balls = self._one.ball[self._shape] + self._other.ball[self._piece]
+        balls = self._one.ball[self._one_index] + self._other.ball[self._other_index]
         found = np.full(len(balls), np.inf)
         live = np.arange(len(balls))
         v = self._support(live, self._direction)
@@ -152,14 +163,14 @@ class _DistanceSearch:
             length = np.sqrt(dot(v, v))
             found[live] = length
             w = self._support(live, v)
-            reach = dot(v, w)  # no point of the difference is nearer to the plane across v
-            with np.errstate(invalid="ignore"):  # inf times 0, which is not far
-                far = reach > (ceiling[live] + balls[live]) * length
+            support = dot(v, w)  # support / length is a lower bound of the distance
+            with np.errstate(invalid="ignore"):  # inf * 0 is NaN, which compares as not far
+                far = support > (ceiling[live] + balls[live]) * length
             found[live[far]] = np.inf
-            left = ~far & (reach < (length - DISTANCE_TOLERANCE) * length)
+            left = ~far & (support < (length - DISTANCE_TOLERANCE) * length)
             live, v, w, corners = live[left], v[:, left], w[:, left], corners[..., left]
-            nearer, corners = _nearest_point(w, corners, reach[left] < 0.0)
-            better = dot(nearer, nearer) < dot(v, v)  # else rounding is all that is left
+            nearer, corners = _nearest_point(w, corners, support[left] < 0.0)
+            better = dot(nearer, nearer) < dot(v, v)  # else only rounding errors are left
             live, v, corners = live[better], nearer[:, better], corners[..., better]
             if not len(live):
                 break
@@ -167,25 +178,26 @@ class _DistanceSearch:
         return np.asarray(np.maximum(found - balls, 0.0))
 
     def _support(self, pair: Indices, v: Array) -> Array:
-        """Points (3, L) of the difference that are farthest against v (3, L), expressed in B."""
+        """Support points (3, L) of the Minkowski differences in the directions -v (3, L), in B."""
         R = self._R[..., pair]
-        a = self._one.support(self._shape[pair], -(R[0] * v[0] + R[1] * v[1] + R[2] * v[2]))
+        a = self._one.support(self._one_index[pair], -(R[0] * v[0] + R[1] * v[1] + R[2] * v[2]))
         a = R[:, 0] * a[0] + R[:, 1] * a[1] + R[:, 2] * a[2] + self._p[:, pair]
-        return np.asarray(a - self._other.support(self._piece[pair], v))
+        return np.asarray(a - self._other.support(self._other_index[pair], v))
 
 
 def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """The point nearest to the origin in simplices; it is on a face with the newest corner.
+    """Points of simplices nearest to the origin; only faces with the newest corner can hold them.
 
     Args:
         w: (3, L) newest corners.
-        corners: (3, 3, L) components of up to three others; fewer are filled up by repetition.
+        corners: (3 components, 3 corners, L) older corners; if there are fewer, some repeat.
         may_contain: (L,) whether the origin may be inside.
 
     Returns:
-        Points (3, L), 0 where the origin is inside, and up to three corners (3, 3, L) of faces that
-        they are on.
+        Points (3, L), 0 where the origin is inside, and up to three corners (3, 3, L) of the faces
+        that contain them.
     """
+    # Edges e from w to a corner, f to the next one; t: parameter on an edge; r, s: on a face.
     e = corners - w[:, None]
     f = e[:, [1, 2, 0]]
     ee, ef, we = dot(e, e), dot(e, f), dot(w[:, None], e)
@@ -196,7 +208,7 @@ def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> 
         r, s = (ef * wf - ff * we) / area, (ef * we - ee * wf) / area
         on_face = (r > 0.0) & (s > 0.0) & (r + s < 1.0)
         points = w[:, None] + np.concatenate([t * e, np.where(on_face, r * e + s * f, 0.0)], axis=1)
-    best = dot(points, points).argmin(axis=0)
+    best = dot(points, points).argmin(axis=0)  # 0 to 2: an edge, 3 to 5: a face
     pair = np.arange(w.shape[1])
     first = best % 3
     second = np.where(best >= 3, (first + 1) % 3, first)
@@ -208,8 +220,8 @@ def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> 
 
 
 def _contains_origin(w: Array, e: Array) -> NDArray[np.bool_]:
-    """Whether the origin is inside of tetrahedra (L,) with a corner w (3, L) and edges e (3, 3, L)
-    from there."""
+    """(L,) whether the origin is inside tetrahedra with a corner w (3, L) and edges e (3, 3, L)
+    from that corner."""
     n = [_cross(e[:, k - 2], e[:, k - 1]) for k in range(3)]
     volume = dot(e[:, 0], n[0])
     shares = [-dot(w, normal) * np.sign(volume) for normal in n]

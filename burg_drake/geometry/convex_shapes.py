@@ -28,12 +28,12 @@ class Convex(Protocol):
     """
 
     def select(self, pairs: NDArray[np.intp]) -> Convex:
-        """The shape of some of the pairs."""
+        """Selects pairs by index."""
         ...
 
     def support_distance(self, a: Components, pair: NDArray[np.intp] | None = None) -> Array:
-        """How far the shape reaches against directions `a`: largest `-a . p` [m]. They are (M, K),
-        or (L,) with the pairs (L,) that they belong to."""
+        """Support distance along -`a`: largest `-a . p` [m]. Directions are (M, K), or (L,) with
+        the indices `pair` (L,) of their pairs."""
         ...
 
     def own_face_overlap(self, vertices: Components) -> Array:
@@ -41,14 +41,14 @@ class Convex(Protocol):
         ...
 
     def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
-        """(M,) smallest overlap along directions that come of edges of both shapes, or of its
+        """(M,) smallest overlap along directions given by edges of both shapes, or by the shape's
         curved surface [m]."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Boxes about the origin, one a pair.
+    """Boxes about the origin, one per pair.
 
     Attributes:
         half: (M, 3) half extents [m].
@@ -135,7 +135,7 @@ class Ball:
         return np.full(len(vertices[0]), np.inf)
 
     def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
-        """Along the way from the nearest point of each edge to the centre."""
+        """Smallest overlap along lines from the nearest point of each edge to the centre."""
         first, second = one.edge_vertices.T
         start = map_components(lambda v: v[:, first], vertices)
         u = map_components(lambda v: v[:, second] - v[:, first], vertices)
@@ -167,7 +167,8 @@ class Cylinder:
         return self.half_length + np.minimum(z.max(axis=1), -z.min(axis=1))
 
     def edge_overlap(self, one: Polytope, normals: Components, vertices: Components) -> Array:
-        """Across the axis, away from edges and from vertices; and where edges meet a rim."""
+        """Smallest overlap across the axis, away from edges and vertices, and of edges with the
+        rims."""
         across = silhouette_overlap(self, one, np.eye(3)[2], normals, vertices)
         x, y, z = vertices
         radial = _radial_overlap(self.radius, (-x, -y, np.zeros_like(z)), vertices)
@@ -176,7 +177,7 @@ class Cylinder:
 
 
 def map_components(f: Callable[..., Array], *vectors: Components) -> Components:
-    """A function of each component."""
+    """Applies a function to each component."""
     x, y, z = map(f, *vectors)
     return x, y, z
 
@@ -203,8 +204,8 @@ def silhouette_overlap(
     other: Convex, one: Polytope, u: Array, normals: Components, vertices: Components
 ) -> Array:
     """(M,) smallest overlap along directions perpendicular to `u` (3,) and to an edge of the
-    polytope; inf where there is none. On the arc between the normals of the edge's faces that is
-    one direction, if the edge is on the silhouette seen along u."""
+    polytope; inf without such a direction. An edge has one, on the arc between the normals of its
+    faces, if it is on the silhouette seen along u."""
     height = project_on_direction(u, normals)
     first, second = one.edge_faces.T
     up = height > 0.0
@@ -229,7 +230,7 @@ def edge_arc_overlap(
 ) -> Array:
     """(M,) smallest overlap along all normals of the polytope's edges, found by search."""
     n_samples = 9  # On an arc of at most a few radians.
-    n_steps = 20  # Golden sections: direction good to 1e-4, overlap to 1e-8 of the size.
+    n_steps = 20  # Golden sections: direction to within 1e-4, overlap to 1e-8 of the size.
     golden_ratio = (np.sqrt(5.0) - 1.0) / 2.0
     first, second = one.edge_faces.T
     n1, n2 = (map_components(lambda n, k=k: n[:, k], normals) for k in (first, second))
@@ -251,8 +252,8 @@ def edge_arc_overlap(
 
 
 def _radial_overlap(radius: float, a: Components, vertices: Components) -> Array:
-    """(M,) smallest overlap along ways `a` (M, K) from a polytope to the centre of a circle or
-    ball; inf where all of them have no length."""
+    """(M,) smallest overlap along vectors `a` (M, K) from a polytope to the centre of a circle or
+    ball; inf where all have length 0."""
     length = np.sqrt(dot(a, a))
     support = np.full_like(length, -np.inf)
     for k in range(vertices[0].shape[1]):
@@ -265,15 +266,15 @@ def _radial_overlap(radius: float, a: Components, vertices: Components) -> Array
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A convex shape at a place.
+    """A convex shape at a pose.
 
     Attributes:
-        X_BP: (4, 4) pose of the shape's frame P in a body's; its origin is the middle of the
+        X_BP: (4, 4) pose of the shape's frame P in a body's frame; its origin is the middle of the
             shape's bounding box.
         half: (3,) half extents of that box along the axes of P [m].
         convex: the shape as a partner of a polytope, in P.
         polytope: the shape as a polytope, in P; None for a ball.
-        curved: whether it is a cylinder or ball; `polytope` is the prism within the cylinder then.
+        curved: whether it is a cylinder or ball; the `polytope` of a cylinder is a prism inside it.
     """
 
     X_BP: Array
@@ -319,19 +320,19 @@ def penetration_depths(
     *,
     faces_only: bool = False,
 ) -> Array:
-    """Smallest translation that separates a polytope from another shape.
+    """Length of the smallest translation that separates a polytope from another shape.
 
     Args:
         one: the polytope, given in A.
         other: the shape, given in B; M shapes or one for all.
         X_BA: (M,) poses of A in B.
-        floor: (M,) depths below it need not be known [m].
-        faces_only: ask only for directions normal to a face of either shape. What comes out is an
-            upper bound of the depth then, and equal to it where the nearest way out is such a one.
+        floor: (M,) depths below it need not be exact [m].
+        faces_only: only try directions normal to a face of either shape. The result is then an
+            upper bound of the depth, exact if the smallest translation has such a direction.
 
     Returns:
         (M,) depths [m]. Where the shapes are apart, or the depth is below the floor, the number is
-        some upper bound of the depth that is not above the floor.
+        an upper bound of the depth that is not above the floor.
     """
     normals = _rotate_components(X_BA.R, one.normals)
     p = X_BA.p[:, :, None].swapaxes(0, 1)

@@ -48,9 +48,9 @@ class SceneBoxes:
         self._center = np.concatenate([body.center for body in bodies]).T.copy()
         self._half = np.concatenate([body.half for body in bodies]).T.copy()
 
-    def around_bodies(self, X_WG: Poses) -> Array:
-        """Bounds (N, H, B) [m] for N grasps, H parts of the hand and B bodies: of the sphere about
-        the part and the box around the body."""
+    def body_bounds(self, X_WG: Poses) -> Array:
+        """Lower bounds (N, H, B) [m] for N grasps, H parts of the hand and B bodies: distances of
+        the part's bounding sphere from the body's bounding box."""
         p_WH = (X_WG[:, None] @ self._X_GH[None]).p
         p_B = self.X_BW.apply(p_WH[:, :, None])
         gaps = np.maximum(self._low - p_B, p_B - self._high)
@@ -58,15 +58,15 @@ class SceneBoxes:
             _signed_box_distance(gaps[..., 0], gaps[..., 1], gaps[..., 2]) - self._radius[:, None]
         )
 
-    def around_pieces(self, X_WG: Poses, pairs: Pairs) -> tuple[Indices, Indices, Array]:
-        """Bounds for all pieces of the bodies: of boxes along the axes of the bodies.
+    def piece_bounds(self, X_WG: Poses, pairs: Pairs) -> tuple[Indices, Indices, Array]:
+        """Lower bounds for all pieces of the bodies: distances of boxes along the bodies' axes.
 
         Args:
             X_WG: (N,) grasps.
             pairs: K grasps, parts and bodies.
 
         Returns:
-            Places (T,) of the pairs, indices (T,) of the pieces of all bodies, and bounds (T,) [m].
+            Indices (T,) of the pairs, indices (T,) among all pieces, and bounds (T,) [m].
         """
         grasp, part, body = pairs
         X_BH = self.X_BW[body] @ X_WG[grasp] @ self._X_GH[part]
@@ -83,8 +83,8 @@ class SceneBoxes:
         )
         return pair, piece, _signed_box_distance(x, y, z)
 
-    def along_parts(self, X_WG: Poses, pairs: Pairs, piece: Indices) -> Array:
-        """Bounds (K,) for one piece each [m]: of boxes along the axes of the parts."""
+    def refined_piece_bounds(self, X_WG: Poses, pairs: Pairs, piece: Indices) -> Array:
+        """Lower bounds (K,) for one piece each [m]: distances of boxes along the parts' axes."""
         grasp, part, body = pairs
         X_HB = (self.X_BW[body] @ X_WG[grasp] @ self._X_GH[part]).inverse()
         p_H = X_HB.apply(self._center[:, piece].T)
@@ -94,8 +94,8 @@ class SceneBoxes:
 
 
 def _signed_box_distance(x: Array, y: Array, z: Array) -> Array:
-    """Signed distance of two boxes with common axes from the gaps along these: negative is how deep
-    they overlap."""
+    """Signed distance of two boxes with common axes from the gaps along these axes; minus the depth
+    if they overlap."""
     far = np.maximum(x, 0.0), np.maximum(y, 0.0), np.maximum(z, 0.0)
     distance = np.sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2])
     return np.asarray(distance + np.minimum(np.maximum(np.maximum(x, y), z), 0.0))
@@ -109,8 +109,7 @@ class _NearestSearch:
         boxes: of the scene, which has at least one body.
 
     Attributes:
-        nearest, distance: (N,) indices of the nearest bodies and their distances [m], as far as is
-            known.
+        nearest, distance: (N,) indices of the nearest bodies found so far and their distances [m].
     """
 
     def __init__(self, X_WG: Poses, boxes: SceneBoxes) -> None:
@@ -120,23 +119,24 @@ class _NearestSearch:
 
     def run(self) -> None:
         """Measures the pairs with the lowest bounds first, then those that may be nearer."""
-        bound = self._boxes.around_bodies(self.X_WG)
+        bound = self._boxes.body_bounds(self.X_WG)
         first = bound <= np.maximum(bound.min(axis=(1, 2), keepdims=True), 0.0)
         self._measure_pairs(np.nonzero(first))
         self._measure_pairs(np.nonzero(~first & (bound < self.distance[:, None, None])))
 
     def _measure_pairs(self, pairs: Pairs) -> None:
-        """Takes pairs of parts and bodies into account, in the order of the grasps."""
-        place, pieces, bound = self._boxes.around_pieces(self.X_WG, pairs)
+        """Measures pairs of parts and bodies, ordered by grasp, that may be the nearest."""
+        place, pieces, bound = self._boxes.piece_bounds(self.X_WG, pairs)
         grasp, part, body = pairs
         left = _PartPiecePairs(grasp[place], part[place], body[place], pieces, bound)
         left = self._measure_lowest(left)
-        left = left.above(self._boxes.along_parts(self.X_WG, left.pairs, left.piece))
+        left = left.with_bounds(self._boxes.refined_piece_bounds(self.X_WG, left.pairs, left.piece))
         left = self._measure_lowest(left)
         self._measure(left)
 
     def _measure_lowest(self, left: _PartPiecePairs) -> _PartPiecePairs:
-        """Measures those with the lowest bound of each grasp; returns the others that count."""
+        """Measures the pairs with the lowest bound of each grasp; returns those left that may be
+        nearer."""
         left = left[left.bound < self.distance[left.grasp]]
         if not len(left.grasp):
             return left
@@ -187,8 +187,8 @@ class _PartPiecePairs:
         grasp, part, body, piece = (v[at] for v in (*self.pairs, self.piece))
         return _PartPiecePairs(grasp, part, body, piece, self.bound[at])
 
-    def above(self, bound: Array) -> _PartPiecePairs:
-        """With further lower bounds (T,) [m]."""
+    def with_bounds(self, bound: Array) -> _PartPiecePairs:
+        """The pairs with the larger of their own and further lower bounds (T,) [m]."""
         return replace(self, bound=np.maximum(self.bound, bound))
 
 
@@ -197,7 +197,7 @@ GRASP_CHUNK = 2048
 
 
 class HandScreen:
-    """Measures how deep the open hand is in the bodies of a scene, or how far it is from them.
+    """Measures the penetration depth or the distance of the open hand in a scene.
 
     Args:
         hand: convex parts of the open hand, in the grasp frame.
@@ -223,13 +223,13 @@ class HandScreen:
 
         Args:
             X_WG: (N, 4, 4) grasps in the world.
-            order: names of all bodies that count.
-            faces_only: take for overlaps what no face separates, and upper bounds for depths; see
-                `penetration_depths`.
+            order: names of all bodies to check.
+            faces_only: count pairs that no face separates as overlaps, with upper bounds as depths;
+                see `penetration_depths`.
 
         Returns:
-            Names (N,) of the bodies, "" where the hand overlaps none of them, and depths (N,) of
-            the deepest overlap with that body [m].
+            Names (N,) of the bodies, "" where the hand overlaps none, and depths (N,) of the
+            deepest overlap with that body [m].
         """
         names, depths = np.full(len(X_WG), "", dtype=object), np.zeros(len(X_WG))
         for k in range(0, len(X_WG), self._chunk):
@@ -274,7 +274,7 @@ class _PlacedHand:
         self._p_WH = self._X_HW.inverse().p
 
     def depths(self, body: Body, asked: Indices, faces_only: bool) -> Array:
-        """Depths (N,) in a body [m], see `Body.depths`; 0 at grasps that are not asked for."""
+        """Depths (N,) in a body [m], see `Body.depths`; 0 at grasps not in `asked`."""
         row, part = np.nonzero(body.is_near(self._p_WH[asked], self._hand.radius))
         if not len(row):
             return np.zeros(len(self._p_WH))

@@ -56,13 +56,13 @@ def hull_mesh(points: Array) -> trimesh.Trimesh:
 def reduced_hull(points: Array, max_vertices: int = 64, tolerance: float = 2e-4) -> trimesh.Trimesh:
     """Convex hull with few vertices, inside the full hull.
 
-    The points farthest outside are added until all are within the tolerance, or the most vertices
-    are reached.
+    The points farthest outside are added until all are within the tolerance, or `max_vertices` are
+    reached.
 
     Args:
         points: (N, 3) [m].
-        max_vertices: most vertices of the result.
-        tolerance: distance from the full hull that is good enough [m].
+        max_vertices: largest number of vertices of the result.
+        tolerance: accepted distance of points outside the result [m].
 
     Raises:
         scipy.spatial.QhullError: the points lie in a plane.
@@ -82,8 +82,8 @@ def reduced_hull(points: Array, max_vertices: int = 64, tolerance: float = 2e-4)
         farthest = [i for i in np.argsort(-outside, kind="stable") if outside[i] > tolerance]
         if not farthest:
             break
-        # One vertex a facet, as each brings down the distances of its neighbours, and at most four
-        # between two computations of the hull.
+        # One vertex per facet, as each lowers the distances of its neighbours, and at most four
+        # per computation of the hull.
         _, first = np.unique(facet[farthest], return_index=True)
         new = [int(farthest[i]) for i in np.sort(first)[:4]]
         chosen += new[: max_vertices - len(chosen)]
@@ -155,12 +155,12 @@ class Polytope:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Centre and half extents (3,) of the box along the axes around it [m]."""
+        """Centre and half extents (3,) of the axis-aligned bounding box [m]."""
         lower, upper = self.vertices.min(axis=0), self.vertices.max(axis=0)
         return (lower + upper) / 2, (upper - lower) / 2
 
     def as_box(self) -> tuple[Array, Array] | None:
-        """Pose (4, 4) and half extents (3,) of the box that it is; None if it is no box."""
+        """Pose (4, 4) and half extents (3,) if the polytope is a box; None otherwise."""
         if len(self.vertices) != 8 or len(self.normals) != 6:
             return None
         x = self.normals[0]

@@ -20,7 +20,7 @@ MAX_HITS = 64
 
 
 class RayCaster:
-    """The hierarchy of one mesh; build it once, cast many rays.
+    """Casts rays against one mesh by a bounding volume hierarchy.
 
     Attributes:
         offset: distance that rays start past their origins [m].
@@ -51,7 +51,7 @@ class RayCaster:
         """The nearest face that each ray meets.
 
         Args:
-            origins: (N, 3) where the rays start [m]; what is nearer than `offset` is not seen.
+            origins: (N, 3) starts of the rays [m]; faces nearer than `offset` are missed.
             directions: (N, 3) unit vectors.
             reach: length of the rays [m].
 
@@ -73,10 +73,11 @@ class RayCaster:
     def seen_from(self, origin: Array, directions: Single) -> tuple[NDArray[np.int32], Single]:
         """The nearest face that each of many rays from one point meets; see `first_hits`.
 
-        A third of its time, for images: nothing is converted, and rays start at the point itself.
+        For images: it takes a third of the time, as it converts nothing. Rays start at the point
+        itself.
 
         Args:
-            origin: (3,) that lies on no face [m].
+            origin: (3,) a point that lies on no face [m].
             directions: (N, 3) unit vectors.
 
         Returns:
@@ -127,12 +128,12 @@ class RayCaster:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A mesh made ready for sampling; faces without area are left out.
+    """A mesh prepared for sampling, without faces of zero area.
 
     Attributes:
         triangles: (F, 3, 3) corners in the object frame [m].
         normals: (F, 3) outward unit normals.
-        cumulative: (F,) probability of each face and all before it; the last entry is 1.
+        cumulative: (F,) cumulative probability of the faces; the last entry is 1.
         rays: caster for these triangles.
     """
 
@@ -148,8 +149,8 @@ class Surface:
         Args:
             mesh: surface in the object frame O [m], faces wound so that normals point outward. It
                 need not be watertight.
-            weights: (F,) density of points on each face of the mesh, from 0, in any unit; uniform
-                if None.
+            weights: (F,) density of points on each face of the mesh, at least 0, in any unit;
+                uniform if None.
 
         Raises:
             MeshError: the mesh has no face with area, is not finite, or is wound inside out.
@@ -191,7 +192,7 @@ class Surface:
 
 
 def check_face_weights(weights: ArrayLike, faces: int) -> Array:
-    """Weights (F,) of the faces of a mesh.
+    """Checks the weights (F,) of the faces of a mesh, and scales them to at most 1.
 
     Raises:
         InvalidInputError: see `Surface.of`.

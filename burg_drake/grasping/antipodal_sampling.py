@@ -5,7 +5,7 @@ inward normal. If the line leaves the material within the friction cone of that 
 points are an antipodal pair (Nguyen, "Constructing force-closure grasps", IJRR 1988).
 
 The grasp frame G lies midway with +x along the closing line. The approach direction +z is uniform
-about it, within the approach cones. The hand's own body counts only if the caller passes a test.
+about it, within the approach cones. The hand's body is checked only if the caller passes a test.
 """
 
 from __future__ import annotations
@@ -39,19 +39,20 @@ if TYPE_CHECKING:
 
 
 class ContactPairSettings:
-    """Room that fingers need, and how many lines are drawn at a time."""
+    """Clearance and width of finger contacts, and batch sizes."""
 
     finger_clearance = 0.001  # Metres that each open finger keeps to its contact.
     min_width = 1e-4  # Metres. Closer contacts are the two sides of a surface without thickness.
-    lines_per_chunk = 8192  # Lines drawn at a time, so that grasps do not depend on their number.
+    lines_per_chunk = 8192  # Lines drawn at a time; fixed, so that the first grasps suit any n.
     rays_per_block = 1024  # Rays cast at a time; divides `lines_per_chunk`.
 
 
 class PairRejection:
-    """Why a line gives no pair of contacts, or a pair no grasp."""
+    """Reasons why a line gives no pair of contacts, or a pair no grasp."""
 
-    too_long = "too long"  # The line leaves the material nowhere within the hand's opening.
-    slanted = "slanted"  # A normal is outside of the friction cone about the line.
+    too_long = "too long"  # The line does not leave the material within the hand's opening.
+    # A normal is outside the friction cone about the line, or the width does not fit the hand.
+    slanted = "slanted"
     no_room = "no room"  # The object is in the way of a finger.
     no_approach = "no approach"  # No approach direction about the closing line lies in the cones.
 
@@ -65,7 +66,7 @@ class ContactPairs:
             component of largest magnitude is positive.
         friction_needed: (N,) tangent of the larger of the two angles between the closing line and
             the surface normals: the smallest friction coefficient that holds the pair.
-        left_out: how many lines gave no pair, or pairs did not count, and why.
+        left_out: number of lines without a pair, or of rejected pairs, by reason.
     """
 
     p_OC1: Array
@@ -77,17 +78,17 @@ class ContactPairs:
 def draw_pairs(
     surface: Surface, rng: np.random.Generator, friction: float, opening: tuple[float, float]
 ) -> Iterator[ContactPairs]:
-    """The pairs of `ContactPairSettings.lines_per_chunk` random lines, in blocks of
+    """Yields the pairs of `ContactPairSettings.lines_per_chunk` random lines, in blocks of
     `ContactPairSettings.rays_per_block` lines.
 
-    First contacts have the density of `Surface.draw`, lines are uniform in the solid angle of the
-    friction cone about the inward normal, and every pair of a line counts that fingers can close
-    on: a line into the side of a mug leaves the material on the inside of the near wall and again
-    on the outside of the far wall.
+    First contacts have the density of `Surface.draw`, and lines are uniform in the solid angle of
+    the friction cone about the inward normal. All pairs of a line that fingers can close on are
+    returned: a line into the side of a mug leaves the material on the inside of the near wall and
+    again on the outside of the far wall.
 
     Args:
-        surface: where to sample.
-        rng: random numbers; all that the lines take is drawn before the first pairs are given.
+        surface: the surface to sample.
+        rng: random numbers; all those for the lines are drawn before the first pairs are yielded.
         friction: coefficient; the cone's half angle is its arctangent.
         opening: smallest and largest distance between the fingers [m].
     """
@@ -138,9 +139,9 @@ def _finger_path_free(
 ) -> NDArray[np.bool_]:
     """(N,) whether fingers reach the contacts (N, 3) from `travel` (N,) [m] away along `outward`.
 
-    What the ray meets first decides: a face within the finger's travel is in the way, and a face
-    seen from behind, at any distance, means that the contact lies inside of material (solids that
-    overlap or touch, a surface that is doubled with both windings).
+    The first face that the ray meets decides. A face within the finger's travel is in the way. A
+    face seen from behind, at any distance, means that the contact lies inside material (solids that
+    overlap or touch, or a surface that is doubled with both windings).
     """
     face, distance = surface.rays.first_hits(p_OC, outward)
     from_behind = _dot(surface.normals[face], outward) > 0.0
@@ -163,42 +164,43 @@ def _directions_in_cone(axis: Array, half_angle: float, rng: np.random.Generator
 
 
 SAMPLER_VERSION = 3
-"""Raised when the same arguments give other grasps."""
+"""Increase it with a change after which the same arguments give other grasps."""
 
 
 class SamplingEffort:
-    """When sampling ends although fewer grasps have been found than are wanted."""
+    """Limits after which sampling ends with fewer grasps than wanted."""
 
     min_rays = 2**18  # Rays after which sampling may end.
-    rays_per_grasp = 20_000  # Further rays for each grasp found.
+    rays_per_grasp = 20_000  # Further rays for each grasp tried.
     min_tests = 20_000  # Grasps tested by `accept` after which sampling may end.
     tests_per_accepted = 5_000  # Further tests for each grasp accepted.
-    tests_per_wanted = 1_000  # Further tests at most, for each grasp wanted.
+    tests_per_wanted = 1_000  # Upper bound of the further tests, for each grasp wanted.
 
 
 Accept = Callable[[Array], NDArray[np.bool_]]
-"""Which of the grasps (N, 4, 4) in the object frame to keep, (N,); the answer for a grasp must not
-depend on the others."""
+"""Takes grasps X_OG (N, 4, 4) and returns whether to keep each (N,). The result for a grasp must
+not depend on the other grasps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AntipodalSettings:
-    """What makes a grasp antipodal, and the poses that a pair of contacts gives.
+    """Conditions of antipodal contacts, and the grasp poses for a pair of contacts.
 
     Attributes:
         friction: coefficient between object and fingers; the cone's half angle is its arctangent.
-        opening: smallest and largest distance between the fingers [m]. Widths are at most the
-            largest less `ContactPairSettings.finger_clearance` on both sides.
-        approaches: evenly spaced approach angles for each pair of contacts, the first one random.
-        approach_cones: where approach directions lie; of several cones all have to hold at once.
-            Anywhere if there are none. Approaches are uniform among the directions that a pair's
-            closing line leaves; pairs whose line leaves none give no grasp.
-        standoffs: every pose is given once with each of these distances between G and the contacts
-            [m]. Above 0 the hand stays back, as in `core.pregrasp`, and holds with its finger
-            tips; below 0 it goes further, and holds with what is behind the middle of its pads.
-        pad: from where to where the pads reach along z of G [m]; bounds of the standoffs.
-        diverse: of this many times n grasps those n are kept that `farthest_points` selects, in its
-            order: any first part of them covers the grasps, too.
+        opening: smallest and largest distance between the fingers [m]. Grasps are at most as wide
+            as the largest, less `ContactPairSettings.finger_clearance` on both sides.
+        approaches: number of evenly spaced approach angles for each pair of contacts; the first is
+            random.
+        approach_cones: cones in which approach directions have to lie, all at once; any direction
+            if empty. Approaches are uniform among the allowed directions perpendicular to a pair's
+            closing line; pairs without an allowed direction give no grasp.
+        standoffs: distances between G and the contacts [m]; every pose is returned once with each.
+            Above 0 the hand stays back, as in `core.pregrasp`, and holds with its finger tips;
+            below 0 it goes further, and holds with the part of its pads behind their middle.
+        pad: range of the pads along z of G [m]; bounds of the standoffs.
+        diverse: samples this many times n grasps and keeps the n that `farthest_points` selects, in
+            its order. The first k of them cover the sampled grasps, for any k.
 
     Raises:
         InvalidInputError: a value is out of range.
@@ -213,7 +215,7 @@ class AntipodalSettings:
     diverse: int = 1
 
     def __post_init__(self) -> None:
-        for name in ("opening", "standoffs", "pad"):  # plain numbers, as they go into files
+        for name in ("opening", "standoffs", "pad"):  # plain numbers for files
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
         object.__setattr__(self, "friction", float(self.friction))
         object.__setattr__(self, "approach_cones", tuple(self.approach_cones))
@@ -257,36 +259,36 @@ def sample_antipodal(
 ) -> GraspSet:
     """Samples grasps whose contacts are antipodal.
 
-    Both contacts lie within the friction cone of their surface, both fingers close on them from
-    outside of the material, and neither meets another part of the object on its way from the open
-    position. Fingers are exchangeable; of the two equal poses the canonical one is given, whose
-    closing axis has a positive component of largest magnitude (`GraspSet.canonical`).
+    Both contacts lie within the friction cone of their surface. Both fingers close on them from
+    outside the material without meeting another part of the object. Fingers are exchangeable; of
+    the two equal poses the canonical one is returned, whose closing axis has a positive component
+    of largest magnitude (`GraspSet.canonical`).
 
-    Distribution: a first contact is uniform on the surface, or has the density of the weights; the
-    line from it is uniform in the solid angle of the friction cone. A pair of patches dA1, dA2 at
-    distance r, whose normals make angles a1, a2 with the line between them, is thus found with a
-    probability in proportion to (w1 cos a2 + w2 cos a1) / r^2 dA1 dA2. It does not depend on how
-    the object lies or is triangulated. Approaches are uniform among the allowed turns about the
-    line. A test leaves of this what passes; with `diverse` above 1 the set covers the grasps
-    instead.
+    Distribution: the first contact is uniform on the surface, or has the density of the weights;
+    the line from it is uniform in the solid angle of the friction cone. A pair of patches dA1, dA2
+    at distance r, whose normals make angles a1, a2 with the line between them, is thus found with a
+    probability proportional to (w1 cos a2 + w2 cos a1) / r^2 dA1 dA2, where w1 and w2 are the
+    densities of first contacts. It does not depend on the object's pose or triangulation.
+    Approaches are uniform among the allowed angles about the line. With `accept`, this is the
+    distribution before the test; with `diverse` above 1, that of the grasps to select from.
 
     Args:
         mesh: surface in the object frame O [m], faces wound so that normals point outward. It need
             not be watertight.
         n: number of grasps.
-        rng: the same generator state gives the same grasps, and, unless they are to be diverse, the
-            first of a larger n.
-        settings: what makes a grasp antipodal; for the Franka Hand if None.
-        weights: (F,) density of first contacts on each face of the mesh, from 0, in any unit.
-            Second contacts lie where the lines lead.
-        accept: keeps grasps that pass, such as those at which a hand is clear; n counts these.
+        rng: the same generator state gives the same grasps, and, with `diverse` at 1, the first
+            ones of a larger n.
+        settings: see `AntipodalSettings`; for the Franka Hand if None.
+        weights: (F,) density of first contacts on each face of the mesh, at least 0, in any unit.
+            Second contacts follow from the lines.
+        accept: test of grasps, for example whether a hand is clear; n counts grasps that pass.
         object: name for the set's `object` column.
 
     Returns:
-        n grasps, or fewer where the object has (almost) no more; see `SamplingEffort`. `width` is
-        the distance of the contacts; `score` is the share of the friction that is left over, from 0
-        to 1 for a line along both normals. The provenance has the parameters, the state of rng,
-        how many `rays` and grasps `tried` it took, and why the others were `left_out`.
+        n grasps, or fewer if the object has (almost) no more; see `SamplingEffort`. `width` is the
+        distance of the contacts; `score` is the unused share of the friction, from 0 to 1 (line
+        along both normals). The provenance has the parameters, the state of rng, the numbers of
+        `rays` and of grasps `tried`, and the numbers `left_out` by reason.
 
     Raises:
         InvalidInputError: a parameter is out of range, or the weights do not fit the mesh.
@@ -326,7 +328,7 @@ def sample_antipodal(
 
 @dataclass(frozen=True, eq=False)
 class _GraspBatch:
-    """N grasps, and what it took to find them."""
+    """N grasps, and the effort of finding them."""
 
     X_OG: Array
     width: Array
@@ -343,7 +345,7 @@ def _collect_grasps(
     settings: AntipodalSettings,
     accept: Accept | None,
 ) -> _GraspBatch:
-    """The first n grasps of a stream that depends on the random numbers alone."""
+    """The first n accepted grasps of a stream that does not depend on n."""
     parts = [_GraspBatch(np.empty((0, 4, 4)), np.empty(0), np.empty(0))]
     kept = tried = rays = 0
     left_out: Counter[str] = Counter()
@@ -372,7 +374,7 @@ def _collect_grasps(
 def _grasps_on(
     pairs: ContactPairs, settings: AntipodalSettings, rng: np.random.Generator
 ) -> _GraspBatch:
-    """All grasps of each pair in turn: each approach, and on it each standoff."""
+    """All grasps of each pair in turn: for each approach all standoffs."""
     closing, center = pairs.p_OC2 - pairs.p_OC1, 0.5 * (pairs.p_OC1 + pairs.p_OC2)
     width = np.linalg.norm(closing, axis=1)
     u, v = perpendicular_axes(closing / width[:, None])

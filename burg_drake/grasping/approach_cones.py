@@ -36,7 +36,7 @@ class ApproachCone:
         object.__setattr__(self, "angle", float(self.angle))
 
     def turns(self, u: Array, v: Array) -> tuple[Array, Array]:
-        """The turns t of directions `cos(t) u + sin(t) v` that lie in the cone: one interval.
+        """The interval of angles t whose directions `cos(t) u + sin(t) v` lie in the cone.
 
         Args:
             u, v: (N, 3) unit vectors, perpendicular to each other.
@@ -58,15 +58,15 @@ class ApproachCone:
 def random_approach_angles(
     cones: Sequence[ApproachCone], u: Array, v: Array, approaches: int, rng: np.random.Generator
 ) -> Array:
-    """Random turns t of directions `cos(t) u + sin(t) v` that lie in every one of the cones.
+    """Random angles t whose directions `cos(t) u + sin(t) v` lie in all cones.
 
-    The first turn is uniform among the allowed ones, the others follow at even spacing in them,
-    which is at even angles where nothing is forbidden. All (N, approaches) take N random numbers.
+    The first angle is uniform among the allowed ones; the others follow at even spacing within the
+    allowed angles. All (N, approaches) take N random numbers.
 
     Args:
-        cones: what has to hold at once; every direction is allowed if there are none.
+        cones: every direction is allowed if empty.
         u, v: (N, 3) unit vectors, perpendicular to each other.
-        approaches: turns a plane.
+        approaches: number of angles for each pair of u and v.
         rng: random numbers.
 
     Returns:
@@ -83,10 +83,10 @@ def random_approach_angles(
 
 
 def _angles_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Array) -> Array:
-    """Turns (N, K) [rad] below which these shares (N, K) of the turns lie that all cones allow.
+    """Quantiles (N, K) [rad] of the angles that all cones allow, at shares (N, K).
 
-    The ends of the other cones' intervals cut that of the first one; whether a piece between two
-    cuts is allowed shows in its middle.
+    The ends of the other cones' intervals cut the first cone's interval into pieces; a piece is
+    allowed if its middle is.
     """
     middle, half = cones[0].turns(u, v)
     others = [cone.turns(u, v) for cone in cones[1:]]
@@ -103,10 +103,10 @@ def _angles_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Arr
     last = length.shape[1] - 1 - (length[:, ::-1] > 0.0).argmax(axis=1)
     piece = np.minimum(piece, last[:, None])  # where a share near 1 was rounded up
     start = np.take_along_axis(cut[:, :-1] - (below - length), piece, axis=1)
-    some = below[:, -1:] > 0.0  # False for NaN
-    return np.where(some, middle[:, None] + start + target, np.nan)
+    any_allowed = below[:, -1:] > 0.0  # False for NaN
+    return np.where(any_allowed, middle[:, None] + start + target, np.nan)
 
 
 def _wrap_to_pi(angle: Array) -> Array:
-    """The same angles from -pi to pi."""
+    """Wraps angles to -pi to pi."""
     return np.asarray(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)

@@ -1,4 +1,4 @@
-"""How well scores rank grasps: GraspNet-1Billion's AP, and plain average precision.
+"""Average precision of ranked grasps: GraspNet-1Billion's AP, and plain average precision.
 
 GraspNet-1Billion's AP (Fang et al., "GraspNet-1Billion", CVPR 2020) is the share of good grasps
 among the best k, averaged over k = 1..50 and over the friction coefficients 0.2, 0.4 ... 1.2. As
@@ -8,9 +8,9 @@ in graspnetAPI (`graspnet_eval.py`, `eval_utils.py`, `graspnms.cpp`):
   a grasp that is kept;
 - the 10 best of each object are kept, then the 50 best of all;
 - precision at k divides by k, also where there are fewer than k grasps;
-- a grasp is good at a friction coefficient if it needs no more than that.
+- a grasp is good at a friction coefficient if it needs no more friction.
 
-Different from graspnetAPI:
+Differences from graspnetAPI:
 
 - the angle is modulo the swap of the fingers;
 - translations are between grasp frames at the tool centre point; graspnetAPI's lie behind the
@@ -82,19 +82,19 @@ class TopPrecision:
 
     @property
     def attainable(self) -> float:
-        """What `ap` would be if all that are kept were good; below 1 for fewer than `top`."""
+        """`ap` if all kept grasps were good; below 1 if there are fewer than `top`."""
         k = np.arange(1, len(self.precision) + 1)
         return float(np.mean(np.minimum(k, len(self.kept)) / k))
 
 
 @dataclass(frozen=True, eq=False)
 class PrecisionRecall:
-    """Precision over recall as the least score falls.
+    """Curve of precision over recall as the score threshold falls.
 
     Attributes:
         score: (K,) distinct scores, falling.
-        precision: (K,) share of good grasps among those that score no less.
-        recall: (K,) share of all good grasps that score no less; NaN if there are none.
+        precision: (K,) share of good grasps among those with at least this score.
+        recall: (K,) share of all good grasps with at least this score; NaN if none is good.
         version: `AP_VERSION`.
     """
 
@@ -121,11 +121,11 @@ def graspnet_ap(
 
     Args:
         grasps: N grasps with scores.
-        friction_needed: (N,) least coefficient of friction that each grasp holds with; NaN or
-            infinity for grasps that hold with none, or collide.
+        friction_needed: (N,) smallest friction coefficient at which each grasp holds; NaN or
+            infinity for grasps that never hold, or collide.
         frictions: coefficients at which grasps are judged.
-        top: longest list.
-        per_object: grasps of an object (and instance) that are kept; None for all.
+        top: length of the longest list.
+        per_object: largest number of grasps kept per object (and instance); None for all.
 
     Raises:
         InvalidInputError: the shape does not fit, or a number is out of range.
@@ -151,8 +151,8 @@ def precision_at_top(
     Args:
         grasps: N grasps with scores.
         good: (N,) or (N, L) bool: whether each grasp is good, by one or by L criteria.
-        top: longest list.
-        per_object: grasps of an object (and instance) that are kept; None for all.
+        top: length of the longest list.
+        per_object: largest number of grasps kept per object (and instance); None for all.
 
     Raises:
         InvalidInputError: the shape does not fit, or a number is out of range.
@@ -178,10 +178,10 @@ def suppress_near_grasps(grasps: GraspSet, per_object: int | None = None) -> NDA
 
     Args:
         grasps: N grasps with scores.
-        per_object: how many of an object (and instance) are kept at most; None for all.
+        per_object: largest number of grasps kept per object (and instance); None for all.
 
     Returns:
-        Indices of the grasps that are kept, best first.
+        Indices of the kept grasps, best first.
     """
     order = rank_by_score(grasps)
     rank = np.empty(len(grasps), dtype=np.intp)
@@ -200,7 +200,7 @@ def rank_by_score(grasps: GraspSet) -> NDArray[np.intp]:
 
 
 def precision_recall(score: ArrayLike, good: ArrayLike) -> PrecisionRecall:
-    """The curve of all grasps, without suppression; equal scores are one step.
+    """Precision-recall curve of all grasps, without suppression; equal scores are one step.
 
     Args:
         score: (N,) higher is better; NaN is below every score.
@@ -225,7 +225,8 @@ def precision_recall(score: ArrayLike, good: ArrayLike) -> PrecisionRecall:
 
 
 def _kept_positions(G: Array, limit: int | None) -> list[int]:
-    """Positions of the grasps that are kept, of (12, N) components in falling order of score."""
+    """Indices of the grasps kept by suppression, of (12, N) components in falling order of
+    score."""
     kept: list[int] = []
     left = np.arange(G.shape[1])
     while len(left) and (limit is None or len(kept) < limit):
@@ -239,25 +240,25 @@ def _kept_positions(G: Array, limit: int | None) -> list[int]:
 
 
 FRICTION_NEEDED = "friction_needed"
-"""Column of least friction coefficients, judged at those of GraspNet-1Billion."""
+"""Column of the smallest friction coefficients, judged at those of GraspNet-1Billion."""
 COLLISION_OUTCOMES = tuple(outcome.value for outcome in Outcome if outcome.stage is Stage.CLEAR)
 """Outcomes of the stage `clear`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Scores held against a column.
+    """Average precision of scores, judged by a column.
 
     Attributes:
         column: its name.
-        criteria: what makes a grasp good, such as `lifted` or `mu 0.4`.
-        grasps: how many are judged.
-        good: how many of them are good, by criterion.
+        criteria: criteria of good grasps, such as `lifted` or `mu 0.4`.
+        grasps: number of judged grasps.
+        good: number of good grasps, by criterion.
         average_precision: area under precision over recall, without suppression, by criterion.
-        top: GraspNet-1Billion's figure.
-        colliding: grasps that are bad at any friction because the hand collides, as in
-            GraspNet-1Billion's figure; None where the column says itself which grasps are good, or
-            no column tells collisions.
+        top: GraspNet-1Billion's AP.
+        colliding: number of grasps that are bad at any friction because the hand collides, as in
+            GraspNet-1Billion's AP; None if the column itself states which grasps are good, or no
+            column states collisions.
     """
 
     column: str
@@ -270,14 +271,14 @@ class Ranking:
 
 
 def rank_by(grasps: GraspSet, column: str) -> Ranking:
-    """Judges the scores of a set.
+    """Average precision of the scores of a set, judged by one of its columns.
 
     Args:
-        grasps: with scores; of equal scores none is better.
-        column: `friction_needed`, judged at several coefficients, where what collides is bad (a
-            negative `clearance`, or so `screened` or `outcome`); outcomes, of which `lifted` is
-            good, or `reachable` where there were no trials, and grasps without an outcome are left
-            out; or truth values or 0 and 1, where NaN is left out, too.
+        grasps: with scores; equal scores are ties.
+        column: one of three kinds. `friction_needed` is judged at several coefficients; colliding
+            grasps (by `clearance`, `screened` or `outcome`) are bad. Of outcomes, `lifted` is good,
+            or `reachable` without trials; grasps without an outcome are left out. Of truth values
+            or 0 and 1, true is good; NaN is left out.
 
     Raises:
         UnknownNameError: there is no such column.
@@ -310,7 +311,7 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
 
 
 def _are_colliding(grasps: GraspSet) -> NDArray[np.bool_] | None:
-    """(N,) whether some column tells that the hand collides; None if none tells anything."""
+    """(N,) whether any column states that the hand collides; None if no column has values."""
     known = colliding = np.full(len(grasps), False)
     for name, values in grasps.columns.items():
         if name == "clearance" and values.dtype.kind == "f":

@@ -22,9 +22,9 @@ class Clearance:
         outcome: one of the `COLLISION_*` outcomes, or None if the hand is clear.
         blocker: name of the instance, obstacle or `table` that decided the outcome; "" if clear.
         overlap: depth of the deepest overlap with it [m]; 0 if there is none.
-        clearance: signed distance of the open hand from `nearest` [m]: how far it is away, or as a
-            negative number how deep it is in it.
-        nearest: where the hand overlaps something, the body that decides; else the nearest one.
+        clearance: signed distance of the open hand from `nearest` [m]; minus the depth if they
+            overlap.
+        nearest: the `blocker` if the hand overlaps it; else the nearest body.
     """
 
     outcome: Outcome | None

@@ -1,6 +1,6 @@
 """Collision geometry of the open hand and of all bodies of a station diagram as convex shapes.
 
-Where Drake would see the convex hull of a rigid mesh, the object's convex pieces take its place.
+Drake would use the convex hull of a rigid mesh; here the object's convex pieces replace it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def screened_bodies(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
 def filter_hand_pairs(
     station_diagram: StationDiagram, context: Context, names: Mapping[BodyIndex, str]
 ) -> dict[GeometryId, BodyIndex]:
-    """Leaves only the pairs of the hand and named bodies in a context; objects that are meshes
-    are pieces there afterwards.
+    """Filters collisions in a context to pairs of the hand and named bodies, and replaces meshes of
+    objects by their convex pieces.
 
     Returns:
         The bodies of all geometries of the hand and of the named bodies.
@@ -73,7 +73,7 @@ def read_shapes(
     """The collision geometry of the hand and of the named bodies.
 
     Args:
-        station_diagram: what is read.
+        station_diagram: the diagram to read.
         plant_context: the plant's part of a Context in which the open hand's grasp frame is the
             world.
         query: of the scene graph in that Context.
@@ -84,7 +84,7 @@ def read_shapes(
         Shapes of the open hand in the grasp frame, and bodies by name.
 
     Raises:
-        InvalidInputError: a collision geometry is of a shape that the screen does not know.
+        InvalidInputError: a collision geometry has an unsupported shape.
     """
     robot = set(station_diagram.robot_bodies)
     hand: list[Shape] = []
@@ -107,10 +107,10 @@ def read_shapes(
 
 
 def shape_of(inspector: SceneGraphInspector, geometry: GeometryId, X_BP: Array) -> Shape:
-    """A collision geometry at a pose (4, 4).
+    """A collision geometry at a pose (4, 4), as a shape.
 
     Raises:
-        InvalidInputError: it is of a shape that the screen does not know.
+        InvalidInputError: it has an unsupported shape.
     """
     shape = inspector.GetShape(geometry)
     match shape:

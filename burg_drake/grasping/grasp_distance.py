@@ -33,14 +33,14 @@ def grasp_components(X_OG: ArrayLike) -> Array:
 
 
 def pair_translation(G: Array, F: Array) -> Array:
-    """Distances of the origins [m] from `grasp_components`, (12, ...) each, which broadcast."""
+    """Distances of the origins [m] from `grasp_components` (12, ...), broadcast."""
     x, y, z = (G[POSITION_ROW + k] - F[POSITION_ROW + k] for k in range(3))
     length: Array = np.sqrt(x * x + y * y + z * z)
     return length
 
 
 def pair_angle(G: Array, F: Array) -> Array:
-    """Angles modulo the swap of the fingers [rad] from `grasp_components`, which broadcast.
+    """Angles modulo the swap of the fingers [rad] from `grasp_components` (12, ...), broadcast.
 
     The finger form with the larger trace of the relative rotation is the nearer one. Its angle
     comes from sine and cosine both, which is exact to rounding at 0 and at pi, too.
@@ -55,7 +55,7 @@ def pair_angle(G: Array, F: Array) -> Array:
 
 
 def check_lever(lever: float) -> None:
-    """Refuses a lever that makes no distance.
+    """Refuses an invalid lever.
 
     Raises:
         InvalidInputError: it is negative or not finite.
@@ -65,7 +65,7 @@ def check_lever(lever: float) -> None:
 
 
 def _dot(G: Array, i: int, F: Array, j: int) -> Array:
-    """Scalar products of two axes; elementwise, a BLAS product would depend on the batch."""
+    """Scalar products of two axes; elementwise, as BLAS results depend on the batch."""
     product: Array = G[i] * F[j] + G[i + 1] * F[j + 1] + G[i + 2] * F[j + 2]
     return product
 
@@ -74,12 +74,12 @@ INSTANCE_COLUMN = "instance"  # Column with the instance that a grasp is on.
 
 
 def by_target(grasps: GraspSet) -> list[Indices]:
-    """Indices of the grasps of each object and instance, rising, by object and instance."""
+    """Rising indices of the grasps of each object and instance, one array for each."""
     return [rows for rows, _ in by_shared_target(grasps, grasps)]
 
 
 def by_shared_target(grasps: GraspSet, others: GraspSet) -> Iterator[tuple[Indices, Indices]]:
-    """Indices of the grasps of both sets for each object and instance that both have."""
+    """Yields the indices of the grasps of both sets for each object and instance in both."""
     instances = INSTANCE_COLUMN in grasps.columns and INSTANCE_COLUMN in others.columns
     keys = [_target_keys(grasps, instances), _target_keys(others, instances)]
     _, labels = np.unique(np.concatenate(keys), return_inverse=True)

@@ -1,4 +1,4 @@
-"""The screen of the open hand against the scene, with the hand's real collision geometry."""
+"""Collision checks of the open hand against the scene, with the hand's real collision geometry."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class HandClearance:
 
     Args:
         station_diagram: a diagram built with `robot="hand"`.
-        bodies: names of the bodies that count; all if None.
+        bodies: names of the bodies to check; all if None.
 
     Raises:
         UnknownNameError: there is no such body.
-        InvalidInputError: a collision geometry is of a shape that the screen does not know.
+        InvalidInputError: a collision geometry has an unsupported shape.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class HandClearance:
         self._screen = HandScreen(shapes, others)
 
     def check(self, instance: str, X_WG: Array) -> Clearance:
-        """Screens one grasp: the same to the last bit as in a batch.
+        """Checks one grasp; the result is the same as in a batch, bit by bit.
 
         Args:
             instance: the target's name in the scene.
@@ -82,35 +82,34 @@ class HandClearance:
     def check_all(
         self, instance: str, X_WG: Array, *, mode: ClearanceMode = "exact", margin: float = 0.0
     ) -> list[Clearance]:
-        """The verdicts of `measure`, one object each."""
+        """The verdicts of `measure` as a list."""
         return list(self.measure(instance, X_WG, mode=mode, margin=margin))
 
     def measure(
         self, instance: str, X_WG: Array, *, mode: ClearanceMode = "exact", margin: float = 0.0
     ) -> ClearanceBatch:
-        """Screens grasps.
+        """Measures the clearance of grasps.
 
-        The clearance of a grasp does not depend on the margin: a set that was measured once can be
-        sorted and thresholded afterwards.
+        The clearance does not depend on the margin: a set that was measured once can be sorted and
+        thresholded afterwards.
 
         Args:
             instance: the target's name in the scene.
             X_WG: (N, 4, 4) grasps in the world.
-            mode: `exact` finds every overlap as deep as it is; what is reported, ranked or
-                compared with trials needs it. `conservative` takes for an overlap what no face of
-                a part of the hand or of a piece separates. It never calls a hand clear that
-                overlaps something; a positive clearance is exact, and a negative one is a lower
-                bound of the clearance from the body that decides. But it rejects a tenth of the
-                clear grasps, those with edges or corners of hand and body close to each other. It
-                takes two thirds of the time where most grasps collide: for thinning out large sets
-                that need not be complete.
-            margin: clearance that a grasp has to have [m].
+            mode: `exact` computes exact depths; use it for reports, rankings and comparisons with
+                trials. `conservative` counts a pair as an overlap if no face of a hand part or of a
+                body's piece separates it. A hand that overlaps a body is never called clear; a
+                positive clearance is exact, a negative one a lower bound of the clearance from the
+                blocker. But it rejects a tenth of the clear grasps, those with edges or corners of
+                hand and body close to each other. It takes two thirds of the time where most grasps
+                collide: use it to thin out large sets that need not be complete.
+            margin: required clearance of a grasp [m].
 
         Returns:
-            N verdicts. Where several bodies are overlapped, the one decides that would be in the
-            way in an emptier scene, too: the target, then the table, then background, then
-            clutter. What is no deeper than `CONTACT_TOLERANCE` is no overlap. Where nothing is
-            overlapped, but the nearest body is nearer than the margin, that one decides.
+            N verdicts. If the hand overlaps several bodies, the blocker is the one that would also
+            be there in an emptier scene: the target, then the table, background, and clutter.
+            Overlaps up to `CONTACT_TOLERANCE` do not count. Without an overlap, a body nearer than
+            the margin is the blocker.
 
         Raises:
             InvalidInputError: `X_WG` are not poses, or the margin is not 0 or more.
@@ -142,12 +141,12 @@ class HandClearance:
 
     def is_clear(self, X_WG: Array) -> NDArray[np.bool_]:
         """(N,) whether the open hand overlaps nothing at grasps (N, 4, 4); faster than `measure`,
-        which finds out how clear it is."""
+        which also measures the clearance."""
         blocker, _ = self._screen.deepest(check_pose(X_WG, "X_WG"), list(self._screen.bodies))
         return np.asarray(blocker == "")
 
     def outcomes(self, instance: str) -> dict[str, Outcome]:
-        """What an overlap with each body means to grasps of `instance`, the deciding ones first."""
+        """Outcome of an overlap with each body for grasps of `instance`, by priority."""
         # The first of these outcomes is reported.
         outcome_order = (
             Outcome.COLLISION_TARGET,
@@ -160,14 +159,13 @@ class HandClearance:
         return {name: outcomes[name] for name in order}
 
     def free_travel(self, X_WG: Array) -> float:
-        """How far the fingers can close before anything is touched.
+        """How far the fingers can close before they touch anything.
 
         Args:
             X_WG: (4, 4) grasp at which the open hand is clear.
 
         Returns:
-            0 (open) to 1 (pads together), to within 0.025; the fingers are clear there and on the
-            way.
+            0 (open) to 1 (pads together), to within 0.025; up to there the fingers are clear.
         """
         closed = 0.0
         for step in (0.125, 0.025):  # 5 mm and 1 mm of the Panda hand's travel
@@ -176,7 +174,7 @@ class HandClearance:
         return closed
 
     def touched(self, X_WG: Array, closed: float = 0.0) -> dict[str, float]:
-        """What the hand overlaps by Drake's own query, which takes one grasp at a time.
+        """Bodies that the hand overlaps, by Drake's own query for a single grasp.
 
         Args:
             X_WG: (4, 4) grasp in the world.
@@ -184,7 +182,7 @@ class HandClearance:
 
         Returns:
             Names and depths [m]; a depth is along some separating direction, and may be larger
-            than that along the nearest one.
+            than the smallest one.
         """
         self._hand.place(self._plant_context, X_WG, closed)
         found: dict[str, float] = {}
@@ -194,9 +192,9 @@ class HandClearance:
         return found
 
     def signed_distances(self, X_WG: Array) -> dict[str, float]:
-        """How far the open hand is from each body by Drake's own query.
+        """Signed distance of the open hand from each body, by Drake's own query.
 
-        Where curved shapes are concerned, its search may end some millimetres above the distance.
+        For curved shapes its search may end some millimetres above the distance.
 
         Args:
             X_WG: (4, 4) grasp in the world.
@@ -232,14 +230,14 @@ class HandClearance:
 def hand_clearance_alone(
     library: ObjectLibrary, object: str, station: StationLike
 ) -> HandClearance:
-    """The screen of a station's hand against one object alone, without table and clutter.
+    """A `HandClearance` of a station's hand against one object, without table and clutter.
 
     Its world is the object's frame O: `hand_clearance_alone(...).check_all(object, X_OG)`.
 
     Args:
         library: the library.
         object: name in it; the outcome of an overlap is `COLLISION_TARGET`.
-        station: whose hand it is.
+        station: the station with the hand.
 
     Raises:
         UnknownNameError: the library has no such object.

@@ -29,12 +29,12 @@ from burg_drake.grasping.grasp_distance import (
 )
 
 SettlePairs = Callable[[Indices, Indices, Indices, Array], NDArray[np.bool_]]
-"""Takes the rows that are open, pairs as positions among those rows and columns, and how far each
-row has looked; returns which rows stay open."""
+"""Evaluates candidate pairs: takes the open rows, pairs as positions among these rows and columns,
+and the search radius of each row; returns which rows stay open."""
 
 
 class NeighbourSearchSettings:
-    """Size of the steps of the search, and the errors it allows for."""
+    """Batch sizes and error margins of the search."""
 
     candidates = 4  # Points seen at first; four times as many in each further round.
     max_pairs = 200_000  # Pairs in one step. Bounds the memory to some ten megabytes.
@@ -50,14 +50,14 @@ MILLIMETRES_PER_DEGREE = DisplayUnit(
 
 @dataclass(frozen=True)
 class Tolerance:
-    """When two grasps count as the same: all three bounds hold.
+    """Bounds within which two grasps match; all three have to hold.
 
     Attributes:
         translation: between the origins [m].
         angle: modulo the swap of the fingers [rad].
-        distance: translation + lever * angle [m]. BURG-Toolkit's coverage is of this kind, with
-            15 mm, which is narrower than 15 mm and 15 degrees.
-        lever: weight of the angle in that distance [m/rad].
+        distance: translation + lever * angle [m]. BURG-Toolkit's coverage uses 15 mm, which is
+            narrower than 15 mm and 15 degrees.
+        lever: weight of the angle in `distance` [m/rad].
     """
 
     translation: float = setting(
@@ -94,14 +94,14 @@ def find_nearest(
     """The nearest grasp by combined distance.
 
     Args:
-        G: (12, N) `grasp_components` of the grasps that search.
-        F: (12, M) of those that are found.
+        G: (12, N) `grasp_components` of the query grasps.
+        F: (12, M) `grasp_components` of the grasps to search.
         lever: weight of the angle [m/rad].
-        same: G and F are one set, and a grasp does not find itself.
+        same: whether G and F are the same set, so that a grasp does not match itself.
 
     Returns:
-        (N,) indices into F and (N,) distances [m]; -1 and infinity where there is none. Of several
-        as near it is the first one; of several that equal the grasp itself, one of them.
+        (N,) indices into F and (N,) distances [m]; -1 and infinity if F has no (other) grasp. Ties
+        go to the first grasp, unless the distance is 0.
     """
     check_lever(lever)
     nearest = np.full(G.shape[1], -1, dtype=np.intp)
@@ -129,12 +129,12 @@ def find_nearest(
 
 
 def find_within(G: Array, F: Array, tolerance: Tolerance) -> NDArray[np.bool_]:
-    """Whether any grasp is near enough.
+    """Whether any grasp of a set is within tolerance.
 
     Args:
-        G: (12, N) `grasp_components` of the grasps that search.
-        F: (12, M) of those that are found.
-        tolerance: what counts as near.
+        G: (12, N) `grasp_components` of the query grasps.
+        F: (12, M) `grasp_components` of the grasps to search.
+        tolerance: bounds of a match.
 
     Returns:
         (N,) True where a grasp of F is within the tolerance.
@@ -156,10 +156,10 @@ def find_within(G: Array, F: Array, tolerance: Tolerance) -> NDArray[np.bool_]:
 
 
 def _match_radius(tolerance: Tolerance) -> tuple[float, float, float]:
-    """Scales of translation and angle, and the radius of a ball of points around all matches.
+    """Scales of translation and angle, and the radius of a ball that contains all matches.
 
-    Scaled by the tolerances, translation and angle are at most 1 each, their hypotenuse at most
-    the root of 2; where the combined distance alone decides, their sum is at most 1.
+    Scaled by the tolerances, translation and angle are at most 1 each, and their hypotenuse at most
+    the root of 2. If only the combined distance matters, their sum is at most 1.
     """
     lever, distance = tolerance.lever, tolerance.distance
     angle = min(tolerance.angle, math.pi)
@@ -175,12 +175,12 @@ def _match_radius(tolerance: Tolerance) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _GraspTree:
-    """Grasps as points, each in both signs of its quaternion and both finger forms.
+    """Grasps as points, with both signs of the quaternion and both finger assignments.
 
     Attributes:
         points: k-d tree of (4 M, 7) points.
         start: index of its first grasp in the set.
-        count: M.
+        count: number M of grasps.
         per_metre, per_radian: scales of the points.
     """
 
@@ -206,8 +206,8 @@ def _build_trees(F: Array, per_metre: float, per_radian: float) -> Iterator[_Gra
 def _grasp_points(G: Array, per_metre: float, per_radian: float) -> Array:
     """(12, N) components -> (N, 7) points.
 
-    Quaternions of rotations that differ by an angle are 2 sin(angle / 4) apart, so that twice of
-    it is at most the angle.
+    Quaternions of rotations that differ by an angle are 2 sin(angle / 4) apart; twice that is at
+    most the angle.
     """
     R = np.transpose(G[:POSITION_ROW].reshape(3, 3, -1), (2, 1, 0))
     q = Rotation.from_matrix(R).as_quat()
@@ -215,7 +215,7 @@ def _grasp_points(G: Array, per_metre: float, per_radian: float) -> Array:
 
 
 def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: SettlePairs) -> None:
-    """Shows each row its nearest points within a radius, and more of them while it is open."""
+    """Passes the nearest points within a radius to `settle`, and more for rows that stay open."""
     count = min(NeighbourSearchSettings.candidates, tree.points.n)
     while len(rows):
         size = max(1, NeighbourSearchSettings.max_pairs // count)
@@ -230,7 +230,7 @@ def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: Se
 def _search_round(
     tree: _GraspTree, G: Array, rows: Indices, radius: float, count: int, settle: SettlePairs
 ) -> Indices:
-    """Shows each row its `count` nearest points; returns the rows that want to see more."""
+    """Passes the `count` nearest points of each row to `settle`; returns the rows still open."""
     points = _grasp_points(G[:, rows], tree.per_metre, tree.per_radian)
     reach, column = tree.points.query(points, k=range(1, count + 1), distance_upper_bound=radius)
     i, k = np.nonzero(np.isfinite(reach))
@@ -242,26 +242,25 @@ def _search_round(
 def farthest_points(
     X_OG: ArrayLike, n: int, *, lever: float = DISTANCE_LEVER, first: int | None = None
 ) -> NDArray[np.intp]:
-    """Indices of n diverse grasps: each is the one farthest from all before it.
+    """Indices of n diverse grasps: each is the grasp farthest from all selected before.
 
     Greedy farthest-point selection (T. F. Gonzalez, Theoretical Computer Science 38, 1985) under
-    the combined distance. At every length the selection covers the set with a
-    radius of at most twice the smallest that so many grasps can have. Depends on the physical
-    grasps alone, not on their finger form; of equally far grasps the first one is taken, and
-    duplicates come last, in order.
+    the combined distance. At every length the selection covers the set with a radius of at most
+    twice the smallest possible for that many grasps. It depends on the physical grasps alone, not
+    on the finger assignment; ties go to the first grasp, and duplicates come last, in order.
 
     Args:
         X_OG: (N, 4, 4) grasp poses in one frame.
-        n: how many, at most N.
+        n: number of grasps to select, at most N.
         lever: weight of the angle in the distance [m/rad].
-        first: index of the grasp to begin with; by default the one whose position is farthest
-            from the middle of the box around all positions.
+        first: index of the first grasp; by default the one whose position is farthest from the
+            middle of the box around all positions.
 
     Returns:
         (n,) indices in the order of selection.
 
     Raises:
-        InvalidInputError: n or first is out of range, or the lever is no weight.
+        InvalidInputError: n or first is out of range, or the lever is negative or not finite.
     """
     check_lever(lever)
     G = grasp_components(X_OG)
@@ -278,23 +277,23 @@ def farthest_points(
     for k in range(n):
         selected[k] = new
         _lower_distances(distance, G, new, lever)
-        distance[new] = -np.inf  # never again, not even among duplicates
+        distance[new] = -np.inf  # never selected again, not even among duplicates
         new = int(np.argmax(distance))
     return selected
 
 
 def neighbour_distances(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> Array:
-    """How far each grasp is from the nearest other one of its object and instance.
+    """Distance of each grasp to the nearest other grasp of its object and instance.
 
-    A set that repeats itself has small ones; the mean is a figure of its diversity, to be compared
-    between sets of equal size only.
+    Repetitive sets have small distances; the mean measures diversity, but compares only between
+    sets of equal size.
 
     Args:
         grasps: N grasps.
         lever: weight of the angle in the distance [m/rad].
 
     Returns:
-        (N,) combined distances [m]; infinity for a grasp that is the only one.
+        (N,) combined distances [m]; infinity for the only grasp of an object.
     """
     distance = np.full(len(grasps), np.inf)
     for rows in by_target(grasps):
@@ -304,10 +303,10 @@ def neighbour_distances(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> A
 
 
 def _lower_distances(distance: Array, G: Array, new: int, lever: float) -> None:
-    """Lowers the distances (N,) to the selection by a grasp that joins it.
+    """Updates the distances (N,) to the selection after grasp `new` joins it.
 
-    The translation alone is a lower bound, so that angles are computed where it is small only:
-    after a few steps for the neighbours of the new grasp.
+    The translation is a lower bound, so that angles are only computed where it is small: after a
+    few steps, for the neighbours of the new grasp.
     """
     F = G[:, new : new + 1]
     translation = pair_translation(G, F)

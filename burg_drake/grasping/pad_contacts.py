@@ -1,16 +1,14 @@
 """Contact patches of the two compliant pads of a parallel hand on an object, for grasps in batch.
 
-Each pad is a bed of springs. The object turns and slides in the hand until the pads hold it.
-
 Each pad is a Winkler foundation (Johnson, "Contact Mechanics", 1985, section 4.3): independent
 springs over a flat face, pressed in against the rigid object until they carry the hand's force.
 The object turns by small angles until the pressures of both pads face each other. There is no
 rotation about the closing axis, and friction does not resist the rotation.
 
-Where faces lean more than friction holds, the pads squeeze the object out: a bottle grasped at its
-shoulder slides until the pads are on its cap. It moves along the pads, without inertia; its weight
-and the table are left out. Of 344 grasps on scans of a bottle and a can that a trial lifted, 165
-slide here, and 147 of these moved by more than 1 mm in the trial.
+Where faces are steeper than the friction cone, the pads squeeze the object out: a bottle grasped at
+its shoulder slides until the pads are on its cap. It moves along the pads, without inertia; its
+weight and the table are left out. Of 344 grasps on scans of a bottle and a can that a trial lifted,
+165 slide here, and 147 of these moved by more than 1 mm in the trial.
 """
 
 from __future__ import annotations
@@ -38,10 +36,10 @@ class Jaws:
 
     Attributes:
         opening: smallest and largest distance between the pads [m].
-        force: with which each pad presses [N].
-        y, z: what the faces of the pads cover of G [m].
-        foundation: pressure of a pad for each metre that it is indented [Pa/m]: its elastic modulus
-            over the depth of its elastic layer.
+        force: normal force of each pad [N].
+        y, z: extents of the pads' faces along y and z of G [m].
+        foundation: pressure of a pad per indentation [Pa/m]: elastic modulus over the thickness of
+            the elastic layer.
     """
 
     opening: Interval
@@ -86,7 +84,7 @@ def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
     Args:
         hand: the document.
         path: the hand's model file.
-        packages: what a station says of packages.
+        packages: the packages of the station.
 
     Raises:
         InvalidInputError: the document does not fit the model.
@@ -105,7 +103,7 @@ def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
 
 
 TURN_RESISTANCE = 1e-3
-"""Stiffness against turning over that of a full pad; makes the angle unique."""
+"""Added rotational stiffness over that of a full pad; makes the angle unique."""
 
 
 def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
@@ -114,13 +112,13 @@ def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
     The object's angles minimise the energy of the springs, which is convex in them.
 
     Args:
-        gap: (N, 2, K) distance of each spring from the object where its pad just touches [m].
-        yz: (2, K, 2) places of the springs on the pads' faces [m].
+        gap: (N, 2, K) distance of each spring from the object when its pad first touches [m].
+        yz: (2, K, 2) positions of the springs on the pads' faces [m].
         total: sum of the indentations of a pad [m].
 
     Returns:
-        (N, 2, K) indentations, from 0 [m], and (N, 2) how far the object moves along x for each
-        metre along y and z: its angles about -z and y [rad].
+        (N, 2, K) indentations, at least 0 [m], and (N, 2) angles of the object about -z and y, as
+        slopes of x along y and z [rad].
     """
     max_angle = 0.35  # Radians. Small-angle formulas are 6 % off there.
     y, z = (np.ascontiguousarray(np.stack([yz[0], -yz[1]])[..., c]) for c in (0, 1))
@@ -143,7 +141,7 @@ def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
 
 
 def _press_in(gap: Array, total: float) -> tuple[Array, Array]:
-    """Indentations (N, 2, K) that add up to `total`, and how far the pads come (N, 2) [m]."""
+    """Indentations (N, 2, K) that add up to `total`, and travels of the pads (N, 2) [m]."""
     order = np.sort(gap, axis=-1)
     depth = (total + np.cumsum(order, axis=-1)) / np.arange(1, gap.shape[-1] + 1)
     bearing = (depth > order).sum(axis=-1, keepdims=True)  # true up to the last spring that bears
@@ -152,7 +150,7 @@ def _press_in(gap: Array, total: float) -> tuple[Array, Array]:
 
 
 def _rise_of_springs(angle: Array, y: Array, z: Array) -> Array:
-    """(N, 2, K) how far the object comes towards each spring when it turns."""
+    """(N, 2, K) motion of the object's surface towards each spring when it turns."""
     a, b = (angle[:, c, None, None] for c in (0, 1))
     return np.asarray(a * y + b * z)
 
@@ -163,7 +161,7 @@ def _energy(pressed: Array, depth: Array, total: float) -> Array:
 
 
 def _newton_step(pressed: Array, y: Array, z: Array, angle: Array, resistance: float) -> Array:
-    """(N, 2) step towards the least energy, with the pads following the object."""
+    """(N, 2) Newton step of the angles towards least energy, with the pads following the object."""
     bears = (pressed > 0.0).astype(float)
     count = bears.sum(axis=2)
     my, mz = (bears * y).sum(axis=2), (bears * z).sum(axis=2)
@@ -179,23 +177,23 @@ def _newton_step(pressed: Array, y: Array, z: Array, angle: Array, resistance: f
 
 
 def _sum_springs(values: Array) -> Array:
-    """(N,) sums over (N, 2, K); one row after another, so that batches do not matter."""
+    """(N,) sums over (N, 2, K), row by row, so that results do not depend on the batch."""
     one, two = values[:, 0].sum(axis=1), values[:, 1].sum(axis=1)
     return np.asarray(one + two)
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """The patches of N grasps, that of the pad on the side of +x of G first.
+    """The contact patches of N grasps; the pad on the side of +x of G is first.
 
     Attributes:
-        touching: (N,) whether both pads touch, one against the other; all others are NaN where not.
+        touching: (N,) whether both pads touch, facing each other; all other arrays are NaN if not.
         p_OC: (N, 2, 3) centres of pressure on the object's surface [m].
         normal: (N, 2, 3) mean inward normals in the object frame, weighted by pressure; unit.
         area: (N, 2) of the patches, as the pad's face sees them [m^2].
-        torsion_radius: (N, 2) mean distance from the centre of pressure, weighted by pressure [m]:
-            the torque that turns the patch in place is this times normal force times friction.
-        indentation: (N, 2) of the pads where they are pressed in farthest [m].
+        torsion_radius: (N, 2) mean distance from the centre of pressure, weighted by pressure [m].
+            Times normal force and friction it is the torque that turns the patch in place.
+        indentation: (N, 2) largest indentations of the pads [m].
     """
 
     touching: NDArray[np.bool_]
@@ -206,20 +204,20 @@ class Contacts:
     indentation: Array
 
     def select(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> Contacts:
-        """Some of the grasps."""
+        """Selects grasps by index or mask."""
         return Contacts(*(getattr(self, field.name)[index] for field in fields(self)))
 
     @property
     def radius(self) -> Array:
-        """(N, 2) radii of circles as large as the patches [m]."""
+        """(N, 2) radii of circles with the area of the patches [m]."""
         return np.asarray(np.sqrt(self.area / np.pi))
 
 
 def grasp_contacts(surface: Surface, X_OG: Array, jaws: Jaws = PANDA_JAWS) -> Contacts:
     """Closes the jaws on an object.
 
-    G need not lie midway between the contacts. Surfaces that a pad would meet from behind are not
-    seen, as where the open pad stands inside of the object.
+    G need not lie midway between the contacts. Faces that a pad would meet from behind, as when the
+    open pad is inside the object, are ignored.
 
     Args:
         surface: of the object, in its frame O.
@@ -236,9 +234,10 @@ def grasp_contacts(surface: Surface, X_OG: Array, jaws: Jaws = PANDA_JAWS) -> Co
 
 
 def friction_needed(contacts: Contacts) -> Array:
-    """(N,) tangent of the larger angle between inward normals and the line through both contacts.
+    """(N,) smallest friction coefficient that holds the grasps: the tangent of the larger angle
+    between inward normals and the line through both contacts.
 
-    Less friction does not hold. Infinite from 90 degrees, NaN where not both pads touch.
+    Infinite from 90 degrees, NaN unless both pads touch.
     """
     angle = largest_angle(contacts.normal, contacts.p_OC[:, 1] - contacts.p_OC[:, 0])
     return np.asarray(np.where(angle < 0.5 * np.pi, np.tan(angle), np.inf) + 0.0 * angle)
@@ -246,7 +245,7 @@ def friction_needed(contacts: Contacts) -> Array:
 
 def antipodal_angle(contacts: Contacts, X_OG: Array) -> Array:
     """(N,) larger of the angles between the closing directions of grasps (N, 4, 4), before the
-    object turns, and the inward normals [rad]; NaN where not both pads touch."""
+    object turns, and the inward normals [rad]; NaN unless both pads touch."""
     return largest_angle(contacts.normal, -X_OG[:, :3, 0])
 
 
@@ -258,8 +257,8 @@ def are_antipodal(contacts: Contacts, X_OG: Array, friction: float) -> NDArray[n
 
 
 def largest_angle(normal: Array, line: Array) -> Array:
-    """(N,) larger of the angles between normals (N, 2, 3) and the line (N, 3) that leads from the
-    first contact to the second, turned round for the second [rad]."""
+    """(N,) larger of the angles between normals (N, 2, 3) and the line (N, 3) from each contact to
+    the other [rad]; `line` points from the first to the second."""
     towards = np.stack([line, -line], axis=1)
     sine = np.linalg.norm(np.cross(normal, towards), axis=-1)
     return np.asarray(np.arctan2(sine, (normal * towards).sum(axis=-1)).max(axis=1))
@@ -271,7 +270,7 @@ def _find_contacts(surface: Surface, X_OG: Array, jaws: Jaws) -> Contacts:
     p_GC, weight, where = touch.p_GC, touch.weight, touch.touching
     normal = -(weight[..., None] * surface.normals[touch.face]).sum(axis=2)
     lever = touch.yz[None] - p_GC[:, :, None, 1:]
-    # a spring stands for its cell, whose points are sqrt(cell / 2 pi) from it in the mean square
+    # a spring represents its cell, whose points have a mean squared distance of cell / 2 pi from it
     square = (lever**2).sum(axis=-1) + touch.cell / (2.0 * np.pi)
     found = (
         _rotate(touch.X_OG, p_GC) + touch.X_OG[:, None, :3, 3],
@@ -285,18 +284,18 @@ def _find_contacts(surface: Surface, X_OG: Array, jaws: Jaws) -> Contacts:
 
 @dataclass(frozen=True, eq=False)
 class _PadTouch:
-    """What M of N grasps touch, as they are.
+    """Contact of the pads in M of N grasps at the given poses.
 
     Attributes:
-        touching: (N,) which ones.
-        X_OG: (M, 4, 4).
-        yz: (2, K, 2) springs on the pads' faces [m].
-        cell: area that a spring stands for [m^2].
-        face: (M, 2, K) faces that they meet.
-        pressed: (M, 2, K) their indentations [m].
-        weight: (M, 2, K) their shares of a pad's force.
+        touching: (N,) whether both pads touch; the M grasps.
+        X_OG: (M, 4, 4) their poses.
+        yz: (2, K, 2) positions of the springs on the pads' faces [m].
+        cell: area that a spring represents [m^2].
+        face: (M, 2, K) faces that the springs meet.
+        pressed: (M, 2, K) indentations of the springs [m].
+        weight: (M, 2, K) shares of the springs in a pad's force.
         p_GC: (M, 2, 3) centres of pressure [m].
-        slope: (M, 2) how the object turns: along x for each metre along y and z.
+        slope: (M, 2) rotation of the object, as slopes of x along y and z.
     """
 
     touching: NDArray[np.bool_]
@@ -328,7 +327,7 @@ class _PadTouch:
 
 
 def _turn_object(X_OG: Array, touch: _PadTouch) -> Array:
-    """The grasps (N, 4, 4) when the object has turned about the middle between the contacts."""
+    """The grasps (N, 4, 4) after the object has turned about the middle between the contacts."""
     zero = np.zeros(len(touch.slope))
     turn = np.stack([zero, -touch.slope[:, 1], touch.slope[:, 0]], axis=-1)
     X_GT = make_pose(Rotation.from_rotvec(turn).as_matrix())
@@ -340,16 +339,16 @@ def _turn_object(X_OG: Array, touch: _PadTouch) -> Array:
 
 
 def _scatter_rows(values: Array, where: NDArray[np.bool_]) -> Array:
-    """Values (M, ...) of the M grasps where it is true among all (N, ...), NaN at the others."""
+    """Values (N, ...) that are `values` (M, ...) at the M grasps in `where`, NaN at the others."""
     full = np.full((len(where), *values.shape[1:]), np.nan)
     full[where] = values
     return full
 
 
 def _springs(jaws: Jaws) -> tuple[Array, float]:
-    """Places of the springs (2, K, 2) along y and z of G [m], those of the second pad turned half a
-    turn about z against those of the first, and the area that a spring stands for [m^2]."""
-    spring_count = 55  # Springs of a pad, in a Fibonacci lattice. Edges meet evenly spaced springs.
+    """Positions of the springs (2, K, 2) along y and z of G [m], and the area that a spring
+    represents [m^2]. The second pad's springs are the first pad's after half a turn about z."""
+    spring_count = 55  # Springs of a pad, in a Fibonacci lattice, evenly spaced along edges.
     lattice_step = 34  # Step of the lattice.
     i = np.arange(spring_count)
     share = np.stack([i + 0.5, i * lattice_step % spring_count + 0.5], axis=-1) / spring_count
@@ -360,7 +359,7 @@ def _springs(jaws: Jaws) -> tuple[Array, float]:
 
 
 def _cast_springs(surface: Surface, X_OG: Array, yz: Array, jaws: Jaws) -> tuple[Indices, Array]:
-    """What the springs meet (N, 2, K): faces, -1 for none, and their distance from the open pad."""
+    """Faces that the springs meet (N, 2, K), -1 for none, and distances from the open pad [m]."""
     half = 0.5 * jaws.opening[1]
     x = np.broadcast_to(np.array([[half], [-half]])[:, :, None], (*yz.shape[:2], 1))
     p_GS = np.concatenate([x, yz], axis=-1).reshape(-1, 3)
@@ -381,32 +380,32 @@ def _weighted_mean(weight: Array, values: Array) -> Array:
 
 
 def _rotate(X_OG: Array, p_G: Array) -> Array:
-    """Vectors (K, 3) or (N, K, 3) of G in O, (N, K, 3); the same bits alone and in any batch."""
+    """Rotates vectors (K, 3) or (N, K, 3) from G to O, (N, K, 3); independent of the batch."""
     R = X_OG[:, None, :3, :3]
     x, y, z = (p_G[..., k, None] for k in range(3))
     return np.asarray(R[..., 0] * x + R[..., 1] * y + R[..., 2] * z)
 
 
 SLIDE_STEPS = 12
-"""Steps in which the object slides by the shorter side of a pad."""
+"""Number of steps in which the object slides by the shorter side of a pad."""
 
 
 def slide_to_rest(
     surface: Surface, X_OG: Array, jaws: Jaws, friction: float, contacts: Contacts
 ) -> tuple[Contacts, Array]:
-    """Lets objects slide until less friction is needed than there is.
+    """Lets objects slide until they need less friction than there is.
 
     Args:
         surface: of the object.
         X_OG: (N, 4, 4) grasps.
         jaws: the hand.
         friction: coefficient.
-        contacts: of these grasps, before anything slides.
+        contacts: of these grasps, before sliding.
 
     Returns:
-        Contacts where the objects come to rest, and how far they slid (N,) [m]: 0 where the pads
-        hold at once; infinite where they do not hold within the way that is looked at, with the
-        contacts given; NaN where not both pads touch.
+        Contacts at rest, and sliding distances (N,) [m]: 0 if the pads hold at once; NaN unless
+        both pads touch. If they do not hold within the shorter side of a pad, the distance is
+        infinite, and the contacts are the given ones.
     """
     rest = {field.name: getattr(contacts, field.name).copy() for field in fields(Contacts)}
     moving = np.flatnonzero(contacts.touching & ~(friction_needed(contacts) < friction))
@@ -429,13 +428,13 @@ def slide_to_rest(
 
 
 def _slide_direction(contacts: Contacts) -> Array:
-    """(N, 3) unit vectors in O along which pads of equal force push the object; zero where they do
-    not."""
+    """(N, 3) unit vectors in O along which pads of equal force push the object; zero without a
+    push."""
     line = contacts.p_OC[:, 1] - contacts.p_OC[:, 0]
     line /= np.linalg.norm(line, axis=1, keepdims=True)
     towards = np.stack([line, -line], axis=1)
     along = (contacts.normal * towards).sum(axis=-1, keepdims=True)
-    # The least cosine between normal and closing line only bears on the direction.
+    # Clipping the cosine between normal and closing line affects only the direction.
     push = contacts.normal / np.maximum(along, 0.1)  # by each pad, for a unit along the line
     across = (push - (push * towards).sum(axis=-1, keepdims=True) * towards).sum(axis=1)
     size = np.linalg.norm(across, axis=1, keepdims=True)

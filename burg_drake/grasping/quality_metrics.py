@@ -1,8 +1,8 @@
-"""Analytic quality of grasps: what two compliant pads with Coulomb friction can withstand.
+"""Analytic quality of grasps: loads that two compliant pads with Coulomb friction withstand.
 
-`force_closure`, `friction_needed` and `antipodal_angle` are those of the grasp as given. All
-others are those of the object where it comes to rest in the hand after sliding. The hand's body,
-the table and other objects are left out.
+`force_closure`, `friction_needed` and `antipodal_angle` are for the grasp as given, all other
+metrics for the object at rest in the hand after sliding. The hand's body, the table and other
+objects are left out.
 """
 
 from __future__ import annotations
@@ -42,20 +42,21 @@ STANDARD_GRAVITY = 9.81
 """m/s^2, as in Drake."""
 
 DEFAULT_METRIC = "load_margin"
-"""It has the weight, the grip force, the lever of the centre of mass and the size of the patches in
-it, and a natural scale: at 1 the grip just bears the object. Epsilon depends on an arbitrary
-length, and the angles know nothing of the weight. In 1,500 trials on the six objects of
-`tabletop_six` at four times their mass, 933 lifted (`benchmarks/ranking.py`, 95 % intervals), it
-ranks a lifted grasp above another one with a chance of 0.951 (0.939 to 0.962); contact_offset 0.945
-(0.932 to 0.955), gravity_margin 0.674 (0.652 to 0.695), epsilon 0.610 (0.588 to 0.632). Of grasps
-on the same object 0.898 (0.871 to 0.924), gravity_margin 0.912 (0.885 to 0.936). At the objects'
-own mass, 1,437 lifted, it is 0.917 (0.885 to 0.948), and on the same object 0.781 (0.720 to 0.848),
-gravity_margin 0.865 (0.826 to 0.902)."""
+"""It depends on the weight, the grip force, the lever of the centre of mass and the size of the
+patches, and has a natural scale: at 1 the grip just bears the object. Epsilon depends on an
+arbitrary length, and the angles do not depend on the weight.
+
+Probability that a lifted grasp ranks above a failed one, with 95 % intervals, in 1,500 trials on
+the six objects of `tabletop_six` at four times their mass, 933 lifted (`benchmarks/ranking.py`):
+0.951 (0.939 to 0.962); contact_offset 0.945 (0.932 to 0.955), gravity_margin 0.674 (0.652 to
+0.695), epsilon 0.610 (0.588 to 0.632). For grasps on the same object 0.898 (0.871 to 0.924),
+gravity_margin 0.912 (0.885 to 0.936). At the objects' own mass, 1,437 lifted: 0.917 (0.885 to
+0.948); on the same object 0.781 (0.720 to 0.848), gravity_margin 0.865 (0.826 to 0.902)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Payload:
-    """What is held.
+    """Mass and friction of the held object.
 
     Attributes:
         mass: [kg].
@@ -79,7 +80,7 @@ class Payload:
 
     @classmethod
     def of(cls, entry: ObjectEntry, friction: float | None = None) -> Payload:
-        """That of a library entry; the coefficient is the object's own if None."""
+        """Payload of a library entry; the object's own friction coefficient if None."""
         properties = entry.mass_properties
         return cls(
             mass=properties.mass,
@@ -90,36 +91,36 @@ class Payload:
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """Metrics of N grasps; NaN (and no force closure) where not both pads touch.
+    """Metrics of N grasps; NaN (and no force closure) unless both pads touch.
 
     Attributes:
         force_closure: whether the line between the contacts lies strictly within both friction
             cones (Nguyen, "Constructing force-closure grasps", IJRR 1988), that is, whether less
-            friction is needed than there is; torsional friction of the patches then resists turning
-            about that line. Where it is false the object slides, and may be held elsewhere.
+            friction is needed than there is; torsional friction of the patches then resists
+            rotation about that line. If false, the object slides, and may be held elsewhere.
         friction_needed: tangent of the larger angle between that line and the inward normals.
             Infinite from 90 degrees.
         antipodal_angle: larger of the angles between the closing direction of the grasp, before the
             object turns, and the inward normals [rad].
-        slide: how far the object slides in the hand until it is in force closure [m]: 0 where it is
-            so at once, infinite where it never is, see `slide_to_rest`.
+        slide: sliding distance of the object in the hand until it is in force closure [m]: 0 if it
+            is at once, infinite if it never is, see `slide_to_rest`.
         epsilon: radius of the largest ball about the origin within the wrench space [-] (Ferrari
             and Canny, ICRA 1992): soft-finger contacts, normal forces that add up to one, torques
-            about the centre of mass over the largest distance between it and the surface. 0 where
-            the pads never hold it. Found by a search whose result is never too small; see
+            about the centre of mass over its largest distance from the surface. 0 if the pads never
+            hold the object. Found by a search whose result is never too small; see
             `wrench_margins`.
         volume: of the wrench space [-] (Miller and Allen, "Examples of 3D grasp quality
-            computations", ICRA 1999); 0 where they never hold it. Coarser than epsilon: friction is
-            within a polytope of the ellipsoid's volume with 80 faces.
-        load_margin: how many times the object's weight the grip bears as a force on its centre of
-            mass in the worst direction, with Coulomb friction and torsion of the patches and pad
-            forces that add up to twice the hand's, as those of coupled fingers do; 0 without force
+            computations", ICRA 1999); 0 if the pads never hold the object. Coarser than epsilon:
+            the friction ellipsoid is approximated by a polytope of equal volume with 80 faces.
+        load_margin: largest force on the centre of mass that the grip bears in every direction,
+            over the object's weight, with Coulomb friction and torsion of the patches. The pad
+            forces add up to twice the hand's, as those of coupled fingers do. 0 without force
             closure.
-        gravity_margin: the same along gravity; NaN where the pose is not known. Below 1 the object
-            begins to turn in the hand, which need not be a drop: most swing until their centre of
+        gravity_margin: the same along gravity; NaN if the pose is not known. Below 1 the object
+            begins to turn in the hand, but need not drop: most objects swing until their centre of
             mass hangs below the pads. Of 1,000 trials on the objects of `tabletop_six` and two
-            scans, a margin below 1 had 332: 282 were lifted, 149 of them turned by more than 5
-            degrees. Of 451 with 1.5 or more 436 were lifted, 24 turned.
+            scans, 332 had a margin below 1: 282 were lifted, 149 of them turned by more than 5
+            degrees. Of 451 with 1.5 or more, 436 were lifted, 24 turned.
         patch_area: of the smaller of the two patches [m^2].
         contact_offset: distance between centre of mass and the line through the contacts [m].
     """
@@ -141,17 +142,17 @@ METRICS = tuple(field.name for field in fields(Quality))
 
 
 def quality_provenance(jaws: Jaws, by: str, **details: Any) -> dict[str, Any]:
-    """What the metrics of a set were computed with, as JSON values."""
+    """Parameters with which the metrics of a set were computed, as JSON values."""
     how = {"version": QUALITY_VERSION, "by": by, "jaws": asdict(jaws), **details}
     plain: dict[str, Any] = json.loads(json.dumps(how))
     return plain
 
 
 def check_metric(name: str) -> None:
-    """Refuses names that no metric has.
+    """Refuses unknown names of metrics.
 
     Raises:
-        UnknownNameError: lists the names.
+        UnknownNameError: there is no such metric.
     """
     if name not in METRICS:
         raise UnknownNameError(f"there is no metric {name!r}; {suggest_names(name, METRICS)}")
@@ -172,19 +173,19 @@ def grasp_quality(
     *,
     up: ArrayLike | None = None,
 ) -> Quality:
-    """All metrics of grasps.
+    """Computes all metrics of grasps.
 
-    A grasp and the one with exchanged fingers get the same figures to the last bit.
+    A grasp and the one with swapped fingers get the same metrics, bit by bit.
 
     Args:
         X_OG: (N, 4, 4) grasps of one object.
-        surface: the object's.
-        payload: its mass, centre of mass and friction.
-        jaws: the hand's.
+        surface: of the object.
+        payload: mass, centre of mass and friction of the object.
+        jaws: of the hand.
         up: (3,) or (N, 3) direction against gravity in the object frame; None if unknown.
 
     Raises:
-        InvalidInputError: `up` is no direction.
+        InvalidInputError: `up` has a wrong shape, or is zero or not finite.
     """
     X_OG = canonical_fingers(X_OG)
     up_O = None if up is None else _unit_directions(up, len(X_OG))
@@ -227,7 +228,7 @@ def _distance_from_line(contacts: Contacts, p_OQ: Array) -> Array:
 
 
 def _unit_directions(up: ArrayLike, n: int) -> Array:
-    """Unit vectors (n, 3)."""
+    """Normalizes directions (3,) or (n, 3) to unit vectors (n, 3)."""
     given = np.asarray(up, float)
     if given.shape not in ((3,), (n, 3)):
         raise InvalidInputError(f"up has shape {given.shape}; expected (3,) or ({n}, 3)")

@@ -38,11 +38,11 @@ DEFAULT_TOLERANCE = Tolerance()  # Tolerances of `coverage` and `precision`.
 
 @dataclass(frozen=True)
 class Share:
-    """How many of how many.
+    """A count and its share of a total.
 
     Attributes:
-        count: grasps with a match.
-        total: grasps.
+        count: number of grasps with a match.
+        total: number of grasps.
     """
 
     count: int
@@ -50,18 +50,18 @@ class Share:
 
     @property
     def value(self) -> float:
-        """The share in [0, 1]; NaN of nothing."""
+        """The share in [0, 1]; NaN if the total is 0."""
         return self.count / self.total if self.total else math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Which grasps of a set have a match in another one.
+    """Whether grasps of a set have a match in another set.
 
     Attributes:
         matched: (N,) bool, in the order of the set.
         object: (N,) names of the objects.
-        tolerance: what counted as a match.
+        tolerance: bounds of a match.
         version: `DISTANCE_VERSION`.
     """
 
@@ -72,7 +72,7 @@ class Matches:
 
     @property
     def overall(self) -> Share:
-        """The share of all grasps; each counts the same, whatever its object."""
+        """The share of all grasps, with the same weight for each grasp."""
         return Share(int(self.matched.sum()), len(self.matched))
 
     @property
@@ -86,11 +86,12 @@ class Matches:
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """For each grasp of a set, the nearest one of another set.
+    """For each grasp of a set, the nearest grasp of another set.
 
     Attributes:
-        index: (N,) in the other set, see `find_nearest` for ties; -1 if it has none of that object.
-        distance: (N,) combined distance [m]; infinite if there is none, as are the other two.
+        index: (N,) in the other set, see `find_nearest` for ties; -1 if it has no grasp of that
+            object. Distance, translation and angle are infinite then.
+        distance: (N,) combined distance [m].
         translation: (N,) [m].
         angle: (N,) modulo the swap of the fingers [rad].
         lever: of the combined distance [m/rad].
@@ -114,7 +115,7 @@ def coverage(
     distance: float = DEFAULT_TOLERANCE.distance,
     lever: float = DISTANCE_LEVER,
 ) -> Matches:
-    """Which grasps of a reference have one of `grasps` within all bounds.
+    """Matches of the grasps of a reference among `grasps`.
 
     Args:
         reference: the set to be covered.
@@ -125,7 +126,7 @@ def coverage(
         lever: weight of the angle in it [m/rad].
 
     Returns:
-        For each grasp of the reference.
+        Whether each grasp of the reference has a match.
 
     Raises:
         InvalidInputError: a bound is negative or NaN.
@@ -134,7 +135,7 @@ def coverage(
 
 
 def _matches(reference: GraspSet, grasps: GraspSet, tolerance: Tolerance) -> Matches:
-    """Which grasps of a reference have one of `grasps` within a tolerance."""
+    """Matches of the grasps of a reference among `grasps`, within a tolerance."""
     matched = np.zeros(len(reference), dtype=bool)
     for rows, columns in by_shared_target(reference, grasps):
         G, F = grasp_components(reference.X_OG[rows]), grasp_components(grasps.X_OG[columns])
@@ -151,10 +152,10 @@ def precision(
     distance: float = DEFAULT_TOLERANCE.distance,
     lever: float = DISTANCE_LEVER,
 ) -> Matches:
-    """Which of `grasps` have a grasp of a reference within all bounds; see `coverage`.
+    """Matches of `grasps` among the grasps of a reference; see `coverage`.
 
     Returns:
-        For each of `grasps`.
+        Whether each of `grasps` has a match.
 
     Raises:
         InvalidInputError: a bound is negative or NaN.
@@ -192,13 +193,13 @@ DISTRIBUTION_QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # Quantiles of
 
 @dataclass(frozen=True)
 class Distribution:
-    """Of numbers; those that are not finite are counted and left out.
+    """Statistics of the finite ones among numbers.
 
     Attributes:
-        count: finite numbers.
-        missing: others.
-        mean: of the finite ones; NaN if there are none.
-        quantiles: at `DISTRIBUTION_QUANTILES`, least to greatest; NaN likewise.
+        count: number of finite values.
+        missing: number of other values.
+        mean: of the finite values; NaN if there are none.
+        quantiles: at `DISTRIBUTION_QUANTILES`, from smallest to largest; NaN if there are none.
     """
 
     count: int
@@ -208,19 +209,19 @@ class Distribution:
 
     @property
     def median(self) -> float:
-        """The middle of the quantiles."""
+        """The median; NaN if there are no finite values."""
         return self.quantiles[DISTRIBUTION_QUANTILES.index(0.5)]
 
 
 @dataclass(frozen=True)
 class ObjectSummary:
-    """Grasps of one object, or of all.
+    """Statistics of the grasps of one object, or of all.
 
     Attributes:
-        grasps: how many.
-        instances: how many instances they are on; 0 if the set does not say.
-        duplicates: grasps that another one of the same object and instance equals.
-        neighbour: distance of each to the nearest other one [m], see `neighbour_distances`.
+        grasps: number of grasps.
+        instances: number of instances with grasps; 0 if the set has no such column.
+        duplicates: number of grasps that equal another grasp of the same object and instance.
+        neighbour: distances to the nearest other grasp [m], see `neighbour_distances`.
         width: distance of the contacts [m].
         score: of the grasps.
     """
@@ -235,14 +236,14 @@ class ObjectSummary:
 
 @dataclass(frozen=True)
 class SetSummary:
-    """Figures of a set of grasps.
+    """Statistics of a set of grasps.
 
     Attributes:
         overall: of all grasps.
         objects: by name of the object.
         numbers: of each column of numbers, and of the coordinates `x`, `y`, `z` [m].
-        truths: grasps for which each column of truth values holds.
-        texts: how often each value of each column of text occurs, the most frequent first.
+        truths: share of true values of each column of truth values.
+        texts: count of each value of each text column, the most frequent first.
         version: `DISTANCE_VERSION`.
     """
 
@@ -256,14 +257,14 @@ class SetSummary:
 
 @dataclass(frozen=True)
 class ObjectComparison:
-    """Grasps of one object, or of all, of a reference and of another set.
+    """Comparison of a reference and another set for one object, or for all.
 
     Attributes:
         coverage: share of the reference with a match in the other set.
         precision: share of the other set with a match in the reference.
-        to_grasps: combined distance of each grasp of the reference to the nearest other one [m].
-        to_reference: the same of each other grasp to the nearest of the reference [m].
-        translation, angle: between each grasp of the reference and that nearest one [m, rad].
+        to_grasps: combined distances from the reference to the nearest grasps of the other set [m].
+        to_reference: combined distances from the other set to the nearest reference grasps [m].
+        translation, angle: parts of `to_grasps` [m, rad].
     """
 
     coverage: Share
@@ -276,13 +277,13 @@ class ObjectComparison:
 
 @dataclass(frozen=True)
 class SetComparison:
-    """Two sets of grasps held against each other.
+    """Comparison of two sets of grasps.
 
     Attributes:
         overall: of all grasps.
         objects: by name, of every object of either set.
-        shared_ids: identifiers that both sets have.
-        tolerance: what counts as a match.
+        shared_ids: number of identifiers in both sets.
+        tolerance: bounds of a match.
         version: `DISTANCE_VERSION`.
     """
 
@@ -294,7 +295,7 @@ class SetComparison:
 
 
 def distribution(values: ArrayLike) -> Distribution:
-    """Of (N,) numbers."""
+    """Computes the statistics of (N,) numbers."""
     all_values = np.asarray(values, dtype=float)
     finite = all_values[np.isfinite(all_values)]
     missing = len(all_values) - len(finite)
@@ -305,7 +306,7 @@ def distribution(values: ArrayLike) -> Distribution:
 
 
 def summarize(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> SetSummary:
-    """Figures of a set.
+    """Computes the statistics of a set.
 
     Args:
         grasps: the set.
@@ -339,12 +340,12 @@ def summarize(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> SetSummary:
 def compare_grasps(
     reference: GraspSet, grasps: GraspSet, tolerance: Tolerance | None = None
 ) -> SetComparison:
-    """Holds a set of grasps against a reference.
+    """Compares a set of grasps with a reference.
 
     Args:
-        reference: what is to be covered.
+        reference: the set to be covered.
         grasps: the other set.
-        tolerance: what counts as a match, and the lever of distances; the default one if None.
+        tolerance: bounds of a match, and the lever of distances; the defaults if None.
     """
     tolerance = tolerance or Tolerance()
     covered = _matches(reference, grasps, tolerance).matched
@@ -388,5 +389,5 @@ def _finite_share(values: Mask) -> Share:
 
 
 def _count_values(values: list[str]) -> dict[str, int]:
-    """How often each value occurs, the most frequent first, then by name."""
+    """Counts of the values, the most frequent first, then by name."""
     return dict(sorted(Counter(values).items(), key=lambda item: (-item[1], item[0])))

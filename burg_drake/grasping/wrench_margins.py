@@ -2,10 +2,10 @@
 
 The largest ball in K about the origin has a radius of 1 over the longest u of the polar set K*,
 and K reaches 1 over the largest d.u in the direction d. Both are maximized over pairs of unit
-vectors: from the best pairs of a coarse set on in shrinking steps, and along the two circles on
-which one contact does not slide. The result is never too small but for rounding; `epsilon_bracket`
-bounds it from the other side. Against a search with 320 directions, 12 starts and 36 steps, on
-3,927 grasps of seven objects, 999 of 1,000 results agree within 6e-4, and all within 2 %.
+vectors: in shrinking steps from the best pairs of a coarse set, and along the two circles on which
+one contact does not slide. Apart from rounding, the result is never too small; `epsilon_bracket`
+bounds it from the other side. Compared with a search with 320 directions, 12 starts and 36 steps,
+on 3,927 grasps of seven objects, 999 of 1,000 results agree within 6e-4, and all within 2 %.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from burg_drake.grasping.wrench_space import WrenchSpace, triangulated_ball
 
 @dataclass(frozen=True, eq=False)
 class WrenchObjective:
-    """What is to be largest over the polar set.
+    """Function of u that is maximized over the polar set.
 
     Attributes:
-        rows: (N, R, 6) or (R, 6) what of u counts.
-        linear: the value is the one row's product with u, and not the square of the length of what
-            counts.
+        rows: (N, R, 6) or (R, 6) matrices that multiply u.
+        linear: whether the value is the product of the single row with u; otherwise it is the
+            squared length of the product.
     """
 
     rows: Array
@@ -60,11 +60,11 @@ class WrenchObjective:
         return np.asarray(value)
 
     def select(self, index: slice) -> WrenchObjective:
-        """For some of the grasps."""
+        """Selects grasps."""
         return self if self.rows.ndim == 2 else WrenchObjective(self.rows[index], self.linear)
 
     def repeat(self, times: int) -> WrenchObjective:
-        """For the same grasps several times over."""
+        """Repeats the grasps."""
         if self.rows.ndim == 2:
             return self
         return WrenchObjective(np.concatenate([self.rows] * times), self.linear)
@@ -74,29 +74,29 @@ ANY_WRENCH, ANY_FORCE = WrenchObjective(np.eye(6)), WrenchObjective(np.eye(6)[:3
 
 
 def force_along(direction: Array) -> WrenchObjective:
-    """A force on the centre of mass along a direction (N, 3), without torque."""
+    """Objective of a force on the centre of mass along directions (N, 3), without torque."""
     return WrenchObjective(
         np.concatenate([direction, np.zeros_like(direction)], axis=-1)[:, None], True
     )
 
 
 def wrench_reaches(space: WrenchSpace, goals: Sequence[WrenchObjective]) -> list[Array]:
-    """How far the wrench spaces reach.
+    """Reach of the wrench spaces for several objectives.
 
     Args:
         space: of N grasps.
         goals: `ANY_WRENCH` gives epsilon; `ANY_FORCE` the largest force on the centre of mass that
-            is borne in every direction; `force_along` that along one.
+            the grip bears in every direction; `force_along` the largest force along one direction.
 
     Returns:
-        (N,) for each goal, where the normal forces of the contacts add up to one.
+        (N,) reaches for each goal, for normal forces of the contacts that add up to one.
     """
     chunk_size = 256  # Grasps evaluated together.
     found = [np.empty(len(space)) for _ in goals]
     for i in range(0, len(space), chunk_size):
         part = slice(i, i + chunk_size)
-        some = [goal.select(part) for goal in goals]
-        largest = _largest_over_polar_set(space.select(part), some)
+        own_goals = [goal.select(part) for goal in goals]
+        largest = _largest_over_polar_set(space.select(part), own_goals)
         for whole, values in zip(found, largest, strict=True):
             whole[part] = values
     with np.errstate(divide="ignore"):
@@ -115,15 +115,16 @@ def _largest_over_polar_set(
     linear_schedule = ((4, 5), (2, 12))  # Linear objectives have one peak.
     coarse = triangulated_ball(0)
     for goal, values in zip(goals, _pair_values(space, goals, coarse.normals), strict=True):
-        race = linear_schedule if goal.linear else full_schedule
-        peaks = _best_local_peaks(values, coarse.neighbors, race[0][0])
-        climb = WrenchAscent.start(coarse.normals[peaks])
-        for starts, steps in race:
-            climb = climb.leaders(starts)
-            many, often = space.select(np.tile(np.arange(len(space)), starts)), goal.repeat(starts)
+        schedule = linear_schedule if goal.linear else full_schedule
+        peaks = _best_local_peaks(values, coarse.neighbors, schedule[0][0])
+        ascent = WrenchAscent.start(coarse.normals[peaks])
+        for starts, steps in schedule:
+            ascent = ascent.keep_best(starts)
+            spaces = space.select(np.tile(np.arange(len(space)), starts))
+            repeated = goal.repeat(starts)
             for _ in range(steps):
-                climb = climb.step_on(many, often)
-        yield np.maximum(climb.leaders(1).value, _along_rims(space, goal))
+                ascent = ascent.step_on(spaces, repeated)
+        yield np.maximum(ascent.keep_best(1).value, _largest_on_rims(space, goal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class WrenchAscent:
         return cls(nu.reshape(n, 2, 3), np.full(n, -np.inf), np.full(n, first_step), len(nu))
 
     def step_on(self, space: WrenchSpace, goal: WrenchObjective) -> WrenchAscent:
-        """Tries the neighbours of every pair."""
+        """Moves every pair to its best neighbour, or halves its step if none is better."""
         around = _neighbour_directions(self.nu, self.step)
         value, pair = _best_pairs(_pair_values(space, [goal], around)[0])
         better = value > self.value
@@ -162,8 +163,8 @@ class WrenchAscent:
             self.starts,
         )
 
-    def leaders(self, starts: int) -> WrenchAscent:
-        """The best of each grasp go on."""
+    def keep_best(self, starts: int) -> WrenchAscent:
+        """Keeps the best `starts` pairs of each grasp."""
         value = self.value.reshape(self.starts, -1)
         order = np.argsort(-value, axis=0, kind="stable")[:starts]
         index = (order * value.shape[1] + np.arange(value.shape[1])).ravel()
@@ -173,7 +174,8 @@ class WrenchAscent:
 def _pair_values(
     space: WrenchSpace, goals: Sequence[WrenchObjective], nu: Array, distance: Array | float = 1.0
 ) -> list[Array]:
-    """(N, M, M) values for each goal of all pairs of nu, (M, 3) or (N, 2, M, 3); -inf: no u."""
+    """(N, M, M) values for each goal of all pairs of nu, (M, 3) or (N, 2, M, 3); -inf for pairs
+    without a u."""
     slides = space.slides(nu, distance)
     # Pairs whose equations are closer to dependent are left out.
     alpha, beta, extreme = slides.pairs(1e-7)
@@ -184,7 +186,7 @@ def _pair_values(
 
 
 def _best_local_peaks(values: Array, neighbors: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """(count, N, 2) the best pairs among those that no neighbour is better than."""
+    """(count, N, 2) the best pairs among the local maxima."""
     peak = values.copy()
     for near in neighbors.T:
         peak[values < values[:, near]] = -np.inf
@@ -198,8 +200,8 @@ def _best_local_peaks(values: Array, neighbors: NDArray[np.int64], count: int) -
     return np.stack(found)
 
 
-def _along_rims(space: WrenchSpace, goal: WrenchObjective) -> Array:
-    """(N,) largest values where one contact does not slide at all; -inf where it always does."""
+def _largest_on_rims(space: WrenchSpace, goal: WrenchObjective) -> Array:
+    """(N,) largest values at which one contact does not slide; -inf if it always does."""
     angle_count = 32  # Angles evaluated on a circle.
     best = np.full(len(space), -np.inf)
     for sliding in (0, 1):
@@ -233,12 +235,12 @@ def _neighbour_directions(nu: Array, step: Array) -> Array:
 
 
 def epsilon_bracket(space: WrenchSpace, subdivisions: int = 2) -> tuple[Array, Array]:
-    """Certain bounds of epsilon, at more cost.
+    """Guaranteed bounds of epsilon, at a higher cost.
 
     Args:
         space: the wrench spaces.
-        subdivisions: of the inscribed polytope that the lower bound comes from. Its wrench space is
-            part of the true one, and its epsilon is computed from all of its facets.
+        subdivisions: of the inscribed polytope of the lower bound. Its wrench space is part of the
+            true one, and its epsilon is computed from all of its facets.
 
     Returns:
         (N,) lower and upper bounds.

@@ -10,8 +10,8 @@ Everything is computed on the polar set, K* = {u : w.u <= 1 for every w of K}. W
 both contacts slide, each against a unit vector nu: A_i' u = alpha_i nu_i and c_i.u + alpha_i = 1
 with alpha_i >= 0. These are eight equations for eight unknowns, so a pair of unit vectors has at
 most one such u, in closed form. With a polytope in place of the unit ball, nu runs through the
-normals of its faces, and the pairs with a solution are the facets of the polytope's wrench space,
-except for those that contain one contact's whole set, which have an edge of the other's. No hull
+normals of its faces, and the pairs with a solution are the facets of the polytope's wrench space.
+The other facets contain the whole set of one contact and an edge of the other contact's. No hull
 algorithm is needed.
 """
 
@@ -54,11 +54,11 @@ class TriangulatedBall:
 
 @lru_cache(maxsize=8)
 def triangulated_ball(subdivisions: int = 1, of_volume: bool = False) -> TriangulatedBall:
-    """An icosahedron whose triangles are divided into four, again and again.
+    """An icosahedron whose triangles are repeatedly divided into four.
 
     Args:
-        subdivisions: how often; there are 20 * 4**subdivisions triangles.
-        of_volume: as large as the unit ball, and not inscribed in it.
+        subdivisions: number of divisions; there are 20 * 4**subdivisions triangles.
+        of_volume: whether it has the volume of the unit ball; otherwise it is inscribed in it.
     """
     import trimesh
 
@@ -82,7 +82,7 @@ def triangulated_ball(subdivisions: int = 1, of_volume: bool = False) -> Triangu
 
 
 def _neighbors(sides: Indices) -> Indices:
-    """(M, 3) from pairs of triangles (E, 2)."""
+    """(M, 3) neighbours of each triangle, from pairs of adjacent triangles (E, 2)."""
     both = np.concatenate([sides, sides[:, ::-1]])
     return both[np.argsort(both[:, 0], kind="stable"), 1].reshape(-1, 3)
 
@@ -100,8 +100,8 @@ class WrenchSpace:
     Attributes:
         basis: (N, 2, 6, 4) columns c and A of both contacts: force [-], and torque about the centre
             of mass over the characteristic length [-].
-        pseudo, null: (N, 2, 6, 4) and (N, 2, 2, 4). With y the values of (c, A)'u of both contacts,
-            u is the sum of the first times y, and the sum of the second times y is zero.
+        pseudo, null: (N, 2, 6, 4) pseudoinverse and (N, 2, 2, 4) null space. With y the values of
+            (c, A)'u of both contacts, u is the sum of `pseudo` y, and the sum of `null` y is zero.
     """
 
     basis: Array
@@ -117,7 +117,7 @@ class WrenchSpace:
         length: float,
         tangent: Array,
     ) -> WrenchSpace:
-        """Unit contacts of the patches.
+        """Wrench spaces of contact patches with unit normal forces.
 
         Args:
             contacts: of N grasps.
@@ -153,15 +153,15 @@ class WrenchSpace:
         return len(self.basis)
 
     def select(self, index: slice | NDArray[np.bool_] | NDArray[np.int64]) -> WrenchSpace:
-        """Some of the grasps."""
+        """Selects grasps."""
         return WrenchSpace(self.basis[index], self.pseudo[index], self.null[index])
 
     def slides(self, direction: Array, distance: Array | float) -> ContactSlides:
-        """What each contact contributes to u where it slides against given vectors.
+        """Contributions to u of each contact when it slides against given vectors.
 
         Args:
             direction: (M, 3) or (N, 2, M, 3) vectors nu.
-            distance: (M,) or scalar, how far the polytope's plane across nu is from the centre; 1
+            distance: (M,) or scalar, distance of the polytope's plane across nu from the centre; 1
                 for the unit ball.
         """
         positive_zero = 1e-300  # A facet in one plane with its neighbours must count exactly once.
@@ -174,10 +174,10 @@ class WrenchSpace:
         return ContactSlides(u, zero, np.where(turn == 0.0, positive_zero, turn), u0)
 
     def rim(self, sliding: int) -> Rim:
-        """The extreme u at which one contact does not slide at all.
+        """The extreme u at which one contact does not slide.
 
         Args:
-            sliding: 0 or 1, the contact that does.
+            sliding: 0 or 1, the contact that slides.
         """
         right = -self.null[..., 0].sum(axis=1)
         zero, pseudo = self.null[:, sliding], self.pseudo[:, sliding]
@@ -216,11 +216,11 @@ class ContactSlides:
     u0: Array
 
     def pairs(self, guard: float = 0.0) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """alpha_1 and alpha_2 of all pairs, (N, M, M), and which of them are extreme.
+        """alpha_1 and alpha_2 of all pairs, (N, M, M), and whether the pairs are extreme.
 
         Args:
-            guard: pairs are left out whose equations are closer to dependent than this. Those have
-                no u, or a whole line of them, whose ends are extreme, too, and have other pairs.
+            guard: relative determinant below which pairs are left out. They have no u, or a whole
+                line of them, whose ends belong to other pairs.
         """
         one, two = self.zero[:, 0], self.zero[:, 1]
         cross = one[:, :, None, 0] * two[:, None, :, 1]
@@ -235,10 +235,10 @@ class ContactSlides:
         return alpha, beta, (alpha > 0.0) & (beta > 0.0) & np.isfinite(inverse)
 
     def edges(self, sides: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """The same where one contact does not slide at all, and the other one against an edge.
+        """`pairs` for one contact that does not slide, and the other sliding against an edge.
 
         Args:
-            sides: (E, 2) the two slides beside each edge.
+            sides: (E, 2) the two slides next to each edge.
 
         Returns:
             Factors of the two slides (N, 2, E); index 1 is the contact that slides.
@@ -259,10 +259,10 @@ class Rim:
 
     Attributes:
         start: (N, 6) u without sliding.
-        slide: (N, 3, 6) what sliding adds, times alpha: a constant, and for cosine and sine of the
-            angle on the circle; NaN where there is no circle.
-        along: (N, 3) likewise, what alpha divides `size` by.
-        size: (N,).
+        slide: (N, 3, 6) coefficients of 1, cosine and sine of the angle on the circle in the part
+            of u that alpha multiplies; NaN without a circle.
+        along: (N, 3) coefficients in the divisor of alpha = size / divisor.
+        size: (N,) dividend of alpha.
     """
 
     start: Array
@@ -271,7 +271,7 @@ class Rim:
     size: Array
 
     def u(self, angle: Array) -> Array:
-        """(N, K, 6) at angles (N, K); NaN where there is none."""
+        """(N, K, 6) u at angles (N, K); NaN where there is none."""
         turns = np.stack([np.ones_like(angle), np.cos(angle), np.sin(angle)], axis=-1)
         with np.errstate(invalid="ignore", divide="ignore"):
             alpha = self.size[:, None] / np.einsum("nkt,nt->nk", turns, self.along)
@@ -280,10 +280,10 @@ class Rim:
 
 
 def hull_volume(space: WrenchSpace, polytope: TriangulatedBall) -> Array:
-    """(N,) volumes of the wrench spaces with a polytope in place of the unit ball; exact for that.
+    """(N,) exact volumes of the wrench spaces with a polytope in place of the unit ball.
 
     Each facet is a simplex. The determinant of its corners is bilinear in the minors of the two
-    contacts' corners (Cauchy and Binet), so that 28 determinants of 6 x 6 do for all facets.
+    contacts' corners (Cauchy and Binet), so that 28 determinants of 6 x 6 suffice for all facets.
     """
     chunk_size = 16  # Grasps evaluated together. Their pairs fit into a processor's cache.
     parts = [
@@ -308,7 +308,7 @@ def _hull_volume(space: WrenchSpace, polytope: TriangulatedBall) -> Array:
 
 
 def _minors(polytope: TriangulatedBall) -> tuple[Array, Array]:
-    """Minors of the corners, a row of ones above them: (M, 4) of triangles, (E, 6) of edges."""
+    """Minors of the corners with a row of ones on top: (M, 4) of triangles, (E, 6) of edges."""
 
     def columns(index: NDArray[np.int64]) -> Array:
         corners = polytope.vertices[index].transpose(0, 2, 1)

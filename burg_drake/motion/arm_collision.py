@@ -43,13 +43,13 @@ def anchor_geometry(
     station_diagram: StationDiagram,
     bodies: Collection[BodyIndex],
 ) -> dict[GeometryId, BodyIndex]:
-    """Gives the collision geometry of bodies to the world, where they are by default.
+    """Attaches the collision geometry of bodies to the world, at their default poses.
 
     Args:
         checker: all its contexts are changed; its filter matrix must not be set afterwards.
-        station_diagram: what it checks; it stays as it is.
-        bodies: what does not move, and does not overlap robot links that do not move either: those
-            the world does not collide with.
+        station_diagram: the diagram that it checks; it is not changed.
+        bodies: bodies that do not move, without those that overlap fixed robot links: the world
+            does not collide with fixed links.
 
     Returns:
         The body that each of the world's new geometries belongs to.
@@ -58,7 +58,7 @@ def anchor_geometry(
     plant_context = plant.CreateDefaultContext()
     inspector, source = graph.model_inspector(), plant.get_source_id()
     filtered = checker.GetFilteredCollisionMatrix()[int(plant.world_body().index())]
-    never = [  # of fixed links, and of what is carried, which counts against links alone
+    never = [  # geometry of fixed links and of the carried instance, which counts against links
         geometry
         for i in range(plant.num_bodies())
         if filtered[i] and BodyIndex(i) not in bodies
@@ -96,14 +96,14 @@ def release_geometry(
     anchored: Mapping[GeometryId, BodyIndex],
     ignored: Collection[BodyIndex],
 ) -> None:
-    """Takes the collision geometry of a body back from the world, so that the body moves again.
+    """Detaches the collision geometry of a body from the world, so that the body moves again.
 
     Args:
-        checker: all its contexts are changed, in which `anchor_geometry` has been at work.
-        station_diagram: what it checks; it stays as it is.
-        body: the body.
-        anchored: what `anchor_geometry` has returned.
-        ignored: bodies that it does not collide with.
+        checker: all its contexts are changed; `anchor_geometry` has been applied to them.
+        station_diagram: the diagram that it checks; it is not changed.
+        body: the body to release.
+        anchored: the result of `anchor_geometry`.
+        ignored: bodies that the released body does not collide with.
     """
     plant, graph = station_diagram.plant, station_diagram.scene_graph
     inspector, source = graph.model_inspector(), plant.get_source_id()
@@ -130,8 +130,8 @@ def release_geometry(
 
 
 class CarriedInstances:
-    """Moves the free instances of a diagram that was built with `weld_objects=True`; there are none
-    where they are free bodies."""
+    """Moves the free instances of a diagram built with `weld_objects=True`. It has no instances if
+    the diagram has free bodies."""
 
     def __init__(self, station_diagram: StationDiagram) -> None:
         plant = station_diagram.plant
@@ -146,8 +146,8 @@ class CarriedInstances:
                     FixedOffsetFrame, plant.GetFrameByName(PLACEMENT_FRAME_NAME, model)
                 )
 
-    def height(self, name: str) -> int:
-        """Where in the plant's positions an instance's height over its place is.
+    def height_index(self, name: str) -> int:
+        """Index of an instance's height above its placement in the plant's positions.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -159,13 +159,13 @@ class CarriedInstances:
             )
         return self._height[name]
 
-    def shifted(self, checker: SceneGraphCollisionChecker) -> InstanceShifts:
-        """Shifts in a checker of the diagram, where all stand at their places."""
+    def shifts_for(self, checker: SceneGraphCollisionChecker) -> InstanceShifts:
+        """Shifts for a checker of the diagram in which all instances are at their placements."""
         return InstanceShifts(checker, self._place)
 
 
 class InstanceShifts:
-    """How far instances stand beside their places in one checker."""
+    """Horizontal displacement of the instances in one checker."""
 
     def __init__(
         self, checker: SceneGraphCollisionChecker, place: dict[str, FixedOffsetFrame]
@@ -173,23 +173,23 @@ class InstanceShifts:
         self._checker, self._place = checker, place
         self._moved: tuple[str, Array] | None = None
 
-    def put(self, name: str, p_W: ArrayLike) -> None:
-        """Shifts one instance, and puts all others at their places.
+    def shift_only(self, name: str, p_W: ArrayLike) -> None:
+        """Shifts one instance, and returns all others to their placements.
 
         Args:
             name: the instance; "" for none.
-            p_W: (2,) along x and y of the world [m].
+            p_W: (2,) displacement along x and y of the world [m].
         """
         p = np.asarray(p_W, dtype=float)
         before = self._moved
         if before is not None and (before[0] != name or not np.array_equal(before[1], p)):
-            self._set(before[0], np.zeros(2))
+            self._move_placement(before[0], np.zeros(2))
             self._moved = before = None
         if before is None and p.any():
-            self._set(name, p)
+            self._move_placement(name, p)
             self._moved = name, p
 
-    def _set(self, name: str, p: Array) -> None:
+    def _move_placement(self, name: str, p: Array) -> None:
         place = self._place[name]
         X_WO = place.GetFixedPoseInBodyFrame()  # as the diagram was built
         moved = RigidTransform(X_WO.rotation(), X_WO.translation() + np.append(p, 0.0))
@@ -201,7 +201,7 @@ class InstanceShifts:
 
 
 NO_DISPLACEMENT = (0.0, 0.0, 0.0)
-"""Metres. Displacement of a target that is where the document places it."""
+"""Metres. Displacement of a target that stands where the document places it."""
 
 
 @dataclass(frozen=True)
@@ -212,8 +212,8 @@ class Overlap:
         link: the robot's link.
         other: instance, obstacle, `table`, or another link.
         depth: of the deepest contact [m].
-        carried: `link` is rigid with the hand and `other` is not of the arm, so that every
-            configuration with the hand at this pose has the same overlap.
+        carried: whether `link` is rigid with the hand and `other` is not part of the arm, so that
+            every configuration with the hand at this pose has the same overlap.
     """
 
     link: str
@@ -229,8 +229,8 @@ class ArmCollision:
     """Checks the arm and its hand against itself and the scene as the documents place it.
 
     Attributes:
-        checker: Drake's checker of the diagram as it is, for other questions. Configurations are
-            those of the whole plant, fingers included. Clones of it answer here, see
+        checker: Drake's checker of the unchanged diagram, for other uses. Its configurations are
+            those of the whole plant, fingers included. The checks here use clones of it, see
             `anchor_geometry`.
         joints: the arm's joints from base to hand.
     """
@@ -238,14 +238,14 @@ class ArmCollision:
     def __init__(
         self, station_diagram: StationDiagram, *, apart: Sequence[tuple[BodyIndex, BodyIndex]] = ()
     ) -> None:
-        """Takes a diagram over; nobody else may use its plant for something else.
+        """Takes over a diagram; its plant must not be used elsewhere.
 
         Args:
             station_diagram: built with `robot="arm"` and `weld_objects=True`: Drake's checker
                 demands that interpolation between two equal configurations is exact, which
                 quaternions of free bodies may miss by a rounding.
-            apart: pairs of bodies that are known not to meet wherever the arm may be asked about:
-                they are left out, which saves 40 of 110 us of a check with the Panda.
+            apart: pairs of bodies that cannot meet in any configuration to be checked. Leaving them
+                out saves 40 of 110 us of a check with the Panda.
 
         Raises:
             InvalidInputError: the diagram has no arm.
@@ -274,13 +274,13 @@ class ArmCollision:
         self._carried = CarriedInstances(station_diagram)
         self._carrying: dict[str, tuple[SceneGraphCollisionChecker, InstanceShifts]] = {}
         self._anchored: dict[GeometryId, BodyIndex] = {}
-        self._in_base = self._overlapping_base()
+        self._base_obstacles = self._find_base_obstacles()
         self._in_hand = set(plant.GetBodyIndices(hand))
         body = plant.GetBodyByName(station_diagram.station.hand.body, hand)
-        fingers = self._in_hand - {body.index()}  # which may be asked about closed, too
+        fingers = self._in_hand - {body.index()}  # checked with closed fingers, too
         self._apart = tuple(pair for pair in apart if not fingers & {*pair})
-        self._empty_handed = self._answering()
-        self._shifts = self._carried.shifted(self.checker)
+        self._empty_handed = self._make_anchored_checker()
+        self._shifts = self._carried.shifts_for(self.checker)
         self._names = station_diagram.body_names
         self._with_hand = _hand_bodies(station_diagram)
 
@@ -296,7 +296,7 @@ class ArmCollision:
         Args:
             q: (n,) arm positions.
             carried: the instance that the hand holds, if any.
-            rise: how far that is above its place [m].
+            rise: its height above its placement [m].
             width: distance between the pads [m]; the hand is open if that is NaN.
 
         Raises:
@@ -310,7 +310,7 @@ class ArmCollision:
             for index, finger in self._fingers:
                 positions[index] = finger.position(closed)
         if carried:
-            positions[self._carried.height(carried)] = rise
+            positions[self._carried.height_index(carried)] = rise
         return positions
 
     def is_free(
@@ -325,22 +325,22 @@ class ArmCollision:
 
         Args:
             q: (n,) arm positions.
-            carried: the instance that the hand holds; None or "" if it is empty. It counts as an
-                obstacle to the arm's links, but not to the hand and its fingers; against the scene
-                no object counts.
-            moved_W: (3,) how far that instance is from its place [m]; all others are at theirs.
+            carried: the instance that the hand holds; None or "" if it is empty. It is an obstacle
+                to the arm's links, but not to the hand and its fingers. Collisions between objects
+                are not checked.
+            moved_W: (3,) displacement of that instance [m]; all others are at their placements.
             width: distance between the pads [m]; the hand is open if that is NaN.
 
         Raises:
             UnknownNameError: there is no such instance.
-            InvalidInputError: nothing is carried, and has been moved.
+            InvalidInputError: `moved_W` is not zero, but nothing is carried.
         """
         moved = _check_displacement(carried, moved_W)
         configuration = self.configuration(q, carried, moved[2], width)
         if not carried:
             return bool(self._empty_handed.CheckConfigCollisionFree(configuration))
-        checker, shifts = self._checker(carried)
-        shifts.put(carried, moved[:2])
+        checker, shifts = self._carrying_checker(carried)
+        shifts.shift_only(carried, moved[:2])
         return bool(checker.CheckConfigCollisionFree(configuration))
 
     def overlaps(
@@ -351,15 +351,15 @@ class ArmCollision:
         moved_W: ArrayLike = NO_DISPLACEMENT,
         width: float = np.nan,
     ) -> list[Overlap]:
-        """What collides, the deepest overlap first; empty if free. See `is_free`.
+        """Overlaps, the deepest first; empty if free. See `is_free`.
 
-        It is seldom asked with something carried, and needs no clone for it.
+        Calls with a carried instance are rare, so that they use no clone of the checker.
         """
         moved = _check_displacement(carried, moved_W)
         configuration = self.configuration(q, carried, moved[2], width)
         held = self._diagram.free[carried] if carried else None
         checker = self.checker if carried else self._empty_handed
-        self._shifts.put(carried or "", moved[:2])
+        self._shifts.shift_only(carried or "", moved[:2])
         checker.UpdatePositions(configuration)
         query = checker.model_context().GetQueryObject()  # with the checker's filters
         depths: dict[tuple[BodyIndex, BodyIndex], float] = {}
@@ -368,19 +368,19 @@ class ArmCollision:
             if held in (a, b) and self._in_hand & {a, b}:
                 continue
             depths[a, b] = max(depths.get((a, b), 0.0), pair.depth)
-        self._shifts.put("", NO_DISPLACEMENT[:2])
+        self._shifts.shift_only("", NO_DISPLACEMENT[:2])
         found = [self._overlap(a, b, depth) for (a, b), depth in depths.items()]
         return sorted(found, key=lambda o: (-o.depth, str(o)))
 
-    def _checker(self, carried: str) -> tuple[SceneGraphCollisionChecker, InstanceShifts]:
-        """The checker's clone that answers; what is carried is not held against the hand."""
+    def _carrying_checker(self, carried: str) -> tuple[SceneGraphCollisionChecker, InstanceShifts]:
+        """Clone of the checker for a carried instance, which does not collide with the hand."""
         if carried not in self._carrying:
-            checker = self._releasing(self._diagram.free[carried])
-            self._carrying[carried] = checker, self._carried.shifted(checker)
+            checker = self._make_carrying_checker(self._diagram.free[carried])
+            self._carrying[carried] = checker, self._carried.shifts_for(checker)
         return self._carrying[carried]
 
-    def _answering(self) -> SceneGraphCollisionChecker:
-        """A clone of the checker, with all tied to the world that does not move in it."""
+    def _make_anchored_checker(self) -> SceneGraphCollisionChecker:
+        """Clone of the checker in which all fixed geometry is attached to the world."""
         ignored_pair = 1  # A pair that is not checked, in Drake's filter matrix.
         diagram, checker = self._diagram, self.checker.Clone()
         filtered = checker.GetFilteredCollisionMatrix().copy()  # set once: that costs 1 ms
@@ -388,19 +388,19 @@ class ArmCollision:
             filtered[int(a), int(b)] = filtered[int(b), int(a)] = ignored_pair
         checker.SetCollisionFilterMatrix(filtered)
         still = {*diagram.free.values(), *diagram.fixed.values(), diagram.table}
-        self._anchored |= anchor_geometry(checker, diagram, still - self._in_base)
+        self._anchored |= anchor_geometry(checker, diagram, still - self._base_obstacles)
         return checker
 
-    def _releasing(self, held: BodyIndex) -> SceneGraphCollisionChecker:
-        """A clone of that one in which a body moves, and is not held against the hand."""
+    def _make_carrying_checker(self, held: BodyIndex) -> SceneGraphCollisionChecker:
+        """Clone of the empty-handed checker in which a body moves and ignores the hand."""
         checker = self._empty_handed.Clone()
         filtered = checker.GetFilteredCollisionMatrix()[int(held)] != 0
         ignored = {BodyIndex(int(k)) for k in np.flatnonzero(filtered)} | self._in_hand
         release_geometry(checker, self._diagram, held, self._anchored, ignored - {held})
         return checker
 
-    def _overlapping_base(self) -> set[BodyIndex]:
-        """The objects that robot links are in which do not move."""
+    def _find_base_obstacles(self) -> set[BodyIndex]:
+        """Objects that overlap fixed robot links."""
         plant, robot = self._diagram.plant, set(self._diagram.robot_bodies)
         fixed = {b.index() for b in plant.GetBodiesWeldedTo(plant.world_body())} & robot
         self.checker.UpdatePositions(self._default)

@@ -51,7 +51,7 @@ class LinkPoses:
 
 
 def _transform_points(poses: Single, points: Single) -> Single:
-    """Points (3, ...) of frames (4, 3, ...)."""
+    """Transforms points (3, ...) by frame poses (4, 3, ...)."""
     x, y, z, p = poses
     placed: Single = x * points[0]
     product = y * points[1]
@@ -106,9 +106,9 @@ class ArmLinks:
         turns = tuple(isinstance(joint, RevoluteJoint) for joint in joints)
         return cls(np.array(X_before), turns, frame_of, X_FB)
 
-    def between(self, joints: tuple[int, ...], positions: Array) -> Array:
-        """(C, 4, 4) poses of the frame after the last of m neighbouring joints in that before the
-        first, at their positions (C, m) [rad or m]."""
+    def relative_poses(self, joints: tuple[int, ...], positions: Array) -> Array:
+        """(C, 4, 4) poses of the frame after m neighbouring joints in the frame before them, at
+        joint positions (C, m) [rad or m]."""
         X = np.tile(np.eye(4), (len(positions), 1, 1))
         for joint, position in zip(joints, positions.T, strict=True):
             moved = np.tile(np.eye(4), (len(positions), 1, 1))

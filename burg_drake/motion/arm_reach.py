@@ -50,11 +50,11 @@ from burg_drake.station import StationLike, as_station, build_station_diagram
 
 @dataclass(frozen=True, eq=False)
 class HandVerdicts:
-    """What the hand's ways decide about N grasps with the fingers either way.
+    """Clearance of the hand alone on N motions, for both finger assignments.
 
     Attributes:
-        blocked_by: (N, 2) what is in the way first; None where nothing is.
-        clearance: (N, 2) of the hand on its way, negative where it is not free [m].
+        blocked_by: (N, 2) verdict that names the first obstacle; None where the hand is free.
+        clearance: (N, 2) of the hand on its path, negative where it is not free [m].
     """
 
     blocked_by: NDArray[np.object_]
@@ -65,17 +65,17 @@ class HandVerdicts:
 
     @property
     def blocked(self) -> NDArray[np.bool_]:
-        """(N,) grasps that the hand gets to, or away from, with its fingers in neither way."""
+        """(N,) whether the hand collides with both finger assignments."""
         return np.asarray((self.clearance < 0.0).all(axis=1))
 
     def refusal(self, grasp: int) -> Reach:
-        """Of one that is blocked; the first way to put the fingers decides."""
-        said = next(no for no in self.blocked_by[grasp] if no is not None)
-        assert isinstance(said, Reach)
-        return said
+        """Verdict on a blocked grasp: that of the first finger assignment that has one."""
+        verdict = next(reach for reach in self.blocked_by[grasp] if reach is not None)
+        assert isinstance(verdict, Reach)
+        return verdict
 
-    def put(self, flip: int, rows: Indices, sweep: SweepResult, outcome: Outcome) -> None:
-        """Takes over what is in the way of some grasps (S,) with the fingers in one way."""
+    def record(self, flip: int, rows: Indices, sweep: SweepResult, outcome: Outcome) -> None:
+        """Enters the sweep of grasps (S,) with one finger assignment."""
         blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
         room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
         self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
@@ -87,12 +87,12 @@ class HandVerdicts:
 
 @dataclass(frozen=True, eq=False)
 class HandPaths:
-    """N grasps whose hand's ways are judged.
+    """Paths of the hand for N grasps.
 
     Attributes:
         sweep: the hand in its scene.
         instance: (N,) names of the targets; "" without one.
-        X_both: (N, 2, 4, 4) grasps in the world with their fingers either way.
+        X_both: (N, 2, 4, 4) grasps in the world with both finger assignments.
         width: (N,) distances between the pads that hold the target [m].
         retreats: whether the hand goes back before it is lifted.
     """
@@ -107,28 +107,28 @@ class HandPaths:
         own = self.instance[chosen], self.X_both[chosen], self.width[chosen]
         return HandPaths(self.sweep, *own, self.retreats)
 
-    def before_lift(self) -> HandVerdicts:
-        """Approach and retreat."""
+    def check_before_lift(self) -> HandVerdicts:
+        """Checks approach and retreat."""
         shape = self.X_both.shape[:2]
         found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
         for name, flip, at in self._to_check(found):
             sweep = self.sweep.approach(name, self.X_both[at, flip])
-            found.put(flip, at, sweep, Outcome.HAND_COLLISION_APPROACH)
+            found.record(flip, at, sweep, Outcome.HAND_COLLISION_APPROACH)
         for name, flip, at in self._to_check(found) if self.retreats else ():
             sweep = self.sweep.retreat(name, self.X_both[at, flip], self.width[at])
-            found.put(flip, at, sweep, Outcome.HAND_COLLISION_RETREAT)
-        return self._mirrored(found)
+            found.record(flip, at, sweep, Outcome.HAND_COLLISION_RETREAT)
+        return self._copy_if_symmetric(found)
 
-    def lifted(self, before: HandVerdicts, height: float) -> HandVerdicts:
-        """The same with the lift to a height [m]."""
+    def check_lift(self, before: HandVerdicts, height: float) -> HandVerdicts:
+        """Checks the lift to a height [m], too."""
         found = before[np.arange(len(before.blocked_by))]
         for name, flip, at in self._to_check(found):
             sweep = self.sweep.lift(name, self.X_both[at, flip], self.width[at], height)
-            found.put(flip, at, sweep, Outcome.HAND_COLLISION_LIFT)
-        return self._mirrored(found)
+            found.record(flip, at, sweep, Outcome.HAND_COLLISION_LIFT)
+        return self._copy_if_symmetric(found)
 
     def _to_check(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
-        """Targets, ways to put the fingers, and the grasps that are free so far."""
+        """Targets, finger assignments, and indices of the grasps that are free so far."""
         flips = (0,) if self.sweep.symmetric else (0, 1)
         free = found.clearance >= 0.0
         return [
@@ -137,7 +137,7 @@ class HandPaths:
             for flip in flips
         ]
 
-    def _mirrored(self, found: HandVerdicts) -> HandVerdicts:
+    def _copy_if_symmetric(self, found: HandVerdicts) -> HandVerdicts:
         if self.sweep.symmetric:
             found.clearance[:, 1] = found.clearance[:, 0]
             found.blocked_by[:, 1] = found.blocked_by[:, 0]
@@ -145,11 +145,11 @@ class HandPaths:
 
 
 ReachAtHeight = Callable[[float, Indices], Sequence[Reach]]
-"""Verdicts on some grasps (S,) that are lifted to a height [m]."""
+"""Verdicts on grasps (S,) with a lift to a height [m]."""
 HandIsFree = Callable[[float, Indices], Booleans]
-"""Whether the hand alone is free on its ways (S,), lifted to a height [m]."""
+"""Whether the hand alone is free for grasps (S,) with a lift to a height [m]."""
 LevelIsFree = Callable[[int, Indices], Booleans]
-"""Whether some rows (S,) are free up to a level."""
+"""Whether rows (S,) are free up to a level."""
 
 
 def lift_heights(least: float, most: float) -> Array:
@@ -162,18 +162,17 @@ def lift_heights(least: float, most: float) -> Array:
 def raise_lifts(
     whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
-    """Goes on with grasps whose lift is not whole.
+    """Searches the largest free lift of grasps for which the whole lift is not free.
 
     Args:
         whole: N verdicts with the whole lift.
-        tried: (H,) rising heights, of which the last is the whole lift [m].
-        judge: asks about others.
-        hand_is_free: likewise.
+        tried: (H,) rising heights; the last is the whole lift [m].
+        judge: gives verdicts at other heights.
+        hand_is_free: checks the hand alone at other heights.
 
     Returns:
-        N verdicts: where there is room for the first of the heights, a yes with the largest one
-        that was found, and as its `blocker` what is in the way of the whole lift; otherwise why
-        there is no room for the first.
+        N verdicts. If the lowest height is free: success with the largest free height found and
+        the obstacle of the whole lift as `blocker`. Otherwise: the failure at the lowest height.
     """
     # Outcomes that a lower lift does not change.
     height_independent = (
@@ -203,20 +202,19 @@ def raise_lifts(
         high[by_hand],
         lambda level, rows: hand_is_free(tried[level], asked[by_hand[rows]]),
     )
-    # As high as the hand gets by itself, the arm often does, too.
+    # The arm can often lift as high as the hand alone.
     guess = np.full(len(asked), -1)
     guess[by_hand] = np.maximum(free, 0)
     high[by_hand] = guess[by_hand] + 1
     low, high = _narrow_levels(low, high, guess, reached)
-    # Where there is no room for the first of the heights, there is none for any.
+    # If the lowest height is not free, no height is.
     low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), reached)
     _bisect_levels(low, high, reached)
     return found
 
 
 def _bisect_levels(low: Indices, high: Indices, is_free: LevelIsFree) -> tuple[Indices, Indices]:
-    """Neighbouring levels of which the lower is free and the upper is not, for R rows, from levels
-    (R,) of which that is known."""
+    """Bisects for R rows between a free level and a blocked one (R,) until they are neighbours."""
     while (high - low > 1).any():
         low, high = _narrow_levels(low, high, (low + high) // 2, is_free)
     return low, high
@@ -225,7 +223,7 @@ def _bisect_levels(low: Indices, high: Indices, is_free: LevelIsFree) -> tuple[I
 def _narrow_levels(
     low: Indices, high: Indices, middle: Indices, is_free: LevelIsFree
 ) -> tuple[Indices, Indices]:
-    """The same with what is between them looked at at one level each (R,)."""
+    """Checks one level per row (R,) between `low` and `high`, and narrows them by the result."""
     low, high = low.copy(), high.copy()
     between = (low < middle) & (middle < high)
     for level in np.unique(middle[between]).tolist():
@@ -235,8 +233,8 @@ def _narrow_levels(
     return low, high
 
 
-def _true_indices(said: Iterable[bool]) -> Indices:
-    return np.flatnonzero(np.fromiter(said, dtype=bool))
+def _true_indices(values: Iterable[bool]) -> Indices:
+    return np.flatnonzero(np.fromiter(values, dtype=bool))
 
 
 GRASPS_PER_BATCH = 128
@@ -247,7 +245,7 @@ class ArmReach:
     """Judges grasps of one scene; objects stand where the document places them.
 
     Attributes:
-        settings: how thoroughly it looks.
+        settings: effort of the search.
         motion: the hand's straight segments to a grasp and away from it.
         kinematics: the arm on its own.
         diagram: the station diagram of the checks.
@@ -264,10 +262,9 @@ class ArmReach:
         """Builds the diagrams that all checks share.
 
         Args:
-            scene, station: what stands where: as loaded, or references for `load_scene` and
-                `load_station`.
-            settings: how thoroughly to look, if not as usual.
-            ik: inverse kinematics of one's own for an arm without a closed form here.
+            scene, station: as loaded, or references for `load_scene` and `load_station`.
+            settings: effort of the search; the defaults if None.
+            ik: the user's inverse kinematics, for an arm without a closed form here.
 
         Raises:
             InvalidInputError: the station has no arm, or in its home posture something collides.
@@ -277,7 +274,7 @@ class ArmReach:
         diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         self.motion = self.settings.motion or station.document.motion
         arm = station.document.arm
-        assert arm is not None  # build_station_diagram has seen to it
+        assert arm is not None  # build_station_diagram requires it
         self.diagram = diagram
         self._proximity = ArmProximity(diagram)
         collision = ArmCollision(diagram, apart=self._proximity.apart)
@@ -296,13 +293,13 @@ class ArmReach:
         self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
-        """Judges one grasp: as in a batch.
+        """Judges one grasp, with the same result as in a batch.
 
         Args:
             instance: the target's name in the scene.
             X_WG: (4, 4) grasp in the world, at which the open hand is clear.
-            width: distance between the pads that hold the target [m]; NaN if it is not known, and
-                the hand goes back and up as wide as it is open then.
+            width: distance between the pads that hold the target [m]; if NaN, the hand retreats and
+                lifts fully open.
 
         Returns:
             The verdict; the same for a grasp and for the one with its fingers swapped.
@@ -345,13 +342,13 @@ class ArmReach:
             widths,
             retreats=self.motion.retreat > 0.0,
         )
-        before, motion = paths.before_lift(), self.motion
+        before, motion = paths.check_before_lift(), self.motion
 
-        def judge(height: float, some: Indices) -> list[Reach]:
-            return self._lifted(paths[some], before[some], float(height))
+        def judge(height: float, grasps: Indices) -> list[Reach]:
+            return self._judge_at_height(paths[grasps], before[grasps], float(height))
 
-        def hand_is_free(height: float, some: Indices) -> NDArray[np.bool_]:
-            return ~paths[some].lifted(before[some], height).blocked
+        def hand_is_free(height: float, grasps: Indices) -> NDArray[np.bool_]:
+            return ~paths[grasps].check_lift(before[grasps], height).blocked
 
         whole = judge(motion.lift_height, np.arange(len(X)))
         if motion.shortest >= motion.lift_height:
@@ -372,11 +369,10 @@ class ArmReach:
 
         Args:
             q: (M, n) its corners, at least one.
-            hand: whether the bounds that are asked first count the hand against the scene; without,
-                the motion of the hand has been judged otherwise. Drake counts it all the same.
+            hand: whether the clearance bounds include the hand against the scene. False if the
+                hand's motion has been checked before. Drake always includes it.
             carried: instance that the hand carries, if any.
-            moved_W: (M, 3) how far it is from its place at each corner [m]; straight between
-                corners.
+            moved_W: (M, 3) its displacement at each corner [m]; linear between corners.
             width: distance between the pads that carry it [m]; NaN if the hand is open.
         """
         edges = self._tree.edges
@@ -388,10 +384,12 @@ class ArmReach:
         """A collision-free path (M, n) with the same ends as one from home that is no longer."""
         return self._tree.shortcut(q)
 
-    def _lifted(self, paths: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:
+    def _judge_at_height(
+        self, paths: HandPaths, before: HandVerdicts, height: float
+    ) -> list[Reach]:
         """Verdicts on N grasps with a lift to one height [m]."""
-        max_poses = 12 * GRASPS_PER_BATCH  # Poses of their ways. Bounds the memory to about 130 MB.
-        hand = paths.lifted(before, height)
+        max_poses = 12 * GRASPS_PER_BATCH  # Poses on the paths. Limits memory to about 130 MB.
+        hand = paths.check_lift(before, height)
         found = {k: hand.refusal(k) for k in np.flatnonzero(hand.blocked).tolist()}
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
@@ -427,14 +425,14 @@ def _line_search(
     home: Array,
     routine: IkRoutine | None,
 ) -> LineSearch:
-    """By the closed form first where the arm has one and it is wanted, else numerically."""
+    """The closed form, then the numeric search, if the arm has a closed form; else numeric only."""
     arm, settings = reach.kinematics, reach.settings
     margin = settings.limit_margin
     if routine is not None:
         return NumericLineSearch(
             *(arm, lines, proximity, home, settings),
             solutions=RoutineSolutions(arm, routine, margin),
-            beyond=RoutineSolutions(arm, routine, margin, limited=False),
+            unlimited_solutions=RoutineSolutions(arm, routine, margin, limited=False),
         )
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:

@@ -50,7 +50,7 @@ NODE_ARRAYS = ("frame", "centers", "outer", "inner", "child")
 
 
 def shape_to_arrays(trees: BallTrees, itself: SelfClearance) -> Arrays:
-    """All that `shape_from_arrays` needs but for the numbers that the bodies have in a diagram."""
+    """Arrays for `shape_from_arrays`, without the body indices of a diagram."""
     bodies = trees.bodies
     balls = Balls.joined([body.balls for body in bodies])
     arrays: dict[str, NDArray[Any]] = {
@@ -77,7 +77,7 @@ def shape_to_arrays(trees: BallTrees, itself: SelfClearance) -> Arrays:
 
 
 def shape_from_arrays(arrays: Arrays) -> tuple[BallTrees, SelfClearance]:
-    """The same again; the bodies are numbered from 0."""
+    """Restores the result of `shape_to_arrays`; the bodies are numbered from 0."""
     ends = arrays["body_end"].tolist()
     bodies = tuple(
         BodyBalls(
@@ -131,7 +131,7 @@ class ArmShape:
         limits: (n, 2) of the joints' positions [rad or m].
         trees: balls that cover it.
         itself: its clearance from itself.
-        content: hash of all that these follow from.
+        content: hash of the inputs.
     """
 
     links: ArmLinks
@@ -166,13 +166,13 @@ class ArmShape:
             _kept.popitem(last=False)
         trees, itself = _kept[key]
         own = dict(zip(bodies_with_shape(station_diagram, links), trees.bodies, strict=True))
-        # Where a scene has other objects, the robot's bodies have other numbers, in the same order.
+        # In another scene the robot's bodies have other indices, in the same order.
         bodies = tuple(replace(known, body=body) for body, known in own.items())
         return cls(links, limits, replace(trees, bodies=bodies), itself, key)
 
 
 def _arm_content(station_diagram: StationDiagram, links: ArmLinks) -> Iterator[Any]:
-    """All that balls and distances follow from."""
+    """Inputs of the balls and the distances."""
     plant = station_diagram.plant
     inspector = station_diagram.scene_graph.model_inspector()
     yield from (links.X_before, list(links.turns))
@@ -200,5 +200,5 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
         case Convex() | Mesh():
             sizes = hull_vertices(inspector, geometry)
         case _:
-            sizes = []  # not known; to cover it raises an error
+            sizes = []  # unknown shape; `cover_body` raises an error
     return [type(shape).__name__, sizes]

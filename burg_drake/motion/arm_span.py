@@ -1,4 +1,4 @@
-"""Largest reach of an arm, whatever its joints do, and what of a scene lies beyond it."""
+"""Largest reach of an arm at any joint positions, and parts of a scene beyond it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ArmSpan:
     """A ball that the grasp frame's origin never leaves.
 
     Attributes:
-        p_WJ: (3,) its middle, on the axis of the arm's first joint, at the shoulder [m].
+        p_WJ: (3,) its centre, on the axis of the arm's first joint, at the shoulder [m].
         radius: [m].
     """
 
@@ -44,7 +44,7 @@ class ArmSpan:
         from scipy.optimize import minimize  # takes 0.1 s
 
         station = as_station(station)
-        assert station.document.arm is not None  # whose kinematics these are
+        assert station.document.arm is not None  # `arm` is its kinematics
         turns = arm.turns == 1.0
         axis, p_AJ = arm.axis[turns], arm.p_AJ[turns]
         p_AG = (arm.X_AH0 @ station.hand.X_HG.matrix())[:3, 3]
@@ -62,8 +62,8 @@ class ArmSpan:
         (p_WJ,) = transform_points(station.document.arm.X_WA.matrix(), middle[None])
         return cls(p_WJ, float(lengths(along).sum() + stroke))
 
-    def beyond(self, p_WQ: Array) -> float:
-        """How far the nearest of some points (N, 3) is out of reach [m]; 0 or less if within."""
+    def excess_distance(self, p_WQ: Array) -> float:
+        """Distance of the nearest of N points (N, 3) out of reach [m]; 0 or less if within."""
         return float(np.linalg.norm(p_WQ - self.p_WJ, axis=1).min()) - self.radius
 
 
@@ -72,7 +72,7 @@ def unreachable_board(span: ArmSpan, station: Station, board: Board) -> str:
     X_WS = station.document.X_WS.matrix()
     p_SJ = transform_points(inverse(X_WS), span.p_WJ[None])
     nearest = np.clip(p_SJ, 0.0, (*board.size, 0.0))
-    beyond = span.beyond(transform_points(X_WS, nearest))
+    beyond = span.excess_distance(transform_points(X_WS, nearest))
     if beyond <= 0.0:
         return ""
     return (
@@ -87,7 +87,7 @@ def unreachable_objects(span: ArmSpan, scene: Scene, station: Station) -> dict[s
     found = {}
     for name in scene.instances:
         p_WV = transform_points(station.document.X_WS.matrix(), placed_vertices(scene, name))
-        beyond = span.beyond(p_WV)
+        beyond = span.excess_distance(p_WV)
         if beyond > 0.0:
             found[name] = (
                 f"{name!r} is out of reach: it is {span.radius + beyond:.2f} m from the arm's"

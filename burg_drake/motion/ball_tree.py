@@ -64,7 +64,7 @@ class Balls:
 
     @classmethod
     def joined(cls, several: list[Balls]) -> Balls:
-        """All of them."""
+        """Concatenates balls."""
         return cls(
             np.concatenate([balls.center for balls in several]),
             np.concatenate([balls.outer for balls in several]),
@@ -80,8 +80,8 @@ def cover_body(
     Args:
         inspector: of the scene graph.
         geometries: of one body.
-        overshoot: how far balls should stick out [m]; those of shapes of some decimetres stick out
-            farther. Of a convex mesh the box around it is covered.
+        overshoot: how far balls should stick out [m]; on shapes of several decimetres they stick
+            out farther. For a convex mesh, its bounding box is covered.
 
     Raises:
         InvalidInputError: a geometry is of a shape that cannot be covered.
@@ -117,7 +117,7 @@ def _cover(
 def unsupported_shape_error(
     inspector: SceneGraphInspector, geometry: GeometryId
 ) -> InvalidInputError:
-    """The error of a collision geometry of the robot whose shape is not known here."""
+    """Error for a collision geometry of the robot with an unsupported shape."""
     return InvalidInputError(
         f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
         f" {type(inspector.GetShape(geometry)).__name__}; supported are boxes, capsules, cylinders,"
@@ -132,7 +132,7 @@ def hull_vertices(inspector: SceneGraphInspector, geometry: GeometryId) -> Array
 
 
 def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
-    """A row along z; half way between two centres the larger balls meet on the capsule's side."""
+    """A row of balls along z. Half-way between centres, outer balls meet on the capsule's side."""
     step = 2.0 * np.sqrt((radius + overshoot) ** 2 - radius**2)
     count = int(np.ceil(length / step)) + 1
     z = np.linspace(-length / 2, length / 2, count)
@@ -141,7 +141,7 @@ def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
 
 
 def _affordable_cells(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
-    """(3,) numbers of cells along a shape, and the overshoot that goes with them [m]."""
+    """(3,) numbers of cells along a shape, and the overshoot for them [m]."""
     while np.prod(count := cells(overshoot)) > Cover.max_cells:
         overshoot *= Cover.coarsening
     return count.astype(int), overshoot
@@ -159,7 +159,7 @@ def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
 
 
 def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: Balls) -> Balls:
-    """Cells are sectors, whose outer corners lie outside, on a polygon about the circle."""
+    """Covers sectors of the cylinder; their outer corners lie on a circumscribed polygon."""
     sides = np.array([2.0 * np.pi * radius, radius, 2.0 * half_length])
     least = np.array([8, 1, 1])  # sectors, rings, layers
     (sectors, rings, layers), overshoot = _affordable_cells(
@@ -177,7 +177,7 @@ def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: 
 
 
 def _cover_hull(points: Array, overshoot: float, given: Balls) -> Balls:
-    """The box around it, in whose directions a hull that is a box lies exactly."""
+    """Covers the hull's bounding box, which is exact for a hull that is a box."""
     polytope = Polytope.from_points(points)
     X = np.eye(4)
     if (box := polytope.as_box()) is not None:
@@ -190,7 +190,7 @@ def _cover_hull(points: Array, overshoot: float, given: Balls) -> Balls:
 
 
 def _middles_and_inner_corners(lattice: Array) -> Array:
-    """(C, 3) of a lattice (2a+1, 2b+1, 2c+1, 3) that halves the cells."""
+    """(C, 3) cell middles and inner cell corners of a lattice (2a+1, 2b+1, 2c+1, 3)."""
     middles, corners = lattice[1::2, 1::2, 1::2], lattice[2:-1:2, 2:-1:2, 2:-1:2]
     return np.concatenate([middles.reshape(-1, 3), corners.reshape(-1, 3)])
 
@@ -205,7 +205,7 @@ def _choose_balls(
         depth: (C,) of the centres in the shape [m].
         nodes: (a, b, c, 3) corners of the cells [m].
         overshoot: the balls' radii are their depths plus this [m].
-        given: balls that are there already.
+        given: balls that exist already.
     """
     cells = _cell_corners(nodes)
     depth = np.minimum(depth, Cover.max_inner_radius)
@@ -254,7 +254,7 @@ class BodyBalls:
     Attributes:
         body, frame: the body and the arm's frame in which it is fixed.
         center, radius: (3,), [m] of a ball around it.
-        balls: that cover it, in the frame.
+        balls: balls that cover it, in the frame.
         root: the first node of its tree.
     """
 
@@ -271,7 +271,7 @@ class BallTrees:
     """T nodes of up to W balls each, the balls' arrays with one row for each place in a node.
 
     Attributes:
-        bodies: those of the robot that have collision geometry, ordered by frames.
+        bodies: bodies of the robot with collision geometry, ordered by frames.
         frame: (T,) the arm's frame in which a node is fixed.
         centers: (3, W, T) [m].
         outer: (W, T) radii of balls that together contain the node's part of the body [m].
@@ -298,7 +298,7 @@ class BallTrees:
     def of(cls, station_diagram: StationDiagram, links: ArmLinks) -> BallTrees:
         """Covers the robot of a diagram."""
         overshoot = 8e-3  # Metres that balls stick out of moving links and the hand.
-        base_overshoot = 25e-3  # Metres, of links that do not move. Only the arm can hit them.
+        base_overshoot = 25e-3  # Metres, for links that do not move. Only the arm can hit them.
         plant = station_diagram.plant
         inspector = station_diagram.scene_graph.model_inspector()
         bodies: list[BodyBalls] = []
@@ -350,7 +350,7 @@ class _Node:
 
 
 def _append_tree(nodes: list[_Node], balls: Balls, frame: int, depth: int) -> int:
-    """Appends a tree to the nodes; returns the place of its root."""
+    """Appends a tree to the nodes; returns the index of its root."""
     place = len(nodes)
     node = _Node(frame, balls, [])
     nodes.append(node)
@@ -365,8 +365,8 @@ def _append_tree(nodes: list[_Node], balls: Balls, frame: int, depth: int) -> in
 
 
 def _enclosing_ball(balls: Balls) -> tuple[Array, float]:
-    """A ball around balls, nearly the smallest: its centre steps towards what lies farthest out
-    (Badoiu and Clarkson, "Smaller core-sets for balls", SODA 2003)."""
+    """A nearly smallest ball around balls: its centre steps towards the farthest ball (Badoiu and
+    Clarkson, "Smaller core-sets for balls", SODA 2003)."""
     center = (balls.center.min(axis=0) + balls.center.max(axis=0)) / 2
     best = (center, np.inf)
     for step in range(20):
@@ -383,7 +383,7 @@ def _enclosing_ball(balls: Balls) -> tuple[Array, float]:
 
 
 def _split_balls(balls: Balls, count: int) -> list[Balls]:
-    """Cuts the balls into parts of about equal size, again and again across the longest side."""
+    """Cuts the balls recursively across the longest side into parts of about equal size."""
     if count <= 1:
         return [balls]
     order = np.argsort(balls.center[:, np.ptp(balls.center, axis=0).argmax()], kind="stable")

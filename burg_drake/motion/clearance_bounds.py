@@ -49,11 +49,11 @@ def joint_reaches(links: ArmLinks, bodies: tuple[BodyBalls, ...], limits: Array)
 
 
 class DisplacementBound:
-    """Bounds the way of every point of the robot.
+    """Bounds the path length of every point of the robot.
 
-    While joint i turns by d, a point at distance r from its axis moves by r d. What r may become
-    on a segment is bounded from its values at the two ends: it changes by no more than the way
-    that the joints beyond i move the point.
+    While joint i turns by d, a point at distance r from its axis moves by r d. On a segment, r is
+    bounded from its values at the two ends: it changes by no more than the path length by which
+    the joints beyond i move the point.
 
     Args:
         links: the arm.
@@ -83,7 +83,7 @@ class DisplacementBound:
         return total
 
     def _from_axes(self, q: Array) -> Array:
-        """(n, K) largest distance of a point beyond each joint from its axis."""
+        """(n, K) largest distance from each joint's axis to a point of the bodies beyond it."""
         poses = self._links.poses(q)
         centers = self._trees.roots_placed(poses)
         largest = np.zeros((len(self._links.turns), len(q)))
@@ -109,12 +109,12 @@ def distance_from_axis(poses: LinkPoses, frame: int, p: Single) -> Array:
 class ClearanceBounds:
     """Bounds on clearances from the scene, and of the arm from itself.
 
-    Links that cannot meet wherever the arm stands within its joints' limits do not count. Below
-    zero the bounds say that something collides, or may; how deep, they say only roughly.
+    Pairs of links that cannot meet within the joint limits are left out. Values below zero mean a
+    collision (upper) or a possible one (lower); as depths they are only rough.
 
     Attributes:
-        lower: (N,) not above the clearance [m]; above zero it is proven that nothing collides.
-        upper: (N,) below zero where it is proven that something collides, else infinite [m].
+        lower: (N,) lower bounds [m]; above zero, the configuration is proven free.
+        upper: (N,) below zero where a collision is proven, else infinite [m].
     """
 
     lower: Array
@@ -122,17 +122,17 @@ class ClearanceBounds:
 
     @property
     def free(self) -> np.ndarray:
-        """(N,) whether it is proven that nothing collides."""
+        """(N,) whether the configuration is proven free."""
         return self.lower > 0.0
 
     @property
     def blocked(self) -> np.ndarray:
-        """(N,) whether it is proven that something collides."""
+        """(N,) whether a collision is proven."""
         return self.upper < 0.0
 
     @property
     def likely_free(self) -> np.ndarray:
-        """(N,) the best guess, where Drake is not to be asked."""
+        """(N,) the best guess without Drake's checker."""
         return (self.lower > Bounding.likely_free_above) & ~self.blocked
 
 
@@ -142,9 +142,8 @@ class ArmProximity:
     Attributes:
         links: the arm's forward kinematics.
         field: distances from the scene.
-        content: hash of all that the bounds follow from.
-        apart: pairs of the robot's bodies that are proven not to meet while its joints are within
-            their limits.
+        content: hash of the inputs of the bounds.
+        apart: pairs of the robot's bodies that are proven not to meet within the joint limits.
     """
 
     def __init__(self, station_diagram: StationDiagram) -> None:
@@ -196,10 +195,10 @@ class ArmProximity:
         return ClearanceBounds(lower - Bounding.rounding, upper + Bounding.rounding)
 
     def displacement(self, q_a: Array, q_b: Array) -> Array:
-        """How far any point of the robot moves at most, the hand's open fingers included.
+        """Largest displacement of any point of the robot, with the hand's fingers open.
 
-        Two parts of the robot do not move farther to each other either, as only the joints between
-        them matter there. So where the lower bounds at the two ends add up to more than this, the
+        It also bounds how far two parts of the robot approach each other, as only the joints
+        between them matter. So if the lower bounds at the two ends add up to more than this, the
         whole segment is free.
 
         Args:
@@ -232,7 +231,8 @@ class ArmProximity:
     def _descend(
         self, poses: LinkPoses, which: Indices, node: Indices, lower: Single, upper: Single
     ) -> None:
-        """Brings in how far nodes of the trees are from the scene in configurations `which`."""
+        """Lowers `lower` and `upper` by the distances of tree nodes (F,) from the scene in
+        configurations `which` (F,)."""
         trees = self._trees
         for start in range(0, len(which), Bounding.chunk_size):
             part = slice(start, start + Bounding.chunk_size)
@@ -252,7 +252,7 @@ class ArmProximity:
 
 
 def _fixed_solids(station_diagram: StationDiagram) -> list[ProximitySolid]:
-    """Everything that is not the robot, where it stands."""
+    """Collision geometry of everything but the robot, at its default pose."""
     plant = station_diagram.plant
     inspector = station_diagram.scene_graph.model_inspector()
     context = plant.CreateDefaultContext()

@@ -28,9 +28,9 @@ GridPlace = tuple[PostureGrid, int]
 
 
 class ChainSearchSettings:
-    """How thoroughly chains are looked for."""
+    """Effort of the search for chains."""
 
-    max_explained = 3  # Postures that a failure names as being in the way.
+    max_explained = 3  # Blocking postures that a failure names.
     rows_per_layer = 5  # Rows of a chain from one layer to the next; 1 cm apart.
     doubt_cost = 0.5  # Radians. Cost of a posture that may be in collision.
     failures_before_measuring = 2  # Failed chains of a grasp before all its postures are measured.
@@ -43,10 +43,10 @@ def explain_failure(
     """Why a grasp has no chain.
 
     Args:
-        search: where postures are looked for.
-        X_AG: (2, 4, 4) the grasp with its fingers either way.
+        search: the search for postures.
+        X_AG: (2, 4, 4) the grasp with both finger assignments.
         places: its grids, the coarsest first.
-        farthest: the layer that the best of the refused chains got to.
+        farthest: the farthest layer that a refused chain reached.
     """
     grid, i = places[-1]
     ends = [0, search.at_grasp]
@@ -57,15 +57,15 @@ def explain_failure(
             return _blocking_postures(search, X_AG, places, Outcome.ARM_COLLISION, layer)
     last = grid.reached(i) + 1
     if not 0 < last < grid.poses:
-        # Where there still are chains, they have been given up: the best of them got this far.
+        # If chains are left, the search has given them up.
         last = int(np.ceil(farthest))
     outcome = search.lines.outcome(last)
     return _blocking_postures(search, X_AG, places, outcome, last)
 
 
 def _is_any_free(search: PostureGridBuilder, places: Sequence[GridPlace], layer: int) -> bool:
-    """Whether any posture at a layer is free as far as is known; if none of those that chains lead
-    over is, all those of the first grid that has any are looked at."""
+    """Whether any posture at a layer is not known to collide. If no measured posture is, measures
+    all postures of the first grid that has any."""
     if any(grid.measured_free(layer, i) for grid, i in places):
         return True
     grid, i = next((g, i) for g, i in places if g.exists[layer, i].any())
@@ -80,8 +80,8 @@ def _blocking_postures(
     outcome: Outcome,
     layer: int,
 ) -> Failure:
-    """Names the postures at a layer that are nearest to being free; where none is in collision,
-    how far the nearest one is beyond its limits."""
+    """Failure with the blocked postures at a layer, the nearest to free first; if none collides,
+    with the smallest excess over the joint limits."""
     for grid, i in places:
         search.measure(grid, np.array([layer]), np.array([i]), grid.exists)
         blocked = grid.exists[layer, i] & ~grid.usable(layer, i)
@@ -96,12 +96,12 @@ def _blocking_postures(
     ]
     chosen = tuple(where[order].T)
     q = grid.q[(slice(None), layer, i, *chosen)].T
-    moved_W = search.lines.carried(X_AG[chosen[0]], search.layers[[layer]])
+    moved_W = search.lines.target_displacement(X_AG[chosen[0]], search.layers[[layer]])
     return Failure(outcome, q=q, moved_W=moved_W)
 
 
 def _limit_failure(search: PostureGridBuilder, X_AG: Array) -> Failure:
-    """Whether there are postures beyond the joint limits, and by how much at least."""
+    """`JOINT_LIMIT` with the smallest excess, or `NO_IK` if no posture exists without limits."""
     excess = max(_limit_excess(search, X_AG, layer) for layer in (0, search.at_grasp))
     if excess == np.inf:
         return Failure(Outcome.NO_IK)
@@ -109,8 +109,8 @@ def _limit_failure(search: PostureGridBuilder, X_AG: Array) -> Failure:
 
 
 def _limit_excess(search: PostureGridBuilder, X_AG: Array, layer: int) -> float:
-    """How far the best posture at a layer is beyond the joint limits [rad]; infinite if there is
-    none whatever the limits."""
+    """Smallest excess of a posture at a layer over the joint limits [rad]; infinite if the pose has
+    no posture even without limits."""
     ik = search.ik
     half = np.full(len(ik.lower), np.pi)
     centre = np.where(np.arange(len(half)) == 5, 0.5 * (ik.lower + ik.upper), 0.0)
@@ -139,8 +139,8 @@ class ClosedFormLineSearch(PostureGridBuilder):
     def straight(self, X_AG: Array, corners: Array, at: Array, tolerance: Array) -> DenseRows:
         """Fills in rows between the postures of chains at the layers; see `straighten_rows`.
 
-        The redundant joint goes straight from layer to layer. Where no postures follow each other
-        that way, at a fold or past the upright upper arm, all joints are solved for together.
+        The redundant joint is linear from layer to layer. Where the postures are not continuous
+        then, at a fold or past the upright upper arm, the numeric filler solves for all joints.
         """
         every = ClosedFormFiller(self.lines, X_AG, corners, self.layers, self.ik)
         rows = straighten_rows(every, at, tolerance)
@@ -196,7 +196,7 @@ class _ClosedFormBatch:
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
         """See `LineSearch`."""
-        excluded_values = 2  # Values of the redundant joint to either side that are left out, too.
+        excluded_values = 2  # Neighbouring values of the redundant joint that are excluded, too.
         found: _FoundChain = chain.place
         if row is None:
             place = found.place
@@ -222,7 +222,7 @@ class _ClosedFormBatch:
     def _best(
         self, grasps: Sequence[int], found: dict[int, Chain | None]
     ) -> list[tuple[int, PostureGrid, int, GridChain]]:
-        """The cheapest chains; grasps without one go on to more values of the redundant joint."""
+        """The cheapest chains; grasps without one get a finer grid, or None in `found`."""
         by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
         for g in grasps:
             grid, _ = self._grids[g][-1]
@@ -244,8 +244,11 @@ class _ClosedFormBatch:
         return rows
 
     def _advance(self, grasps: Indices) -> None:
-        """Opens a finer grid for grasps: finds the postures at pregrasp and grasp, the others where
-        both are reached, and measures at both what chains lead over."""
+        """Opens a finer grid for grasps.
+
+        Solves for the postures at pregrasp and grasp and, where both exist, at the other layers.
+        Measures those at pregrasp and grasp that chains pass through.
+        """
         if not len(grasps):
             return
         for level in np.unique(self._level[grasps]) + 1:
@@ -262,7 +265,7 @@ class _ClosedFormBatch:
             grid.join()
             for i, g in enumerate(members.tolist()):
                 for coarse, index in self._grids[g][-1:]:
-                    grid.take_over(i, coarse, index, ends)
+                    grid.copy_deep_collisions(i, coarse, index, ends)
             flip = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None]).max(axis=0)
             grid.start[:] = START_COST * np.nan_to_num(flip)
             alive = alive[grid.joined[0, alive].any(axis=(1, 2, 3))]
@@ -277,7 +280,7 @@ class _ClosedFormBatch:
             self._failed[members] = 0
 
     def _measure_failing(self, grasps: Sequence[int]) -> None:
-        """Measures all postures of grasps whose chains keep failing."""
+        """Measures all postures of grasps whose chains have failed repeatedly."""
         by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
         for g in grasps:
             if self._failed[g] == ChainSearchSettings.failures_before_measuring:
@@ -289,8 +292,8 @@ class _ClosedFormBatch:
     def _refine(
         self, rows: list[tuple[int, PostureGrid, int, GridChain]]
     ) -> dict[int, Chain | None]:
-        """Chains whose hand goes straight and that are not in collision as far as is known; None
-        where that is not so, and what keeps it from being so is put out."""
+        """Chains with a straight hand motion and no known collision. None for the others, whose
+        failing postures are excluded."""
         search = self._search
         count = len(search.layers)
         at = np.linspace(0.0, count - 1.0, (count - 1) * ChainSearchSettings.rows_per_layer + 1)
@@ -329,9 +332,9 @@ class _ClosedFormBatch:
         return self._search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, found)
 
     def _exclude(self, grasp: int, found: _FoundChain, layer: float) -> None:
-        """Puts the posture at a layer out of the search, or the step between two.
+        """Excludes the posture at a layer, or the step between two layers, from the search.
 
-        Where chains keep failing the neighbours go with it, so that the next chain leads elsewhere.
+        After repeated failures its neighbours are excluded, too, so that the next chain differs.
         """
         grid, place = found.grid, found.place
         widely = self._failed[grasp] >= ChainSearchSettings.failures_before_measuring

@@ -16,7 +16,7 @@ from burg_drake.core import Array, Arrays, Single, cached, content_hash
 from burg_drake.geometry import Ball, Boxes, Cylinder, Shape
 
 Points = Single | Sequence[Single]
-"""(3, ...) points, or their three coordinates in shapes that broadcast, as those of a grid."""
+"""(3, ...) points, or three coordinate arrays that broadcast, such as those of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +41,8 @@ class BoxSolid:
         """(3,) its upper corner."""
         return np.asarray(self.X_WB[:3, 3] + np.abs(self.X_WB[:3, :3]) @ self.half)
 
-    def _beyond(self, p: Points) -> list[Single]:
-        """How far points are outside of each pair of faces; negative between them."""
+    def _face_distances(self, p: Points) -> list[Single]:
+        """Distances of points outside each pair of faces; negative between the faces."""
         R = self.X_WB[:3, :3]
         beyond = []
         for axis in range(3):
@@ -58,15 +58,15 @@ class BoxSolid:
             beyond.append(value)
         return beyond
 
-    def below(self, p: Single) -> Single:
-        """A lower bound, exact in front of a face and inside."""
-        x, y, z = self._beyond(p)
+    def lower_bound(self, p: Single) -> Single:
+        """Lower bound of the distance, exact in front of a face and inside."""
+        x, y, z = self._face_distances(p)
         np.maximum(x, y, out=x)
         return np.maximum(x, z, out=x)
 
     def distance(self, p: Points) -> Single:
-        """The signed distance."""
-        x, y, z = self._beyond(p)
+        """The signed distance at points."""
+        x, y, z = self._face_distances(p)
         inside = np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
         x, y, z = (np.maximum(a, 0.0) for a in (x, y, z))
         return np.asarray(inside + np.sqrt(x * x + y * y + z * z))
@@ -126,8 +126,8 @@ class HullSolid:
         """(3,) its upper corner."""
         return np.asarray(self.vertices.max(axis=0) + self.bulge)
 
-    def below_on(self, ticks: list[Array]) -> Single:
-        """A lower bound on a grid (a, b, c): the farthest plane. Inside it is exact."""
+    def grid_lower_bound(self, ticks: list[Array]) -> Single:
+        """Lower bound of the distance on a grid (a, b, c): the farthest plane. Exact inside."""
         x, y, z = (np.asarray(t, dtype=np.float32) for t in ticks)
         normals, offsets = self.normals.astype(np.float32), self.offsets.astype(np.float32)
         farthest = np.full((len(x), len(y), len(z)), -np.inf, dtype=np.float32)
@@ -136,11 +136,11 @@ class HullSolid:
             np.maximum(farthest, plane[:, :, None] + normal[2] * z, out=farthest)
         return farthest - np.float32(self.bulge)
 
-    def above(self, p: Array) -> Single:
-        """An upper bound at points (K, 3).
+    def upper_bound(self, p: Array) -> Single:
+        """Upper bound of the distance at points (K, 3).
 
-        From the foot of the perpendicular on the farthest plane it goes on to the centroid until
-        it is inside: along a line the farthest plane's distance is convex.
+        The length of a path from the point perpendicularly to the farthest plane, and on towards
+        the centroid until it is inside: along a line the farthest plane's distance is convex.
         """
         heights = p @ self.normals.T - self.offsets
         farthest = heights.max(axis=1)
@@ -195,7 +195,7 @@ class DistanceField:
         cell: side of the cells [m].
         shape: number of cells along each axis.
         lower, upper: (cells,) bounds that hold in the whole cell [m].
-        boxes: those that are not in the grid.
+        boxes: boxes that are not in the grid.
     """
 
     origin: Array
@@ -207,7 +207,7 @@ class DistanceField:
 
     @classmethod
     def of(cls, solids: list[ProximitySolid]) -> DistanceField:
-        """The field of solids in the world; of solids seen before, from the user's cache."""
+        """The field of solids in the world, from the user's cache if it is there."""
         large = DistanceFieldSettings.large_side
         boxes = tuple(s for s in solids if isinstance(s, BoxSolid) and 2 * max(s.half) >= large)
         small = [s for s in solids if s not in boxes]
@@ -220,7 +220,7 @@ class DistanceField:
         return cls(arrays["origin"], float(arrays["cell"]), (nx, ny, nz), *bounds, boxes)
 
     def index(self, p: Single) -> NDArray[np.intp]:
-        """Cells of points (3, ...); of points beyond the grid the nearest cell."""
+        """Cells of points (3, ...); the nearest cell for points beyond the grid."""
         ones = (1,) * (p.ndim - 1)
         offset = (0.5 - self.origin / self.cell).astype(np.float32).reshape(3, *ones)
         last = (np.array(self.shape) - 0.5).astype(np.float32).reshape(3, *ones)
@@ -240,7 +240,7 @@ class DistanceField:
         """Lower bounds (...,) of the distance at points (3, ...) [m]."""
         bound = self.lower.take(self.index(p), mode="clip")
         for box in self.boxes:
-            np.minimum(bound, box.below(p), out=bound)
+            np.minimum(bound, box.lower_bound(p), out=bound)
         return bound
 
     def upper_at(self, p: Single) -> Single:
@@ -266,7 +266,7 @@ def _grid_arrays(small: list[ProximitySolid]) -> Arrays:
     slack = np.float32(cell * np.sqrt(3.0) / 2)
     lower -= slack
     upper += slack
-    for axis in range(3):  # where points beyond the grid are looked up
+    for axis in range(3):  # boundary cells stand for points beyond the grid
         np.moveaxis(upper, axis, 0)[[0, -1]] = np.inf
     bounds = {"lower": lower.reshape(-1), "upper": upper.reshape(-1)}
     return {"origin": low, "cell": np.array(cell), "shape": shape, **bounds}
@@ -289,15 +289,15 @@ def _grid_bounds(
             continue
         hulls = True
         window, local = _grid_window(ticks, solid, DistanceFieldSettings.band)
-        below = solid.below_on(local)
+        below = solid.grid_lower_bound(local)
         np.minimum(near[window], below, out=near[window])
         occupied = below <= reach
         at = np.stack(np.meshgrid(*local, indexing="ij"))[:, occupied]
         view = seed[window]
-        view[occupied] = np.minimum(view[occupied], solid.above(at.T))
+        view[occupied] = np.minimum(view[occupied], solid.upper_bound(at.T))
     if not hulls:
         return exact, exact.copy()
-    from scipy.ndimage import distance_transform_edt  # not needed for what is in the cache
+    from scipy.ndimage import distance_transform_edt  # not needed if the field is cached
 
     occupied = np.isfinite(seed)
     nearest = distance_transform_edt(

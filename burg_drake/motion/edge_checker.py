@@ -26,7 +26,7 @@ from burg_drake.motion.clearance_bounds import ArmProximity
 
 
 class EdgeCheckSettings:
-    """Lengths down to which segments are divided, and how often Drake is asked."""
+    """Lengths down to which segments are divided, and spacing of Drake's checks."""
 
     coarse_length = 0.08  # Metres of displacement. Longest stretch at the beginning.
     fine_length = 0.003  # Metres of displacement. Longest stretch left undecided.
@@ -34,19 +34,19 @@ class EdgeCheckSettings:
     guess_length = 0.012  # Metres, where a best guess decides in the end.
     pieces = 3  # Pieces into which an undecided stretch is divided.
     row_spacing = 0.20  # Metres of displacement between rows that Drake checks in any case.
-    # Mean segments of a polyline from which shared corners are checked first.
+    # Mean number of segments per polyline above which shared corners are checked first.
     min_shared_segments = 8
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeBounds:
-    """What the fast tier says of E segments.
+    """Verdicts of the fast tier on E segments.
 
     Attributes:
         length: (E,) displacement of each segment [m].
-        blocked_at: (E,) smallest share of each segment at which a collision is proven, among those
-            that were looked at; infinite if none is.
-        doubted_at: (E,) the same where a collision is the best guess.
+        blocked_at: (E,) smallest checked share of each segment at which a collision is proven;
+            infinite if there is none.
+        doubted_at: (E,) the same for collisions that are the best guess.
         open_edge, open_from, open_to: (G,) undecided stretches of segments that are not blocked:
             index of the segment, ordered, and share of it at which the stretch begins and ends.
     """
@@ -71,7 +71,7 @@ class EdgeBounds:
         return proven
 
     def open_shares(self, edge: int) -> Array:
-        """(g,) where on a segment the undecided stretches begin and end, rising."""
+        """(g,) shares of a segment at which undecided stretches begin or end, rising."""
         begin, end = np.searchsorted(self.open_edge, (edge, edge + 1))
         return np.unique(np.concatenate([self.open_from[begin:end], self.open_to[begin:end]]))
 
@@ -95,10 +95,10 @@ def screen_edges(
         hand: whether the hand counts against the scene.
         refutes: whether an upper bound below zero proves a collision, for all or (E,); otherwise it
             leaves the stretch undecided.
-        path: (E,) number of the path that a segment belongs to, each its own by default; what is
-            undecided on a blocked path is left as it is.
-        known: (2, E) lower bounds of the clearance at both ends, if they have been found before,
-            where nothing spoke against them [m].
+        path: (E,) number of the path that a segment belongs to; by default each is its own path.
+            Undecided stretches of a blocked path are not divided further.
+        known: (2, E) lower bounds of the clearance at both ends [m], if they have been computed
+            before and neither end was blocked or doubted.
         fine: longest stretch that may be left undecided [m of displacement].
 
     Returns:
@@ -114,7 +114,7 @@ def screen_edges(
     over = np.zeros(path.max() + 1, dtype=bool)
 
     def lower(edge: NDArray[np.intp], share: Array) -> Array:
-        """Lower bounds of the clearance at (R,) places; notes what they say of their segments."""
+        """Lower bounds of the clearance at (R,) places; records blocked and doubted ones."""
         q = q_a[edge] + share[:, None] * (q_b[edge] - q_a[edge])
         bounds = proximity.bounds(q, hand=hand)
         hit = (bounds.upper < 0.0) & refutes[edge]
@@ -166,8 +166,8 @@ class EdgeChecker:
     Attributes:
         proximity: the fast tier.
         collision: Drake's checker.
-        exact: whether Drake is asked; otherwise the best guess of the fast tier counts.
-        checks: how often Drake has been asked so far.
+        exact: whether Drake's checker decides; otherwise the best guess of the fast tier counts.
+        checks: number of Drake's checks so far.
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class EdgeChecker:
 
     @property
     def content(self) -> str:
-        """Hash of what the fast tier's answers follow from."""
+        """Hash of the fast tier's inputs."""
         return content_hash(self.proximity.content, self.exact)
 
     def is_free(self, q_a: Array, q_b: Array) -> bool:
@@ -188,8 +188,8 @@ class EdgeChecker:
         return self.first_blocked(np.stack([q_a, q_b])) is None
 
     def screen(self, q_a: Array, q_b: Array, *, fine: float | None = None) -> EdgeBounds:
-        """What the fast tier says of (E, n) segments, in one batch; stretches no longer than `fine`
-        [m of displacement] may be left undecided."""
+        """Verdicts of the fast tier on (E, n) segments, in one batch; stretches no longer than
+        `fine` [m of displacement] may be left undecided."""
         fine = self._fine(hand=True) if fine is None else fine
         return screen_edges(self.proximity, q_a, q_b, fine=fine)
 
@@ -200,14 +200,14 @@ class EdgeChecker:
         return EdgeCheckSettings.hand_fine_length if hand else EdgeCheckSettings.fine_length
 
     def seem_free(self, screened: EdgeBounds, *, guess: bool = False) -> NDArray[np.bool_]:
-        """(E,) segments that are worth a closer look: with `exact` those that nothing is proven
-        against; otherwise, and with `guess`, those that are free by the best guess."""
+        """(E,) segments worth an exact check: with `exact` those without a proven collision;
+        otherwise, and with `guess`, those that are free by the best guess."""
         return np.isinf(screened.blocked_at if self.exact and not guess else screened.doubted_at)
 
     def confirm(self, q_a: Array, q_b: Array, screened: EdgeBounds, edge: int) -> bool:
-        """The verdict on one of the segments (E, n) that `screen` has looked at.
+        """Whether a segment of a screened batch (E, n) is free.
 
-        Without `exact` that is the screen's guess.
+        Without `exact` this is the screen's guess.
         """
         if not self.exact:
             return bool(np.isinf(screened.doubted_at[edge]))
@@ -232,17 +232,17 @@ class EdgeChecker:
 
         Args:
             q: (M, n) its corners, at least one.
-            hand: whether the fast tier counts the hand against the scene; without, the motion of
-                the hand has been judged otherwise. Drake counts it all the same.
-            carried: instance that the hand carries, if any. The fast tier, which sees it where the
-                scene has it, then proves nothing blocked, and Drake alone sees it against the arm.
-            moved_W: (M, 3) how far the carried instance is from its place at each corner [m];
-                straight between corners.
+            hand: whether the fast tier includes the hand against the scene. False if the hand's
+                motion has been checked before. Drake always includes it.
+            carried: instance that the hand carries, if any. The fast tier sees it at its placement,
+                so it then proves no collision, and Drake alone checks it against the arm.
+            moved_W: (M, 3) displacement of the carried instance at each corner [m]; linear between
+                corners.
             width: distance between the pads that carry it [m]; NaN if the hand is open.
 
         Returns:
-            Index of a corner that is not free, or of the one that a blocked segment leads to: the
-            first that the bounds refute, else the first that Drake does; None if all is free.
+            Index of a corner that is not free, or of the end of a blocked segment: the first that
+            the bounds refute, else the first that Drake refutes; None if all is free.
         """
         return self.first_blocked_each(
             [q],
@@ -262,14 +262,14 @@ class EdgeChecker:
         width: Sequence[float] | None = None,
         lower: Sequence[Array] | None = None,
     ) -> list[int | None]:
-        """`first_blocked` of each of several polylines, with one batch of the fast tier; what is
-        said of one does not depend on the others.
+        """`first_blocked` of several polylines, with one batch of the fast tier. The results do
+        not depend on each other.
 
         Args:
             paths, carried, moved_W, width: one entry for each.
             hand: for all.
-            lower: lower bounds of the clearance at the corners, if they have been found before,
-                where nothing spoke against them [m].
+            lower: lower bounds of the clearance at the corners [m], if they have been computed
+                before and no corner was blocked or doubted.
         """
         if not len(paths):
             return []
@@ -306,8 +306,8 @@ class EdgeChecker:
         ]
 
     def _lower_at_corners(self, corners: Sequence[Array], hand: bool) -> list[Array] | None:
-        """Lower bounds at the corners of paths, each looked at once; None if something speaks
-        against one, for then the segments have to know."""
+        """Lower bounds at the corners of paths, each computed once; None if any corner is blocked
+        or doubted, as the screen of the segments has to record that."""
         bounds = self.proximity.bounds(np.concatenate(corners), hand=hand)
         if bounds.blocked.any() or not bounds.likely_free.all():
             return None
@@ -322,7 +322,7 @@ class EdgeChecker:
         moved_W: Array,
         width: float,
     ) -> int | None:
-        """The verdict on a polyline whose segments begin at the `first` of those screened."""
+        """`first_blocked` of a polyline whose segments begin at index `first` of `screened`."""
         at = screened.blocked_at if self.exact else screened.doubted_at
         hit = np.flatnonzero(np.isfinite(at[first : first + len(q) - 1]))
         if len(hit):
@@ -347,8 +347,8 @@ class EdgeChecker:
 
 
 def _rows_to_check(screened: EdgeBounds, first: int, count: int) -> Iterator[tuple[int, float]]:
-    """What to ask Drake about along `count` segments that follow one another, from the `first`:
-    segment and share of it, in order. A corner is asked about as the start of a segment."""
+    """Places for Drake to check along `count` successive segments from the `first`: segment and
+    share of it, in order. A corner is checked as the start of a segment."""
     end = first + count
     since = np.inf
     begin, stop = np.searchsorted(screened.open_edge, (first, end))
@@ -362,7 +362,7 @@ def _rows_to_check(screened: EdgeBounds, first: int, count: int) -> Iterator[tup
         if edge + 1 == end:
             shares.add(1.0)
         since = length * (1.0 - max(shares)) if shares else since + length
-        if 1.0 in shares and edge + 1 < end:  # asked about as the start of the next one
+        if 1.0 in shares and edge + 1 < end:  # checked as the start of the next segment
             shares.remove(1.0)
             since = np.inf
         yield from ((edge, share) for share in sorted(shares))

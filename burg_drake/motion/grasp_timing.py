@@ -23,12 +23,12 @@ REFERENCE_LIFT_HEIGHT = GraspMotion().lift_height
 
 @dataclass(frozen=True)
 class PathChecks:
-    """Checks of what leaves an arm path, each of rows (R, n) that the arm moves through
-    straight from row to row.
+    """Collision checks for deviations from an arm path, each for rows (R, n) that the arm moves
+    through straight from row to row.
 
     Attributes:
         transfer: with the hand open and empty.
-        approach: the same, near the target.
+        approach: with the hand open and empty, near the target.
         lift, retreat: with the target in the hand.
     """
 
@@ -47,15 +47,15 @@ def time_motion(
     checks: PathChecks | None = None,
     limit_margin: float = 0.0,
 ) -> Plan:
-    """Gives the segments of an arm path their time; each begins and ends at rest.
+    """Times the segments of an arm path; each begins and ends at rest.
 
     Args:
         path: the segments.
         limits: of the joints; none is exceeded.
         kinematics: the arm, to measure the path length of the hand.
-        settings: how fast, how close to the paths.
-        checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
-            at each corner; without one for a line, it keeps to a spline through the waypoints.
+        settings: speeds and tolerances.
+        checks: of rounded corners and smoothed lines. Without a check of the transfer, the arm
+            stops at each corner; without one of a line, it keeps to a spline through the waypoints.
 
     Returns:
         The plan, sampled at `settings.rate`.
@@ -64,8 +64,8 @@ def time_motion(
         InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
             keep the others.
     """
-    min_straightness = 2e-5  # Metres. The path is no straighter.
-    unmeasured_clearance = 2e-4  # Metres.
+    min_straightness = 2e-5  # Metres. The path itself is no straighter.
+    unmeasured_clearance = 2e-4  # Metres. Clearance of a path without a measured one.
     settings, checks = settings or TimingSettings(), checks or PathChecks()
     near = unmeasured_clearance if np.isnan(path.clearance) else max(0.0, path.clearance)
     lines = replace(
@@ -115,15 +115,15 @@ def _require_within_limits(q: Array, limits: ArmLimits, name: str) -> Array:
 
 
 def _lift_speed(height: float, settings: TimingSettings) -> HandSpeed:
-    """Half of the time full acceleration and half of it full braking, as hard as over
-    `REFERENCE_LIFT_HEIGHT`: what the hand holds feels the same load at any height."""
+    """Hand limits for a lift: full acceleration, then full braking, each for half of the time. The
+    acceleration is that of `REFERENCE_LIFT_HEIGHT`, so that the load on the object is the same."""
     time = settings.lift_time * np.sqrt(height / REFERENCE_LIFT_HEIGHT)
     acceleration = 4.0 * REFERENCE_LIFT_HEIGHT / settings.lift_time**2
     return HandSpeed(float(acceleration * time / 2.0), acceleration, settings.ramp)
 
 
 def _retreat_speed(settings: TimingSettings) -> HandSpeed:
-    """As slow as on the approach, and accelerated no more than on the lift."""
+    """Hand limits for a retreat: the speed of the approach, at most the lift's acceleration."""
     acceleration = min(
         settings.approach_acceleration, 4.0 * REFERENCE_LIFT_HEIGHT / settings.lift_time**2
     )
@@ -139,7 +139,7 @@ def _hand_path_length(rows: Array, kinematics: ArmKinematics) -> float:
 def _sample_motion(
     motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
 ) -> Trajectory:
-    """Samples that keep the limits, by their differences, too."""
+    """Samples a motion, slowed down until finite differences of the samples keep the limits."""
     max_slowdowns = 20  # Times that a motion is slowed down.
     motion, kept = motion.time_scaled(1.0 / settings.speed), limits.slowed(settings.speed)
     for _ in range(max_slowdowns):

@@ -1,7 +1,7 @@
-"""The hand on its straight segments: approach, retreat and lift of many grasps, without the arm.
+"""Collision checks of the hand on approach, retreat and lift of many grasps, without the arm.
 
-What a convex part sweeps along a straight segment is convex (`geometry`), so a segment is checked
-as a whole, not at samples. No result depends on the rest of a batch, not even in its last bit.
+The swept volume of a convex part along a straight segment is convex (`geometry`), so a segment is
+checked as a whole, not at samples. No result depends on the rest of a batch, bit by bit.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class HandPart:
 
     Attributes:
         shapes: in the grasp frame of the open hand.
-        closing_G: (3,) how far they move when the open hand closes until its pads meet, or are as
-            close as they can be [m]; 0 of the hand's body.
+        closing_G: (3,) displacement when the open hand closes as far as it can [m]; 0 for the
+            hand's body.
         opening: smallest and largest distance between the pads [m].
     """
 
@@ -53,7 +53,7 @@ class HandPart:
     opening: tuple[float, float]
 
     def placed(self, X_WG: Array, width: Array) -> Array:
-        """Grasp frames of an open hand that has this part where it is at another width.
+        """Grasp frames at which an open hand has this part where it is at the given widths.
 
         Args:
             X_WG: (N, 4, 4) grasps.
@@ -78,7 +78,8 @@ def read_hand_parts(
         station_diagram: a diagram built with `robot="hand"`.
 
     Returns:
-        The hand's body and its fingers, as far as they have shapes; and the other bodies by name.
+        The hand's body and its fingers, without parts that have no shapes; and the other bodies by
+        name.
 
     Raises:
         InvalidInputError: see `read_shapes`.
@@ -114,8 +115,8 @@ def read_hand_parts(
 
 
 def is_hand_symmetric(parts: Sequence[HandPart]) -> bool:
-    """Whether a hand occupies the same space when it is turned by half a turn about its approach:
-    by how far its shapes reach in 64 directions."""
+    """Whether a hand occupies the same space after half a turn about its approach axis, by the
+    support distances of its shapes in 64 directions."""
     rng = rng_from("burg_drake directions")
     directions = rng.normal(size=(64, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -141,7 +142,7 @@ def _support_distance(shape: Shape, directions: Array) -> Array:
 def _closing_paths(
     hand: FloatingHand, plant: MultibodyPlant, plant_context: Context
 ) -> list[Array]:
-    """How far each finger moves from open to closed, in the grasp frame (3,) [m]."""
+    """Displacement of each finger from open to closed, in the grasp frame (3,) [m]."""
     ends = []
     for closed in (0.0, 1.0):
         hand.place(plant_context, np.eye(4), closed)
@@ -153,21 +154,21 @@ def _closing_paths(
 def deepest_overlap_along_path(
     screen: HandScreen, X_WG: Array, names: NDArray[np.object_], u_W: Array, length: float
 ) -> tuple[Array, Array]:
-    """The deepest overlap of each hand with the one body that is known to be in its way.
+    """The deepest overlap of each hand with the body that blocks its path.
 
-    Along the way the depth in a convex piece rises to one maximum and falls; a body of several may
-    have several, of which the one about the deepest place of the grid is found.
+    Along the path the depth in a convex piece rises to one maximum and falls. A body of several
+    pieces may have several maxima; the one around the deepest place of the grid is found.
 
     Args:
         screen: the hand, not swept.
-        X_WG: (N, 4, 4) grasps in the world, from which the ways start.
+        X_WG: (N, 4, 4) grasps in the world, at which the paths start.
         names: (N,) of the bodies.
-        u_W: (N, 3) unit vectors along the ways.
-        length: of the ways [m].
+        u_W: (N, 3) unit vectors along the paths.
+        length: of the paths [m].
 
     Returns:
         Depths (N,) and their distances from the start (N,) [m]; depth 0 and NaN where the overlap
-        is so short that no place of the finest grid has it.
+        is so short that the finest grid misses it.
     """
     steps = (0.02, 0.002)  # Metres. The second step is used where the first finds no overlap.
     depth, at = np.zeros(len(X_WG)), np.full(len(X_WG), np.nan)
@@ -196,7 +197,7 @@ def deepest_overlap_along_path(
 def _overlap_depths(
     screen: HandScreen, X_WG: Array, names: NDArray[np.object_], u_W: Array, s: Array
 ) -> Array:
-    """Depths (N, S) in the named bodies (N,) at distances (N, S) along the ways [m]."""
+    """Depths (N, S) in the named bodies (N,) at distances (N, S) along the paths [m]."""
     X = np.repeat(X_WG[:, None], s.shape[1], axis=1)
     X[..., :3, 3] += s[..., None] * u_W[:, None]
     depth = np.zeros(s.shape)
@@ -209,16 +210,16 @@ def _overlap_depths(
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What is in the way of N hands.
+    """Obstacles on the paths of N hands.
 
     Attributes:
-        free: (N,) whether nothing is.
-        blocker: (N,) name of the body that is; "" where the way is free.
-        clearance: (N,) smallest signed distance on the way [m]. Where it is free, that of the hand
-            from other bodies: a lower bound, exact where no cylinder is swept across its axis (see
-            `geometry.swept_shape`). Where not, minus the depth of the overlap with the blocker.
-        at: (N,) how far from the grasp that depth is met [m]; NaN where the way is free, or the
-            overlap too short to be found.
+        free: (N,) whether the path is free.
+        blocker: (N,) name of the body in the way; "" where the path is free.
+        clearance: (N,) smallest signed distance on the path [m]. Where it is free, the distance of
+            the hand from other bodies: a lower bound, exact where no cylinder is swept across its
+            axis (see `geometry.swept_shape`). Else minus the overlap depth with the blocker.
+        at: (N,) distance from the grasp at which that depth is met [m]; NaN where the path is free,
+            or the overlap too short to be found.
     """
 
     free: NDArray[np.bool_]
@@ -229,8 +230,8 @@ class SweepResult:
     def __len__(self) -> int:
         return len(self.free)
 
-    def put(self, rows: NDArray[np.intp], target: PathBlockers) -> None:
-        """Takes over what is in the way of the target on some ways (S,), where anything is."""
+    def add_blockers(self, rows: NDArray[np.intp], target: PathBlockers) -> None:
+        """Enters the blockers of the target on the paths `rows` (S,), where there are any."""
         hit = np.flatnonzero(target.by != "")
         rows = rows[hit]
         self.free[rows], self.blocker[rows] = False, target.by[hit]
@@ -241,9 +242,9 @@ class HandSweep:
     """Sweeps a station's hand through one scene; objects stand where the document places them.
 
     Args:
-        scene: what stands there.
-        station: whose hand it is.
-        motion: the ways.
+        scene: the objects.
+        station: the station with the hand.
+        motion: the straight segments.
 
     Attributes:
         symmetric: whether the hand with its fingers swapped occupies the same space.
@@ -263,22 +264,22 @@ class HandSweep:
         shapes = [shape for part in self._parts for shape in part.shapes]
         self._open = HandScreen(shapes, self._bodies)
         self._approach = HandScreen(_swept_shapes(shapes, motion.standoff), self._bodies)
-        self._still = [HandScreen(part.shapes, self._bodies) for part in self._parts]
+        self._part_screens = [HandScreen(part.shapes, self._bodies) for part in self._parts]
         self._retreat = [
             HandScreen(_swept_shapes(part.shapes, motion.retreat), self._bodies)
             for part in self._parts
         ]
-        self._against: dict[float, dict[str, Body]] = {}
+        self._swept_by_height: dict[float, dict[str, Body]] = {}
         self._lifts: dict[tuple[str, float], list[HandScreen]] = {}
         self._targets: dict[str, TargetSweep] = {}
-        self._risen: dict[tuple[str, float], PathBlockers] = {}
+        self._shared_lift_blockers: dict[tuple[str, float], PathBlockers] = {}
 
     def approach(self, instance: str, X_WG: Array) -> SweepResult:
-        """The open hand on its way from the pregrasp to the grasp, both included.
+        """Checks the open hand from the pregrasp to the grasp, both included.
 
         Args:
-            instance: the target's name in the scene, which decides where several bodies are in the
-                way; "" if there is none.
+            instance: the target's name in the scene; "" if there is none. If several bodies are in
+                the way, the target is named first.
             X_WG: (N, 4, 4) grasps in the world.
 
         Raises:
@@ -299,10 +300,10 @@ class HandSweep:
         return SweepResult(names == "", names, clearance, at)
 
     def retreat(self, instance: str, X_WG: Array, width: Array) -> SweepResult:
-        """The hand with the target in it on its way straight back along the approach.
+        """Checks the hand with the target straight back along the approach.
 
-        Hand and fingers count against all but the target, and the target against all others: where
-        the hand is free and the target is not, what is in the target's way is the blocker.
+        Hand and fingers are checked against all bodies but the target, and the target against all
+        others: where only the target collides, its obstacle is the blocker.
 
         Args:
             instance: the target's name in the scene; "" if the hand is empty.
@@ -316,20 +317,20 @@ class HandSweep:
         """
         X_WG, length = self._checked(instance, X_WG), self._motion.retreat
         back_W = -X_WG[:, :3, 2]
-        found = self._closed(instance, self._retreat, X_WG, width, back_W, length)
+        found = self._check_around_target(instance, self._retreat, X_WG, width, back_W, length)
         if instance:
             free = np.flatnonzero(found.free)
-            found.put(free, self._target(instance).retreat(back_W[free], length))
+            found.add_blockers(free, self._target(instance).retreat(back_W[free], length))
         return found
 
     def lift(
         self, instance: str, X_WG: Array, width: Array, height: float | None = None
     ) -> SweepResult:
-        """The hand with the target in it on its lift, which begins where the retreat ends.
+        """Checks the hand with the target on the lift, which begins where the retreat ends.
 
         Args:
             instance, X_WG, width: see `retreat`.
-            height: how far it goes [m]; by the whole lift if None.
+            height: of the lift [m]; the whole lift if None.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -342,13 +343,13 @@ class HandSweep:
         X_WR[:, :3, 3] += start_W
         along_W = np.broadcast_to(motion.direction_W, (len(X_WG), 3))
         screens = self._lift_screens(instance, height)
-        found = self._closed(instance, screens, X_WR, width, along_W, height)
+        found = self._check_around_target(instance, screens, X_WR, width, along_W, height)
         if instance:
             free = np.flatnonzero(found.free)
-            found.put(free, self._lifted(instance, start_W[free], height))
+            found.add_blockers(free, self._lift_blockers(instance, start_W[free], height))
         return found
 
-    def _closed(
+    def _check_around_target(
         self,
         instance: str,
         screens: Sequence[HandScreen],
@@ -357,15 +358,16 @@ class HandSweep:
         u_W: Array,
         length: float,
     ) -> SweepResult:
-        """The hand around the target on straight segments from N poses (N, 4, 4).
+        """Checks the hand around the target on straight segments from N poses.
 
         Args:
-            instance: the target, which does not count.
-            screens: for each part of the hand what it sweeps, or the others against it.
-            X_WG: where the ways begin.
+            instance: the target, which is ignored.
+            screens: for each part of the hand, a screen of its swept shapes, or of its shapes
+                against the swept bodies.
+            X_WG: (N, 4, 4) poses at which the segments begin.
             width: (N,) distance between the pads [m].
-            u_W: (N, 3) unit vectors along the ways.
-            length: of the ways [m].
+            u_W: (N, 3) unit vectors along the segments.
+            length: of the segments [m].
         """
         others = self._others(instance)
         placed = [part.placed(X_WG, np.asarray(width, float)) for part in self._parts]
@@ -379,7 +381,7 @@ class HandSweep:
             clearance[free] = np.minimum(clearance[free], screen.nearest(X[free])[1])
             hit = np.flatnonzero((names != "") & (decisive == k))
             depth, at[hit] = deepest_overlap_along_path(
-                self._still[k], X[hit], names[hit], u_W[hit], length
+                self._part_screens[k], X[hit], names[hit], u_W[hit], length
             )
             clearance[hit] = -depth
         return SweepResult(names == "", names, clearance, at)
@@ -392,22 +394,24 @@ class HandSweep:
         return check_pose(X_WG, "X_WG")
 
     def _others(self, instance: str) -> list[str]:
-        """Names of all bodies but the target, the deciding ones first; see `HandClearance`."""
+        """Names of all bodies but the target, by their rank as blockers; see `HandClearance`."""
         return [name for name in self._order if name in self._bodies and name != instance]
 
-    def _moved_against(self, height: float) -> dict[str, Body]:
-        """All bodies, as they sweep when in place of the hand all else moves: against the lift."""
-        if height not in self._against:
+    def _swept_bodies(self, height: float) -> dict[str, Body]:
+        """All bodies, swept against the direction of the lift, in the frame of the lifted hand."""
+        if height not in self._swept_by_height:
             shift_W = -height * self._motion.direction_W
             bodies = self._bodies.items()
-            self._against[height] = {name: swept_body(body, shift_W) for name, body in bodies}
-        return self._against[height]
+            self._swept_by_height[height] = {
+                name: swept_body(body, shift_W) for name, body in bodies
+            }
+        return self._swept_by_height[height]
 
     def _lift_screens(self, instance: str, height: float) -> list[HandScreen]:
-        """The parts of the hand against what the others sweep."""
+        """The parts of the hand against the swept bodies."""
         key = instance, height
         if key not in self._lifts:
-            swept = self._moved_against(height)
+            swept = self._swept_bodies(height)
             others = {name: swept[name] for name in self._others(instance)}
             self._lifts[key] = [HandScreen(part.shapes, others) for part in self._parts]
         return self._lifts[key]
@@ -418,26 +422,25 @@ class HandSweep:
             self._targets[instance] = TargetSweep(self._bodies[instance], others)
         return self._targets[instance]
 
-    def _lifted(self, instance: str, start_W: Array, height: float) -> PathBlockers:
-        """What is in the way of the target on the lift; without a retreat that is the same for all
-        grasps."""
+    def _lift_blockers(self, instance: str, start_W: Array, height: float) -> PathBlockers:
+        """Obstacles of the target on the lift; without a retreat the same for all grasps."""
         shift_W, u_W = self._target(instance), self._motion.direction_W
-        swept = self._moved_against(height)
+        swept = self._swept_bodies(height)
         if self._motion.retreat > 0.0:
             return shift_W.lift(start_W, u_W, height, swept)
         key = instance, height
-        if key not in self._risen:
-            self._risen[key] = shift_W.lift(np.zeros((1, 3)), u_W, height, swept)
-        return self._risen[key].repeated(len(start_W))
+        if key not in self._shared_lift_blockers:
+            self._shared_lift_blockers[key] = shift_W.lift(np.zeros((1, 3)), u_W, height, swept)
+        return self._shared_lift_blockers[key].repeated(len(start_W))
 
 
 def _swept_shapes(shapes: Sequence[Shape], length: float) -> list[Shape]:
-    """What shapes in the grasp frame sweep on a way straight back [m]."""
+    """Swept volumes of shapes in the grasp frame on a straight retreat of `length` [m]."""
     backwards = np.array((0.0, 0.0, -1.0))  # Direction of the retreat, in the grasp frame.
     return [swept for shape in shapes for swept in swept_shape(shape, length * backwards)]
 
 
 def _ranks(names: NDArray[np.object_], order: Sequence[str]) -> NDArray[np.intp]:
-    """Places (N,) of names in an order; its length for what is not in it."""
+    """Ranks (N,) of names in an order; its length for names that are not in it."""
     place = {name: i for i, name in enumerate(order)}
     return np.array([place.get(name, len(order)) for name in names], dtype=np.intp)

@@ -16,11 +16,11 @@ from burg_drake.station import Arm, Station, StationDiagram
 
 @dataclass(frozen=True)
 class HomeClearance:
-    """How near the arm at home is to anything, itself included.
+    """Clearance of the arm at home from the scene and from itself.
 
     Attributes:
         distance: of the nearest pair of bodies, at most 1 [m].
-        link, other: their names; empty if none is that near.
+        link, other: their names; empty if no pair is within 1 m.
     """
 
     distance: float
@@ -30,10 +30,10 @@ class HomeClearance:
 
 @dataclass(frozen=True)
 class BaseOverlap:
-    """A shape of the arm's base that is in something.
+    """A shape of the arm's base that penetrates another body.
 
     Attributes:
-        name: what it is in.
+        name: the other body.
         depth: [m].
         link, shape: names of the base's link and of its collision geometry.
         upwards: whether the shortest way out leads upwards.
@@ -47,11 +47,11 @@ class BaseOverlap:
 
 
 def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) -> None:
-    """Refuses a station whose arm stands in something, or collides in its home posture.
+    """Refuses a station whose arm base is inside a body, or whose home posture collides.
 
     Args:
         station_diagram: the arm among the objects of a scene.
-        collision: its checks.
+        collision: collision checks of that arm.
 
     Raises:
         InvalidInputError: one line that names the bodies.
@@ -70,12 +70,12 @@ def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) 
 
 
 def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
-    """What the arm's base is in by more than 5 mm although `arm.stands_in` does not allow it; the
-    checks of configurations leave that out, as neither of the two can move.
+    """Overlaps of more than 5 mm of the arm's base that `arm.stands_in` does not allow. The checks
+    of configurations ignore them, as neither body can move.
 
     Returns:
-        By shapes of the base and what they are in (table, obstacles, fixed instances), the deepest
-        first.
+        One for each pair of a base shape and a body (table, obstacles, fixed instances), the
+        deepest first.
     """
     plant, arm = station_diagram.plant, _arm_document(station_diagram)
     model = plant.GetModelInstanceByName("arm")
@@ -99,7 +99,7 @@ def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
 
 
 def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
-    """What the base is in most deeply, with which shapes, and what to do."""
+    """Message that names the deepest overlap of the base, the shapes in it, and a remedy."""
     max_shapes = 3  # Shapes of the base that are listed.
     name = inside[0].name
     shapes = [overlap for overlap in inside if overlap.name == name]
@@ -125,8 +125,8 @@ def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
 
 
 def home_clearance(station_diagram: StationDiagram) -> HomeClearance:
-    """How near the arm at home, its hand open, is to anything; the hand's own parts do not count
-    against each other."""
+    """Clearance of the arm at home with its hand open; the hand's own parts are not checked against
+    each other."""
     max_distance = 1.0  # Metres. Bodies farther away are ignored.
     plant = station_diagram.plant
     inspector = station_diagram.scene_graph.model_inspector()

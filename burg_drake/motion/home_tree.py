@@ -18,15 +18,15 @@ from burg_drake.motion.roadmap import Roadmap, chain_to_root
 
 
 def shorten_path(edges: EdgeChecker, path: Array, scale: Array) -> Array:
-    """Straightens a free way.
+    """Shortens a free path.
 
     Args:
         edges: judges segments.
         path: (M, n) its corners.
-        scale: (n,) what a unit of each joint counts in the length of a segment, which is the norm.
+        scale: (n,) weights of the joints in the length (Euclidean norm) of a segment.
 
     Returns:
-        (L, n) corners of a free way with the same ends, at most as long as `path`.
+        (L, n) corners of a free path with the same ends, at most as long as `path`.
     """
     known: dict[bytes, bool] = {}
     if len(path) > 2 and _is_segment_free(edges, path[[0, -1]], known):
@@ -54,7 +54,7 @@ def _path_points(path: Array, scale: Array) -> Array:
 
 
 def _is_segment_free(edges: EdgeChecker, ends: Array, known: dict[bytes, bool]) -> bool:
-    """Whether a segment (2, n) is free; one that is not so by the best guess is not looked at."""
+    """Whether a segment (2, n) is free; checked exactly only if the best guess is that it is."""
     screened = edges.screen(ends[:1], ends[1:], fine=np.inf)
     free = bool(edges.seem_free(screened, guess=True)[0]) and edges.is_free(*ends)
     known[ends.tobytes()] = free
@@ -64,16 +64,16 @@ def _is_segment_free(edges: EdgeChecker, ends: Array, known: dict[bytes, bool]) 
 def _shortest_through(
     edges: EdgeChecker, q: Array, scale: Array, known: dict[bytes, bool]
 ) -> Array:
-    """The shortest way from the first to the last of points that follow one another on a free way.
+    """The shortest free path over points of a free path, from the first to the last.
 
-    A few bounds say which segments are worth considering: those that are free by the best guess, as
-    it takes hundreds of checks to be sure of others. Those that a way takes are judged.
+    Only segments that are free by the best guess are considered, as others take hundreds of checks
+    to prove. Those on a shortest path are then checked exactly.
 
     Args:
         edges: judges segments.
-        q: (N, n) points.
+        q: (N, n) successive points on the free path.
         scale: see `shorten_path`.
-        known: verdicts on segments by the bytes of their ends; what is found is added.
+        known: verdicts on segments by the bytes of their ends; new verdicts are added.
     """
     corner_cost = 1e-9  # Metres. Leaves no corner on a straight line.
     first, second = np.triu_indices(len(q), 2)
@@ -100,9 +100,9 @@ def _shortest_through(
 def search_from_goal(
     roadmap: Roadmap, edges: EdgeChecker, goal: Array, lower: Array, upper: Array
 ) -> Array | None:
-    """Looks for a way (M, n) from home to a goal (n,) by a tree that grows from the goal."""
+    """Searches a path (M, n) from home to a goal (n,) with a tree that grows from the goal."""
     bounds = edges.proximity.bounds(goal[None])
-    # A goal that is not even likely free says that bounds are too loose around here to guess by.
+    # If the goal is not even likely free, the bounds around it are too loose for a guess.
     guess = bool(bounds.likely_free[0])
     if bounds.blocked[0] or not (edges.exact or guess):
         return None
@@ -121,7 +121,7 @@ def search_from_goal(
 
 
 def _draw_samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-    """Half uniform, half around nodes of the trees."""
+    """Samples (32, n): half uniform, half around nodes of the tree."""
     batch_size = 32  # Samples in a batch.
     spread = 0.15  # Standard deviation of half of the samples, over a joint's range.
     drawn = rng.uniform(lower, upper, (batch_size, len(lower)))
@@ -134,8 +134,8 @@ def _draw_samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator
 def _connections(
     roadmap: Roadmap, edges: EdgeChecker, q: Array, new: NDArray[np.intp], guess: bool
 ) -> list[tuple[int, int]]:
-    """New nodes and near nodes of the roadmap (3 each) between which the screen finds a free
-    segment, the shortest first."""
+    """Pairs of a new node and one of its 3 nearest roadmap nodes that the screen finds connected,
+    the shortest first."""
     if not len(new):
         return []
     entry = np.concatenate([roadmap.near(q[node], 3) for node in new])
@@ -147,7 +147,7 @@ def _connections(
 
 
 class _GoalTree:
-    """Nodes that lead back to a goal.
+    """Tree of configurations that is rooted at a goal.
 
     Attributes:
         q: (T, n) configurations, the goal first.
@@ -174,16 +174,16 @@ class _GoalTree:
         return np.arange(len(self.q) - int(free.sum()), len(self.q))
 
     def chain(self, node: int) -> list[int]:
-        """The nodes from one to the goal."""
+        """The nodes from `node` to the goal."""
         return chain_to_root(self._towards, node)
 
 
 class HomeTree:
-    """Leads from home to goals.
+    """Finds paths from home to goals.
 
     Attributes:
         edges: judges segments.
-        roadmap: configurations that home leads to.
+        roadmap: configurations around home.
     """
 
     def __init__(
@@ -196,48 +196,49 @@ class HomeTree:
         focus: Array | None = None,
         nodes: int = 600,
     ) -> None:
-        """Lays the roadmap out; for the arguments see there."""
+        """Builds the roadmap; for the arguments see `Roadmap`."""
         self.edges = edges
         self.roadmap = Roadmap(edges, home, lower, upper, focus=focus, nodes=nodes)
         self._lower, self._upper = lower, upper
 
     def connect(self, goals: Array) -> list[Array | None]:
-        """A free way to each of several goals, with few batches of the fast tier; what is found
-        for one does not depend on the others.
+        """Free paths to goals, with few batches of the fast tier. The results do not depend on
+        each other.
 
         Args:
             goals: (K, n) postures.
 
         Returns:
-            (M, n) the corners of each way, home first: one that ends with a segment from home or
-            from a near node of the roadmap, else one that a search has found; None if there is
-            neither.
+            (M, n) corners of each path, home first. It ends with a segment from home or from a near
+            node of the roadmap, or else was found by a search from the goal; None if both fail.
         """
         goals = np.asarray(goals, dtype=float)
-        paths = self._by_segments(goals)
+        paths = self._connect_by_segments(goals)
         for index in (k for k, path in enumerate(paths) if path is None):
             paths[index] = search_from_goal(
                 self.roadmap, self.edges, goals[index], self._lower, self._upper
             )
         return paths
 
-    def _by_segments(self, goals: Array) -> list[Array | None]:
-        """Ways that end with a segment from home or from a near node, for each goal (K, n)."""
+    def _connect_by_segments(self, goals: Array) -> list[Array | None]:
+        """Paths that end with a segment from home or from a near node, for each goal (K, n)."""
         first_count = 2  # Nearest nodes that a goal is tried with at first.
         further_count = 8  # Further nodes that are tried, beside home.
         near = [self.roadmap.near(goal, first_count + further_count) for goal in goals]
-        paths = self._over(goals, [nodes[:first_count] for nodes in near])
+        paths = self._connect_over(goals, [nodes[:first_count] for nodes in near])
         left = [k for k, way in enumerate(paths) if way is None]
         rest = [np.append(nodes[first_count:][nodes[first_count:] != 0], 0) for nodes in near]
-        for k, path in zip(left, self._over(goals[left], [rest[k] for k in left]), strict=True):
+        for k, path in zip(
+            left, self._connect_over(goals[left], [rest[k] for k in left]), strict=True
+        ):
             paths[k] = path
         return paths
 
-    def _over(self, goals: Array, nodes: list[NDArray[np.intp]]) -> list[Array | None]:
-        """Ways over some nodes, for each goal: the shortest segment first among the proven ones."""
+    def _connect_over(self, goals: Array, nodes: list[NDArray[np.intp]]) -> list[Array | None]:
+        """Paths over given nodes, for each goal: proven segments first, then the shortest."""
         if not len(goals):
             return []
-        counts = [len(some) for some in nodes]
+        counts = [len(own) for own in nodes]
         q_a = self.roadmap.q[np.concatenate(nodes)]
         q_b = np.repeat(goals, counts, axis=0)
         screened = self.edges.screen(q_a, q_b)
@@ -258,5 +259,5 @@ class HomeTree:
         return paths
 
     def shortcut(self, path: Array) -> Array:
-        """A way with the same ends that is no longer; see `shorten_path`."""
+        """A free path with the same ends that is no longer; see `shorten_path`."""
         return shorten_path(self.edges, path, self.roadmap.scale)

@@ -32,17 +32,17 @@ class ArmSolutions(Protocol):
     """Finds configurations without regard to collisions.
 
     Attributes:
-        rounds: how many there are.
+        rounds: number of rounds.
     """
 
     rounds: int
 
-    def solve(self, X_AH: Array, turn: int) -> tuple[Indices, Array]:
-        """Configurations that the rounds before this one did not have.
+    def solve(self, X_AH: Array, round_index: int) -> tuple[Indices, Array]:
+        """Configurations that the rounds before this one did not return.
 
         Args:
             X_AH: (N, 4, 4) hand poses.
-            turn: index of the round.
+            round_index: index of the round.
 
         Returns:
             (S,) index of the pose of each configuration, and (S, n) arm positions.
@@ -53,7 +53,7 @@ class ArmSolutions(Protocol):
 def arm_solutions(
     arm: ArmKinematics, *, redundant: tuple[int, ...], limit_margin: float
 ) -> ArmSolutions:
-    """The best way that there is for an arm.
+    """The best solver for an arm: the closed form if it has one, else the numeric search.
 
     Args:
         arm: the arm.
@@ -79,15 +79,15 @@ class ClosedFormSolutions:
             self._values.append(share[near > 1e-9])
         self.rounds = len(redundant)
 
-    def solve(self, X_AH: Array, turn: int) -> tuple[Indices, Array]:
+    def solve(self, X_AH: Array, round_index: int) -> tuple[Indices, Array]:
         """See `ArmSolutions`."""
         lower, upper = self._ik.lower[6], self._ik.upper[6]
-        found = self._ik.solve(X_AH, lower + self._values[turn] * (upper - lower))
+        found = self._ik.solve(X_AH, lower + self._values[round_index] * (upper - lower))
         return found.pose, found.q
 
 
 class NumericSolutions:
-    """Levenberg-Marquardt; what is found depends on the pose alone. See `ArmSolutions`."""
+    """Levenberg-Marquardt; the result depends on the pose alone. See `ArmSolutions`."""
 
     def __init__(
         self,
@@ -103,8 +103,8 @@ class NumericSolutions:
             arm: the arm.
             limit_margin: distance to keep from the joint limits [rad or m].
             starts: postures to start from for each pose, round by round.
-            limited: whether configurations have to be within the joint limits; the postures of the
-                table are in either case.
+            limited: whether configurations have to be within the joint limits; the table's postures
+                always are.
         """
         table_size = 16_384  # Postures among which the starts of numeric searches are chosen.
         lower, upper = arm.lower + limit_margin, arm.upper - limit_margin
@@ -122,9 +122,9 @@ class NumericSolutions:
         self._starts = starts
         self.rounds = len(starts)
 
-    def solve(self, X_AH: Array, turn: int) -> tuple[Indices, Array]:
+    def solve(self, X_AH: Array, round_index: int) -> tuple[Indices, Array]:
         """See `ArmSolutions`."""
-        skip, count = sum(self._starts[:turn]), self._starts[turn]
+        skip, count = sum(self._starts[:round_index]), self._starts[round_index]
         if not len(X_AH):
             return np.empty(0, np.intp), np.empty((0, self._q.shape[1]))
         _, near = self._tree.query(_pose_features(X_AH), k=np.arange(skip + 1, skip + count + 1))
@@ -141,8 +141,8 @@ class NumericSolutions:
 
 
 def _pose_features(X_AH: Array) -> Array:
-    """(N, 12) points whose squared distances are about those of poses, in squared radians: half the
-    squared difference of two rotation matrices is their squared angle, where that is small."""
+    """(N, 12) points whose squared distances approximate those of poses [rad^2]: half the squared
+    difference of two rotation matrices is their squared angle, if that is small."""
     length_scale = 0.3  # Metres that count as much as one radian.
     R = X_AH[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)
     return np.concatenate([X_AH[:, :3, 3] / length_scale, R], axis=1)
@@ -160,14 +160,14 @@ class IkRoutine(Protocol):
 
         Returns:
             For each pose the arm positions (S, n) that meet it, joints from base to hand [rad or
-            m]; S may be 0. Of a redundant arm as many as are worth trying. Whole turns do not
-            matter, and positions beyond the joint limits are told apart here.
+            m]; S may be 0. For a redundant arm, as many as are worth trying. Whole turns do not
+            matter, and positions may be beyond the joint limits.
         """
         ...
 
 
 class RoutineSolutions:
-    """What a routine finds, in one round; see `ArmSolutions`."""
+    """Solutions of the user's IK routine, in one round; see `ArmSolutions`."""
 
     rounds = 1
 
@@ -180,17 +180,17 @@ class RoutineSolutions:
             arm: the arm.
             routine: its inverse kinematics.
             limit_margin: distance to keep from the joint limits [rad or m].
-            limited: whether to leave out what is beyond the limits.
+            limited: whether to leave out positions beyond the limits.
         """
         self._arm, self._routine = arm, routine
         self._lower, self._upper = arm.lower + limit_margin, arm.upper - limit_margin
         self._limited = limited
 
-    def solve(self, X_AH: Array, turn: int) -> tuple[Indices, Array]:
+    def solve(self, X_AH: Array, round_index: int) -> tuple[Indices, Array]:
         """See `ArmSolutions`.
 
         Raises:
-            InvalidInputError: the routine does not return what it should, or its positions do not
+            InvalidInputError: the routine returns arrays of a wrong shape, or its positions do not
                 bring the hand to the poses.
         """
         n = len(self._lower)

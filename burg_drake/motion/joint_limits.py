@@ -54,21 +54,21 @@ class ArmLimits:
     def of(cls, diagram: StationDiagram, kinematics: ArmKinematics) -> ArmLimits:
         """The limits of a station's arm.
 
-        What the station document states counts before what the model does. For an arm that turns
-        as the Panda does, Franka's acceleration and jerk fill in what neither states. Another arm
-        gets to full speed in 0.5 s and to full acceleration in 0.1 s.
+        The station document takes precedence over the model. If neither states acceleration or
+        jerk, an arm with the Panda's kinematics gets Franka's values; another arm gets those that
+        reach full speed in 0.5 s and full acceleration in 0.1 s.
 
         Args:
             diagram: a diagram with the arm.
             kinematics: that arm.
 
         Raises:
-            InvalidInputError: a joint without velocity limit, or a limit that is none.
+            InvalidInputError: a joint has no velocity limit, or a limit is invalid.
         """
         # rad/s^2 and rad/s^3: Franka Control Interface, "Limits for Panda", joint space.
         panda_acceleration = (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0)
         panda_jerk = (7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0)
-        # Seconds to full speed. Careful: industrial arms take half of it or less.
+        # Seconds to full speed. Conservative: industrial arms take half of it or less.
         acceleration_time = 0.5
         jerk_time = 0.1  # Seconds to full acceleration.
         arm = diagram.station.document.arm
@@ -93,7 +93,7 @@ class ArmLimits:
         return cls(lower, upper, velocity, acceleration, jerk, torque)
 
     def slowed(self, speed: float) -> ArmLimits:
-        """For motions at a share `speed` of the arm's, 1 / `speed` times as long."""
+        """Limits that a motion within these keeps once it is stretched in time by 1 / `speed`."""
         return replace(
             self,
             velocity=self.velocity * speed,
@@ -102,8 +102,8 @@ class ArmLimits:
         )
 
     def scaled_down(self, velocity_share: float, ramp: float) -> ArmLimits:
-        """With a share of the velocity, and with jerk that takes `ramp` [s] or more to build up the
-        largest acceleration."""
+        """Limits with a share of the velocity, and with jerk that takes at least `ramp` [s] to
+        build up the largest acceleration."""
         return replace(
             self,
             velocity=self.velocity * velocity_share,
@@ -111,8 +111,8 @@ class ArmLimits:
         )
 
     def time_scale(self, peaks: tuple[Array, Array, Array]) -> float:
-        """By what factor in time a motion with these peaks, (n,) each, has to be stretched to keep
-        within the limits; below 1 for one that could be faster."""
+        """Factor by which a motion with these peaks, (n,) each, has to be stretched in time to keep
+        the limits; below 1 if it could be faster."""
         velocity, acceleration, jerk = peaks
         return float(
             max(
@@ -124,7 +124,7 @@ class ArmLimits:
 
 
 def _velocity_limits_of_model(diagram: StationDiagram) -> Array:
-    """What the model says, which has to say it."""
+    """Velocity limits (n,) of the model; raises an error if a joint has none."""
     joints = diagram.arm_joints
     velocity = np.array([joint.velocity_upper_limits()[0] for joint in joints])
     for joint, limit in zip(joints, velocity, strict=True):

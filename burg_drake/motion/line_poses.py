@@ -20,7 +20,7 @@ from burg_drake.station import GraspMotion
 
 @dataclass(frozen=True, eq=False)
 class LinePoses:
-    """The hand's way, by its length from the grasp: negative on the way there, positive after it.
+    """The hand's path, by its length from the grasp: negative before the grasp, positive after it.
 
     Attributes:
         X_GH: (4, 4) hand body in the grasp frame.
@@ -38,35 +38,35 @@ class LinePoses:
 
     @classmethod
     def of(cls, X_HG: Array, R_WA: Array, motion: GraspMotion) -> LinePoses:
-        """With the whole lift.
+        """The path with the whole lift.
 
         Args:
             X_HG: (4, 4) grasp frame in the hand.
             R_WA: (3, 3) the arm's base in the world.
-            motion: the ways.
+            motion: the straight segments.
         """
         lengths = motion.standoff, motion.retreat, motion.lift_height
         return cls(inverse(X_HG), R_WA.copy(), motion.direction_W, *lengths)
 
     @property
     def layers(self) -> Array:
-        """(L,) lengths at which postures of the arm are looked for, from pregrasp to the top of the
-        lift, at most 5 cm apart; grasp and end of the retreat are among them [m]."""
+        """(L,) path lengths at which postures are computed [m], from pregrasp to the top of the
+        lift, at most 5 cm apart; they include the grasp and the end of the retreat."""
         approach, retreat, lift = map(_layer_distances, (self.standoff, self.retreat, self.lift))
         return np.concatenate([-approach[:0:-1], retreat, self.retreat + lift[1:]])
 
     @property
     def at_grasp(self) -> int:
-        """Which of the layers is the grasp."""
+        """Index of the layer at the grasp."""
         return len(_layer_distances(self.standoff)) - 1
 
     @property
     def at_retreated(self) -> int:
-        """Which of the layers is the end of the retreat, where the lift begins."""
+        """Index of the layer at the end of the retreat, where the lift begins."""
         return self.at_grasp + len(_layer_distances(self.retreat)) - 1
 
     def outcome(self, layer: int) -> Outcome:
-        """What is said of an arm that gets no further than to the layer before this one."""
+        """Outcome of an arm that cannot move from the layer before to this one."""
         if layer <= self.at_grasp:
             return Outcome.APPROACH_LINE
         return Outcome.RETREAT_LINE if layer <= self.at_retreated else Outcome.LIFT_LINE
@@ -94,13 +94,13 @@ class LinePoses:
     def chain(
         self, X_AG: Array, flip: int, rows: DenseRows, own: slice, lower: Array, place: Any
     ) -> Chain:
-        """A chain of some rows.
+        """Makes a chain of its rows.
 
         Args:
             X_AG: (4, 4) grasp in the arm's base frame.
-            flip: which of the two ways to put the fingers it is.
+            flip: finger assignment, 0 or 1.
             rows: of several chains.
-            own: those of this one.
+            own: the rows of this chain.
             lower: lower bounds of the clearance at all rows [m].
             place: see `Chain`.
         """
@@ -111,13 +111,13 @@ class LinePoses:
             q=rows.q[own],
             at_grasp=int(np.searchsorted(layer, self.at_grasp)),
             at_retreated=int(np.searchsorted(layer, self.at_retreated)),
-            moved_W=self.carried(X_AG, length),
+            moved_W=self.target_displacement(X_AG, length),
             lower=lower[own],
             place=place,
         )
 
-    def carried(self, X_AG: Array, distance: Array) -> Array:
-        """How far what the hand holds from the grasp on has been moved in the world.
+    def target_displacement(self, X_AG: Array, distance: Array) -> Array:
+        """Displacement of the grasped target in the world.
 
         Args:
             X_AG: (..., 4, 4) grasps in the arm's base frame.
@@ -133,8 +133,8 @@ class LinePoses:
 
 
 def _layer_distances(length: float) -> Array:
-    """Distances from 0 to `length` [m]; 0 alone if that is 0."""
-    max_spacing = 0.05  # Metres between poses at which postures are looked for.
+    """Distances from 0 to `length` [m]; only 0 if `length` is 0."""
+    max_spacing = 0.05  # Metres between poses at which postures are computed.
     return np.linspace(0.0, length, int(np.ceil(length / max_spacing - 1e-9)) + 1)
 
 
@@ -144,13 +144,13 @@ MAX_JOINT_JUMP = 0.35
 
 @dataclass(frozen=True, eq=False)
 class DenseRows:
-    """Arm positions of m chains, in the order of the chains and their ways.
+    """Arm positions of m chains, ordered by chain, then along the path.
 
     Attributes:
         chain: (K,) indices of the chains.
-        layer: (K,) where a row is between the layers of its chain.
+        layer: (K,) position of a row along its chain, in layers and fractions between them.
         q: (K, n) joint positions [rad].
-        broken: (K,) whether there is none, or one that jumps from the row before.
+        broken: (K,) whether no posture was found, or it jumps from the row before.
     """
 
     chain: Indices
@@ -163,7 +163,7 @@ class DenseRows:
         return slice(*np.searchsorted(self.chain, [chain, chain + 1]))
 
     def replaced(self, chains: Indices, other: DenseRows) -> DenseRows:
-        """With those of some chains, which are numbered from 0 there, in place of the own ones."""
+        """Copy with the rows of `chains` replaced by `other`, which numbers them from 0."""
         kept = ~np.isin(self.chain, chains)
         chain = np.append(self.chain[kept], chains[other.chain])
         order = np.argsort(chain, kind="stable")
@@ -176,13 +176,13 @@ class DenseRows:
 
 
 def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
-    """Fills in rows between the layers of chains.
+    """Fills in rows between the layers of chains until the hand moves straight.
 
     Args:
         every: the chains.
-        at: (R,) where rows are wanted at least, as layers and fractions between them.
-        tolerance: (m,) how far the hand may be beside the straight segment half-way between two
-            rows [m].
+        at: (R,) positions of the first rows, as layers and fractions between them.
+        tolerance: (m,) largest deviation of the hand from the straight segment half-way between
+            two rows [m].
 
     Returns:
         The rows.
@@ -196,7 +196,7 @@ def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
             break
         middle = 0.5 * (layer[first] + layer[first + 1])
         half_way = 0.5 * (q[first] + q[first + 1])
-        # A row half-way is put in where the hand strays; what has been looked at stays as it is.
+        # Where the hand strays, a row is inserted half-way; earlier rows do not change.
         astray = every.deviation(chain[first], middle, half_way) > tolerance[chain[first]]
         if not astray.any():
             break
@@ -217,10 +217,10 @@ class RowFiller(ABC):
     """Finds arm positions between the layers of chains.
 
     Attributes:
-        lines: where the hand goes.
+        lines: the hand's path.
         X_AG: (m, 4, 4) grasps in the arm's base frame.
         corners: (m, L, n) joint positions at the layers [rad].
-        layers: (L,) their lengths from the grasp [m].
+        layers: (L,) path lengths of the layers from the grasp [m].
     """
 
     lines: LinePoses
@@ -230,15 +230,15 @@ class RowFiller(ABC):
 
     @abstractmethod
     def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """The posture at each of K places that is nearest to what lies between the layers, (K, n),
-        and whether there is none that near (K,); what lies between stands in for it then."""
+        """Postures (K, n) nearest to the interpolated ones, and whether none is near enough (K,).
+        In that case the interpolated posture is returned."""
 
     @abstractmethod
     def forward(self, q: Array) -> Array:
         """Poses of the hand body (K, 4, 4) in the arm's base frame."""
 
     def deviation(self, chain: Indices, layer: Array, q: Array) -> Array:
-        """How far the hand is from where it should be (K,) [m]."""
+        """Deviation of the hand from its wanted poses (K,) [m]."""
         lever = 0.2  # Metres from H to the finger tips, whose motion a rotation counts as.
         X, wanted = self.forward(q), self.X_AH(chain, layer)
         p = X[:, :3, 3] - wanted[:, :3, 3]
@@ -246,8 +246,8 @@ class RowFiller(ABC):
         distance = np.sqrt((p * p).sum(axis=1))
         return np.asarray(distance + lever * np.sqrt(0.5 * (R * R).sum(axis=(1, 2))))
 
-    def between(self, chain: Indices, layer: Array) -> Array:
-        """What lies between the layers (K, n)."""
+    def interpolate(self, chain: Indices, layer: Array) -> Array:
+        """Joint positions (K, n), interpolated linearly between the layers."""
         below = np.minimum(layer.astype(np.intp), max(0, self.corners.shape[1] - 2))
         above = np.minimum(below + 1, self.corners.shape[1] - 1)
         share = (layer - below)[:, None]
@@ -263,13 +263,13 @@ class RowFiller(ABC):
 
 @dataclass(frozen=True, eq=False)
 class ClosedFormFiller(RowFiller):
-    """By the inverse kinematics of the Panda."""
+    """Solves with the closed-form inverse kinematics of the Panda."""
 
     ik: PandaIk
 
     def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """See `RowFiller`; the redundant joint has the value between the layers."""
-        expected = self.between(chain, layer)
+        """See `RowFiller`; the redundant joint has the interpolated value."""
+        expected = self.interpolate(chain, layer)
         found = self.ik.solve(self.X_AH(chain, layer), expected[:, -1:])
         q = np.full((len(chain), IK_BRANCHES, expected.shape[1]), np.inf)
         q[found.pose, found.branch] = found.q
@@ -286,14 +286,14 @@ class ClosedFormFiller(RowFiller):
 
 @dataclass(frozen=True, eq=False)
 class NumericFiller(RowFiller):
-    """By steps from what lies between the layers."""
+    """Solves numerically, starting from the interpolated postures."""
 
     arm: ArmKinematics
     settings: ReachSettings
 
     def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
         """See `RowFiller`."""
-        expected = self.between(chain, layer)
+        expected = self.interpolate(chain, layer)
         q, met = solve_ik_near(self.arm, self.X_AH(chain, layer), expected, self.settings)
         broken = ~met | (np.abs(q - expected).max(axis=1) > MAX_JOINT_JUMP)
         return np.where(broken[:, None], expected, q), broken
@@ -306,8 +306,8 @@ class NumericFiller(RowFiller):
 def solve_ik_near(
     arm: ArmKinematics, X_AH: Array, start: Array, settings: ReachSettings
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they meet
-    them (S,)."""
+    """Solves numerically for hand poses (S, 4, 4) from near postures `start`; returns postures
+    (S, n) and whether they meet the poses (S,)."""
     return solve_ik(
         arm,
         X_AH,

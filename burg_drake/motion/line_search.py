@@ -28,13 +28,13 @@ class Chain:
     deviation.
 
     Attributes:
-        flip: which of the two grasps with fingers swapped it is, 0 or 1.
+        flip: finger assignment, 0 or 1.
         q: (M, n) from the pregrasp over the grasp to the top of the lift.
         at_grasp: row of the grasp.
         at_retreated: row at which the retreat ends and the lift begins.
-        moved_W: (M, 3) how far the target has been moved in the world [m]; 0 up to the grasp.
+        moved_W: (M, 3) displacement of the target in the world [m]; 0 up to the grasp.
         lower: (M,) lower bound of the arm's clearance, without the hand [m].
-        place: of the search, to know the chain again.
+        place: the search's own reference to the chain.
     """
 
     flip: int
@@ -53,10 +53,10 @@ class Failure:
     Attributes:
         outcome: `NO_IK`, `JOINT_LIMIT`, `ARM_COLLISION`, `APPROACH_LINE`, `RETREAT_LINE` or
             `LIFT_LINE`.
-        excess: how far the best configuration is beyond the joint limits that are kept [rad or m];
-            NaN where that is not the reason.
-        q: (K, n) configurations that are in the way of it, the nearest to being free first.
-        moved_W: (K, 3) how far the target has been moved there [m].
+        excess: smallest excess of a configuration over the joint limits, including the margin [rad
+            or m]; NaN if that is not the reason.
+        q: (K, n) colliding configurations, the nearest to being free first.
+        moved_W: (K, 3) displacement of the target at these configurations [m].
     """
 
     outcome: Outcome
@@ -66,63 +66,63 @@ class Failure:
 
 
 class LineSearchBatch(Protocol):
-    """The search of a batch of N grasps; what it answers about one depends on no other."""
+    """The search of a batch of N grasps; the results do not depend on each other."""
 
     def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
-        """The most promising chain of each of some grasps among those not refused; None if there
-        is none (left)."""
+        """The most promising chain of each grasp that has not been refused; None if none is
+        left."""
         ...
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
-        """Puts out of the search what keeps a chain from being free.
+        """Excludes a chain, and others that would fail in the same way, from the search.
 
         Args:
             grasp: index of the grasp.
             chain: the chain.
-            row: the row at which, or just before which, the arm is in collision; None if the arm
-                does not get to its pregrasp.
+            row: the row at which, or just before which, the arm is in collision; None if no path
+                leads to the pregrasp posture.
         """
         ...
 
     def close(self, grasp: int, flip: int) -> None:
-        """Leaves one way to put the fingers of a grasp out: the hand itself is in the way of
-        something, and no posture of the arm helps."""
+        """Excludes one finger assignment of a grasp: the hand itself collides, so that no posture
+        of the arm helps."""
         ...
 
     def failure(self, grasp: int) -> Failure:
-        """Why there is no chain (left)."""
+        """Why no chain is left."""
         ...
 
 
 class LineSearch(Protocol):
-    """Looks for chains of an arm in a scene."""
+    """Searches chains of an arm in a scene."""
 
     def lifted(self, height: float) -> LineSearch:
         """The same search with a lift to another height [m]."""
         ...
 
     def begin(self, X_AG: Array, clearance: Array) -> LineSearchBatch:
-        """Begins with a batch.
+        """Begins the search of a batch.
 
         Args:
-            X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with the fingers either way; which of
-                the two comes first does not depend on how a grasp was given.
-            clearance: (N, 2) of the hand on its way with the fingers either way [m]: the hand may
-                deviate from the straight segment by a fraction of it.
+            X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with both finger assignments. Their
+                order does not depend on how a grasp was given.
+            clearance: (N, 2) of the hand on its path [m]; it may deviate from the straight segment
+                by a fraction of the clearance.
         """
         ...
 
 
 RETRIED_OUTCOMES = (Outcome.APPROACH_LINE, Outcome.RETREAT_LINE, Outcome.LIFT_LINE)
-"""Outcomes after which the second search is asked, in order of progress."""
+"""Outcomes after which the second search is tried, in order of progress."""
 
 
 class SuccessiveLineSearch:
-    """Looks for chains by two searches; see `LineSearch`.
+    """Tries a second search where the first one fails; see `LineSearch`.
 
     Args:
-        first: the search that is asked about every grasp.
-        second: makes the other one, once it is needed.
+        first: the search for every grasp.
+        second: makes the second search once it is needed.
     """
 
     def __init__(self, first: LineSearch, second: Callable[[], LineSearch]) -> None:
@@ -130,7 +130,7 @@ class SuccessiveLineSearch:
 
     @cached_property
     def second(self) -> LineSearch:
-        """The other search."""
+        """The second search."""
         return self._make()
 
     def lifted(self, height: float) -> SuccessiveLineSearch:
@@ -182,7 +182,7 @@ class _SuccessiveBatch:
         lines.close(number, flip)
 
     def failure(self, grasp: int) -> Failure:
-        """See `LineSearchBatch`: what the search says that got farther, or else has more to say."""
+        """See `LineSearchBatch`; the failure of the search that got farther or explains more."""
         first = self._failed[grasp] if grasp in self._failed else self._first.failure(grasp)
         if grasp not in self._again:
             return first
@@ -191,7 +191,7 @@ class _SuccessiveBatch:
         return max(first, second, key=_failure_rank)
 
     def _switch_search(self, grasps: Sequence[int]) -> None:
-        """Leaves grasps to the second search where that may help."""
+        """Hands grasps over to the second search where it may succeed."""
         if not grasps:
             return
         self._failed |= {g: self._first.failure(g) for g in grasps}
@@ -206,6 +206,6 @@ class _SuccessiveBatch:
 
 
 def _failure_rank(failure: Failure) -> tuple[int, bool]:
-    """How far a search got, and whether it says why it got no farther."""
+    """Sort key: how far a search got, and whether it explains the failure."""
     far = RETRIED_OUTCOMES.index(failure.outcome) if failure.outcome in RETRIED_OUTCOMES else -1
     return far, bool(len(failure.q)) or bool(np.isfinite(failure.excess))

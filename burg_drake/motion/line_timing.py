@@ -27,13 +27,13 @@ from burg_drake.motion.polyline_timing import (
 
 @dataclass(frozen=True, eq=False)
 class LinePath:
-    """A straight segment of the hand's path, with an arm that does not go straight in joint space.
+    """A straight segment of the hand's path, given by arm positions.
 
     Attributes:
         rows: (K, n) joint positions along it.
-        X_AH: (K, 4, 4) hand poses there.
-        travel: (K,) rising: how far the hand is from the first row [m].
-        kinematics: the arm, with limits that leave the margin, or reach to the rows.
+        X_AH: (K, 4, 4) hand poses at the rows.
+        travel: (K,) path length of the hand from the first row [m].
+        kinematics: the arm; its limits include the margin, but never exclude a row.
     """
 
     rows: Array
@@ -43,7 +43,7 @@ class LinePath:
 
     @classmethod
     def of(cls, rows: Array, kinematics: ArmKinematics, limit_margin: float = 0.0) -> LinePath:
-        """Through the rows (K, n), with a distance to keep from the joints' limits [rad or m]."""
+        """The segment through the rows (K, n), with a margin to the joint limits [rad or m]."""
         kinematics = replace(
             kinematics,
             lower=np.minimum(kinematics.lower + limit_margin, rows.min(axis=0)),
@@ -55,18 +55,19 @@ class LinePath:
 
     @property
     def length(self) -> float:
-        """The hand's way [m]."""
+        """Path length of the hand [m]."""
         return float(self.travel[-1])
 
     def paths(self, smoother: bool) -> Iterator[CubicSpline]:
-        """Joint positions by the path length of the hand [m]: first a spline that is close to the
-        rows; then, if they are wanted, smoother and smoother ones; last one that is closer to the
-        line.
+        """Splines of joint positions over the path length of the hand [m].
+
+        First one close to the rows; then, if `smoother`, increasingly smooth ones; last one that is
+        closer to the line.
         """
         max_spacing = 0.01  # Metres between knots of the spline.
-        # Metres, where the hand would be too far from the line between knots.
+        # Metres between knots of the last spline, which is closer to the line.
         fine_spacing = 0.0025
-        # Of the knots' second differences: bent over 3 knots, 10, or all.
+        # Weights of the knots' second differences: they smooth over 3 knots, 10, or all.
         smoothing_weights = (1e2, 1e4, np.inf)
         weights = (0.0, *smoothing_weights) if smoother else (0.0,)
         for spacing, weight in (*((max_spacing, w) for w in weights), (fine_spacing, 0.0)):
@@ -75,7 +76,7 @@ class LinePath:
                 yield path
 
     def _path(self, spacing: float, weight: float) -> CubicSpline | None:
-        """A spline with its knots on the line; None if the arm does not get there."""
+        """A spline with its knots on the line; None if the arm does not reach a knot."""
         count = max(4, int(np.ceil(self.length / spacing))) + 1
         share = np.linspace(0.0, 1.0, count)[:, None]
         travel = share[:, 0] * self.length
@@ -95,13 +96,13 @@ class LinePath:
     def is_good(
         self, path: CubicSpline, straightness: float, deviation: float, is_free: IsFree | None
     ) -> bool:
-        """Whether a path keeps to the joint limits, the line of the hand, and what is free.
+        """Whether a path keeps the joint limits, the hand's line, and is free.
 
         Args:
             path: one of `paths`.
-            straightness: farthest from the straight line [m].
-            deviation: farthest from the rows' polyline [rad], if there is no check.
-            is_free: the check, or None.
+            straightness: largest distance from the straight line [m].
+            deviation: largest distance from the rows' polyline if `is_free` is None [rad].
+            is_free: the collision check, or None.
         """
         low, high = spline_extremes(path)
         if (low < self.kinematics.lower).any() or (high > self.kinematics.upper).any():
@@ -116,8 +117,8 @@ class LinePath:
 
 
 def _smooth_offsets(offset: Array, weight: float) -> Array:
-    """(count, n) points between two fixed ones at 0, with less of second differences: least
-    squares, by a matrix with two diagonals to either side."""
+    """Smooths offsets (count, n) between two fixed points at 0 by least squares with weighted
+    second differences (a pentadiagonal matrix)."""
     if weight == 0.0:
         return offset
     count = len(offset)
@@ -128,7 +129,7 @@ def _smooth_offsets(offset: Array, weight: float) -> Array:
 
 
 def spline_extremes(path: CubicSpline) -> tuple[Array, Array]:
-    """(n,) smallest and (n,) largest values of n splines: at knots, or where a cubic turns."""
+    """(n,) smallest and (n,) largest values of n splines, at knots or extrema of the cubics."""
     a, b, c, d = path.c
     with np.errstate(all="ignore"):
         s = -b - np.copysign(np.sqrt(b * b - 3.0 * a * c), b)
@@ -140,8 +141,8 @@ def spline_extremes(path: CubicSpline) -> tuple[Array, Array]:
 
 
 def line_error(X_AH: Array, X_A0: Array, X_A1: Array) -> float:
-    """Largest distance of hand poses (N, 4, 4) from the straight line between two poses [m]; a turn
-    away from the first counts with a lever of 10 cm."""
+    """Largest distance of hand poses (N, 4, 4) from the straight line between two poses [m]; a
+    rotation away from the first pose counts with a lever of 10 cm."""
     lever = 0.1  # Metres from the hand at which its rotation counts as a deviation.
     segment = X_A1[:3, 3] - X_A0[:3, 3]
     offset = X_AH[:, :3, 3] - X_A0[:3, 3]
@@ -158,7 +159,7 @@ class HandSpeed:
     Attributes:
         speed: [m/s].
         acceleration: [m/s^2].
-        ramp: time to build it up [s].
+        ramp: time to build up the acceleration [s].
     """
 
     speed: float
@@ -166,7 +167,7 @@ class HandSpeed:
     ramp: float
 
     def over(self, length: float, share: float = 1.0) -> Cubics:
-        """The way (n = 1) over time along a line [m], with a share of the speed."""
+        """Path length (n = 1) over time along a line of `length` [m], at a share of the speed."""
         acceleration = self.acceleration / length
         profile = DoubleS.of(share * self.speed / length, acceleration, acceleration / self.ramp)
         return profile.over(np.array([length]))
@@ -177,8 +178,8 @@ class PathMotion:
     """A motion along a path that is given by the path length of the hand.
 
     Attributes:
-        path: joint positions (n,) over the way [m], with continuous second derivatives.
-        profile: the way over time, n = 1.
+        path: joint positions (n,) over path length [m], with continuous second derivatives.
+        profile: path length over time, n = 1.
     """
 
     path: CubicSpline
@@ -190,7 +191,7 @@ class PathMotion:
         return self.profile.duration
 
     def time_scaled(self, factor: float) -> PathMotion:
-        """The same way in `factor` times the time."""
+        """The same path in `factor` times the time."""
         return PathMotion(self.path, self.profile.time_scaled(factor))
 
     def at(self, time: Array) -> tuple[Array, Array, Array, Array]:
@@ -217,13 +218,12 @@ def time_line(
     is_free: IsFree | None = None,
     limit_margin: float = 0.0,
 ) -> PathMotion | Cubics:
-    """Moves along a line, at rest at both ends.
+    """Times a motion along a line, at rest at both ends.
 
-    The path is a cubic spline close to the rows, with the hand on the line. Where the joints cannot
-    follow the hand's speed along it, and a check is given, smoother ones are tried; where the hand
-    is not straight enough between the spline's knots, one with more of them. Then the hand is
-    slowed down. Where no spline will do, the arm follows the polyline of the rows, which may mean
-    stops.
+    The path is a cubic spline close to the rows, with the hand on the line. If the joints cannot
+    follow the hand's speed, smoother splines are tried (only with a check); if the hand deviates
+    too far between the knots, a spline with more knots. Then the hand is slowed down. If no spline
+    is good enough, the arm follows the polyline of the rows, which may mean stops.
 
     Args:
         rows: (K, n) joint positions at waypoints of the line.
@@ -231,14 +231,14 @@ def time_line(
         limits: of its joints.
         hand: limits of the hand.
         settings: tolerances.
-        is_free: the check of all but the polyline of the rows.
-        limit_margin: distance to keep from the joints' limits [rad or m], where the rows do.
+        is_free: the collision check of everything but the polyline of the rows.
+        limit_margin: distance to keep from the joint limits [rad or m], if the rows keep it.
     """
     line = LinePath.of(rows, kinematics, limit_margin)
     if line.length > 0.0:
         slow: list[PathMotion] = []
         for path in line.paths(smoother=is_free is not None):
-            # Peaks are looked for at every fourth sample of a plan.
+            # Peaks are evaluated at every fourth sample of a plan.
             motion, full = _fastest_line_motion(path, hand, limits, settings.rate / 4)
             if not full:
                 slow.append(motion)
@@ -248,7 +248,7 @@ def time_line(
             if line.is_good(motion.path, settings.straightness, settings.line_deviation, is_free):
                 return motion
     least = np.diff(line.travel) / max(hand.speed, np.finfo(float).tiny)
-    # Where no smooth path will do, corners are cut by 0.002 rad.
+    # Without a good smooth path, corners are cut by 0.002 rad.
     return time_polyline(rows, limits, deviation=0.002, is_free=is_free, least=least)
 
 

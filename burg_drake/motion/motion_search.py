@@ -1,6 +1,6 @@
 """The search for motions of a batch of grasps: chains are proposed, checked, and joined to home.
 
-If no chain remains, what Drake's collision checker found tells why.
+If no chain remains, the verdict names what Drake's collision checker found.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ PROGRESS_ORDER = (
     Outcome.RETREAT_LINE,
     Outcome.LIFT_LINE,
 )
-"""Outcomes by how far a motion got."""
+"""Outcomes in order of progress."""
 
 
 @dataclass(frozen=True, eq=False)
 class GraspBatch:
-    """Grasps whose hand is free on its way.
+    """Grasps with a free hand path for at least one finger assignment.
 
     Attributes:
         instance: N names of the targets; "" without one.
-        X_WG: (N, 2, 4, 4) grasps in the world with their fingers either way.
+        X_WG: (N, 2, 4, 4) grasps in the world with both finger assignments.
         width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
-        clearance: (N, 2) of the hand on its way [m]; negative where it is not free.
+        clearance: (N, 2) of the hand on its path [m]; negative where it is not free.
     """
 
     instance: Sequence[str]
@@ -50,8 +50,8 @@ class Refusal:
     """A row of a chain that Drake has refused.
 
     Attributes:
-        outcome: one of `PROGRESS_ORDER`: what is said if the search ends here.
-        overlap: the deepest one there; None if what collides lies just before the row.
+        outcome: one of `PROGRESS_ORDER`, the verdict if the search ends here.
+        overlap: the deepest overlap at the row; None if the collision lies just before it.
     """
 
     outcome: Outcome
@@ -59,19 +59,19 @@ class Refusal:
 
     @property
     def rank(self) -> tuple[int, float]:
-        """How near to a motion it was: how far it got, and how little was in the way."""
+        """Sort key: how far the chain got, then how small the overlap is."""
         depth = np.inf if self.overlap is None else self.overlap.depth
         return PROGRESS_ORDER.index(self.outcome), -depth
 
 
 class MotionSearch:
-    """Looks for motions.
+    """Searches arm motions for a batch of grasps.
 
     Args:
         task: the grasps.
         lines: the search for chains of these grasps.
         tree: paths from home.
-        settings: when to give a grasp up.
+        settings: limits of the search.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class MotionSearch:
             lines.close(int(grasp), int(flip))
 
     def run(self) -> list[Reach]:
-        """The verdicts."""
+        """Returns the N verdicts."""
         found: dict[int, Reach] = {}
         left = list(range(len(self._task.instance)))
         while left:
@@ -101,12 +101,12 @@ class MotionSearch:
         return [found[grasp] for grasp in range(len(self._task.instance))]
 
     def _is_exhausted(self, grasp: int) -> bool:
-        """Whether so much has been tried that no more is."""
+        """Whether a grasp has used up its attempts."""
         refused = self._refused[grasp] >= self._settings.chains
         return bool(refused or self._unconnected[grasp] >= self._settings.starts_tried)
 
     def _unblocked(self, chains: dict[int, Chain]) -> dict[int, Chain]:
-        """The chains that are free; the others are refused."""
+        """Returns the free chains and refuses the others."""
         blocked = {grasp: self._doubtful_blocked(grasp, chain) for grasp, chain in chains.items()}
         for lift in (False, True):
             left = {grasp: chains[grasp] for grasp in chains if blocked[grasp] is None}
@@ -117,8 +117,8 @@ class MotionSearch:
         return {grasp: chain for grasp, chain in chains.items() if blocked[grasp] is None}
 
     def _doubtful_blocked(self, grasp: int, chain: Chain) -> int | None:
-        """Row at which the arm collides, among those whose clearance is not known to be positive:
-        what fails, fails soonest there."""
+        """Row at which the arm collides, among those with no positive lower bound of the clearance:
+        they are the most likely to fail."""
         if not self._settings.exact:
             return None
         doubtful = np.flatnonzero(chain.lower <= 0.0)
@@ -131,15 +131,16 @@ class MotionSearch:
         return None
 
     def _load(self, grasp: int, moved_W: Array) -> tuple[str | None, ArrayLike, float]:
-        """What the hand carries once it has moved the target by (3,) [m], how far that has been
-        moved, and its width [m]."""
+        """Carried instance, its displacement (3,) [m] and width [m] for a target displacement of
+        `moved_W`; nothing is carried at 0."""
         held = bool(moved_W.any())
         name = self._task.instance[grasp] if held else ""
         width = float(self._task.width[grasp]) if held else np.nan
         return (name, moved_W, width) if name else (None, NO_DISPLACEMENT, width)
 
     def _first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
-        """Rows at, or just before, which the arm collides on the approach, or on the lift."""
+        """First row of each chain at, or just before, which the arm collides: on the approach, or
+        after the grasp if `lift`."""
         rows = {
             grasp: slice(chain.at_grasp, len(chain.q)) if lift else slice(0, chain.at_grasp + 1)
             for grasp, chain in chains.items()
@@ -158,8 +159,8 @@ class MotionSearch:
         }
 
     def _refuse(self, grasp: int, chain: Chain, row: int) -> None:
-        """Puts a chain out; where what collides is rigid with the hand, no other posture helps,
-        and all of this way to put the fingers goes with it."""
+        """Excludes a chain. If the colliding link is rigid with the hand, no other posture helps,
+        and the whole finger assignment is excluded."""
         self._refused[grasp] += 1
         carried, moved_W, width = self._load(grasp, chain.moved_W[row])
         overlaps = self._collision.overlaps(
@@ -179,7 +180,7 @@ class MotionSearch:
             self._nearest[grasp] = refusal
 
     def _reached(self, chains: dict[int, Chain]) -> dict[int, Reach]:
-        """A yes for each of the free chains that a path leads to; the others are refused."""
+        """Verdicts for the free chains that a path from home leads to; refuses the others."""
         if not chains:
             return {}
         transfers = self._tree.connect(np.array([c.q[0] for c in chains.values()]))
@@ -204,7 +205,7 @@ class MotionSearch:
         return found
 
     def _refused_reach(self, grasp: int) -> Reach:
-        """Why there is no motion: what kept the best attempt from being one."""
+        """Verdict on a grasp without a motion: the failure of the best attempt."""
         if self._unconnected[grasp]:
             return Reach(Outcome.NO_PATH)
         failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
@@ -216,7 +217,8 @@ class MotionSearch:
         return _reach_blocked_by(failure.outcome, least)
 
     def _least_overlapping(self, grasp: int, failure: Failure) -> Overlap | None:
-        """What is in the way, of the configuration where that is least."""
+        """Deepest overlap at the failure's configuration where it is smallest; None if all are
+        free."""
         least: Overlap | None = None
         for q, place in zip(failure.q, failure.moved_W, strict=True):
             carried, moved_W, width = self._load(grasp, place)

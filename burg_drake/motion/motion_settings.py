@@ -10,29 +10,29 @@ from burg_drake.station import GraspMotion
 
 @dataclass(frozen=True, kw_only=True)
 class ReachSettings:
-    """How thoroughly to look for arm configurations.
+    """Effort and tolerances of the search for arm motions.
 
     Attributes:
-        motion: the hand's straight segments to a grasp and away from it; those that the station
-            states if None.
-        exact: whether Drake's collision checker has the last word on every motion; without it, for
-            screening, the best guess of bounds of the arm's clearance decides.
+        motion: the hand's straight segments to a grasp and away from it; those of the station if
+            None.
+        exact: whether Drake's collision checker confirms every motion. False, for screening: the
+            best guess from bounds of the arm's clearance decides.
         closed_form: whether to use the closed form for arms that have one, the Panda.
-        redundant: values of the redundant joint that the closed form sweeps, round by round; a
-            next round is made if the one before found nothing.
-        starts: likewise, postures that the numeric inverse kinematics of other arms starts from,
-            for each way to put the fingers.
-        iterations: most steps from a start.
+        redundant: number of values of the redundant joint that the closed form sweeps in each
+            round. A round is run only if the one before found nothing.
+        starts: number of start postures of the numeric inverse kinematics of other arms in each
+            round, for each finger assignment.
+        iterations: largest number of steps from a start.
         tolerance: largest error of a solution [m and rad].
         limit_margin: distance to keep from the joint limits [rad].
-        joint_travel: most that a joint may move while the hand moves by 5 cm [rad]; with more, the
-            two postures lie on different branches, and the hand could not go straight from one to
-            the other.
-        deviation: the hand may be beside the straight segment by half of its clearance, but by no
-            less and no more than these two [m].
-        chains: so many motions of a grasp may be refused by the collision checker before it is
-            given up ...
-        starts_tried: ... and so many of its pregrasp postures that the arm does not get to.
+        joint_travel: largest motion of a joint while the hand moves by 5 cm [rad]. Beyond it, the
+            two postures count as different branches, between which the hand cannot move straight.
+        deviation: the hand may deviate from the straight segment by half of its clearance, clipped
+            to these two bounds [m].
+        chains: number of motions of a grasp that the collision checker refuses before the grasp is
+            given up.
+        starts_tried: number of its pregrasp postures without a path from home before it is given
+            up.
     """
 
     motion: GraspMotion | None = None
@@ -67,29 +67,29 @@ class ReachSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class TimingSettings:
-    """How fast to move, and how close to the path.
+    """Speeds of the arm, and tolerances of its path.
 
-    The lift accelerates and brakes the hand as the trial of the hand alone does.
+    The lift accelerates and brakes the hand as in the trial of the hand alone.
 
     Attributes:
         speed: share of the speed that the limits allow, above 0, at most 1: the same motion in
             1 / speed times the time.
-        velocity_share: share of the joints' velocity limits to use, at most 1. libfranka keeps what
-            three lost packets may cost, up to 2.3 % (`rate_limiting.h`, kTolNumberPacketsLost).
+        velocity_share: share of the joints' velocity limits to use, at most 1. libfranka reserves
+            up to 2.3 % for three lost packets (`rate_limiting.h`, kTolNumberPacketsLost).
         rate: samples per second of time.
-        ramp: least time in which a joint builds up its largest acceleration [s]. Franka's limits
-            of jerk alone would allow 2 ms; but torques may change by 1000 Nm/s only, for which
+        ramp: shortest time in which a joint builds up its largest acceleration [s]. Franka's jerk
+            limits alone would allow 2 ms, but torques may change by at most 1000 Nm/s, for which
             transfers need about 30 ms (`benchmarks/timing.py`).
         corner_deviation: how far the transfer may cut a corner [rad].
         line_deviation: how far approach and lift may leave the joint path between two of its
             waypoints without a new check [rad].
-        straightness: how far the hand may leave a straight line on approach, retreat and lift
-            [m], and no farther than half of its clearance there.
+        straightness: how far the hand may leave a straight line on approach, retreat and lift [m];
+            at most half of its clearance there.
         approach_speed, approach_acceleration: of the hand [m/s, m/s^2].
         lift_time: time in which the hand rises by 0.30 m with full acceleration in the first half
-            and full braking in the second one [s]; the ramps come on top. Another height has the
-            same acceleration, so that its time grows like the square root; the retreat has no more,
-            and the speed of the approach.
+            and full braking in the second one [s], without the ramps. Other heights have the same
+            acceleration, so that the time grows with the square root of the height. The retreat has
+            at most this acceleration, and the speed of the approach.
     """
 
     speed: float = 1.0

@@ -94,16 +94,15 @@ class ArmKinematics:
         return replace(self, lower=-infinite, upper=infinite)
 
     def one_revolution_around(self, posture: Array, margin: float) -> tuple[Array, Array]:
-        """Limits for planning.
+        """Joint limits for planning, in which each hand pose occurs about once.
 
         Args:
             posture: (n,) joint positions.
             margin: distance to keep from the joint limits [rad or m].
 
         Returns:
-            (n,) least and (n,) largest positions: the joint limits, but for joints that turn by a
-            whole turn or more, no farther from `posture` than somewhat more than half a turn, as
-            what is beyond is there a second time.
+            (n,) smallest and (n,) largest positions: the joint limits. Revolute joints with a range
+            of a whole turn or more are limited to slightly more than half a turn from `posture`.
         """
         # Radians from home. Straight segments need a little more than half a turn.
         max_turn = np.pi + 0.5
@@ -120,8 +119,8 @@ class ArmKinematics:
             posture: (n,) joint positions within the limits.
 
         Returns:
-            (N, n) the same hand poses with each joint within its limits where that is possible, and
-            as near to `posture` as it is then.
+            (N, n) positions with the same hand poses, each joint within its limits if possible, and
+            then as near to `posture` as possible.
         """
         turn = 2.0 * np.pi
         near = posture + (q - posture + np.pi) % turn - np.pi
@@ -131,7 +130,7 @@ class ArmKinematics:
 
     @cached_property
     def _generators(self) -> tuple[Array, Array, Array]:
-        """(n, 4, 4) factors of sin(q), 1 - cos(q) and q in the joints' exponentials."""
+        """(n, 4, 4) matrices that multiply sin(q), 1 - cos(q) and q in the joint exponentials."""
         sine, cosine, linear = np.zeros((3, len(self.turns), 4, 4))
         S = np.cross(np.eye(3), self.axis[:, None, :] * self.turns[:, None, None])
         for block, rotation in ((sine, S), (cosine, S @ S)):
@@ -179,13 +178,13 @@ def solve_ik(
     tolerance: float,
     margin: float = 0.0,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Moves every start towards its goal, always within the joint limits.
+    """Iterates every start towards its goal within the joint limits.
 
     Args:
         arm: the arm.
         X_AH: (N, 4, 4) wanted hand poses.
         start: (N, n) joint positions to start at.
-        iterations: most steps to take.
+        iterations: largest number of steps.
         tolerance: a goal counts as met below this position [m] and rotation [rad] error.
         margin: distance to keep from the joint limits [rad or m].
 
@@ -197,7 +196,7 @@ def solve_ik(
     lower, upper = arm.lower + margin, arm.upper - margin
     found = np.clip(start, lower, upper)
     met = np.zeros(len(found), dtype=bool)
-    left = np.arange(len(found))  # whoever has arrived stays there, whatever the others do
+    left = np.arange(len(found))  # solved rows are frozen, so that batches do not matter
     q = found.copy()
     for step in range(iterations + 1):
         error, J = _pose_error(arm, X_AH[left], q)
@@ -215,7 +214,7 @@ def solve_ik(
 
 
 def _pose_error(arm: ArmKinematics, X_AH: Array, q: Array) -> tuple[Array, Array]:
-    """(N, 6) rotation vector [rad] and translation [m] left to go, and the Jacobians at q."""
+    """(N, 6) remaining rotation vector [rad] and translation [m], and the Jacobians at q."""
     X, J = arm.forward(q)
     error = np.empty((len(q), 6))
     error[:, :3] = rotation_vector(X_AH[:, :3, :3] @ X[:, :3, :3].swapaxes(-1, -2))
@@ -224,8 +223,8 @@ def _pose_error(arm: ArmKinematics, X_AH: Array, q: Array) -> tuple[Array, Array
 
 
 def rotation_vector(R: Array) -> Array:
-    """(N, 3, 3) rotations -> (N, 3) axis times angle [rad]. At half a turn, where this formula
-    loses the axis, it takes x; that serves a search step."""
+    """(N, 3, 3) rotations -> (N, 3) axis times angle [rad]. At half a turn, where the formula does
+    not determine the axis, it takes x, which is good enough for a search step."""
     v = 0.5 * np.stack(
         [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=-1
     )

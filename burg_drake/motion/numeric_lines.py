@@ -32,19 +32,19 @@ from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.posture_grid import START_COST, decisive_clearance
 
 GRASP, APPROACH, RETREAT, LIFT, COMPLETE_CHAIN = range(5)
-"""Where a candidate ended: at the grasp, on the way there, back, or up, or not at all."""
+"""Stage at which a candidate failed: grasp, approach, retreat or lift; the last: not at all."""
 
 
 @dataclass(eq=False)
 class ChainCandidates:
-    """C postures at a grasp, each with its continuation at L poses of the way.
+    """C postures at a grasp, each with its continuation at L poses of the path.
 
     Attributes:
-        flip: (C,) which of the two ways to put the fingers.
-        q: (C, L, n) arm positions; NaN where the continuation has not got to.
-        stage: (C,) where it ended.
-        cost: (C,) of those that have not ended.
-        open: (C,) whether it may still be proposed.
+        flip: (C,) finger assignment, 0 or 1.
+        q: (C, L, n) arm positions; NaN beyond the end of the continuation.
+        stage: (C,) stage at which the candidate failed.
+        cost: (C,) cost of complete chains; infinite for others.
+        open: (C,) whether the candidate may still be proposed.
     """
 
     flip: Indices
@@ -56,8 +56,8 @@ class ChainCandidates:
     _closed: set[int] = field(default_factory=set)
 
     @classmethod
-    def none(cls, poses: int, joints: int) -> Self:
-        """Of a grasp of which nothing is known yet."""
+    def empty(cls, poses: int, joints: int) -> Self:
+        """No candidates yet."""
         index = np.empty(0, np.intp)
         return cls(index, np.empty((0, poses, joints)), index, np.empty(0), np.empty(0, dtype=bool))
 
@@ -65,15 +65,15 @@ class ChainCandidates:
         return len(self.flip)
 
     def add(self, flip: Indices, q: Array, pose: int) -> Indices:
-        """Adds postures at one of the poses, without those that are there already.
+        """Adds postures at one of the poses, without duplicates.
 
         Args:
-            flip: (S,) which way to put the fingers.
+            flip: (S,) finger assignments.
             q: (S, n) arm positions.
             pose: index of the pose.
 
         Returns:
-            Indices of what is new.
+            Indices of the new candidates.
         """
         first = len(self)
         if not len(q):
@@ -94,29 +94,29 @@ class ChainCandidates:
         return np.arange(first, first + count)
 
     def complete(self, k: int, q: Array, cost: float) -> None:
-        """Takes the continuation (L, n) of a candidate over, which may be proposed from now on."""
+        """Stores the complete chain (L, n) of a candidate and opens it for proposal."""
         self.q[k], self.cost[k], self.stage[k] = q, cost, COMPLETE_CHAIN
         self.open[k] = self.flip[k] not in self._closed
 
     def stop(self, k: int, stage: int) -> None:
-        """A candidate ends at a stage, as its continuation does not exist."""
+        """Ends a candidate at a stage at which it has no continuation."""
         self.stage[k], self.open[k] = stage, False
 
     def block(self, k: int, stage: int, q: Array, moved_W: Array, upper: float) -> None:
-        """A candidate ends at a stage, as it is in collision there.
+        """Ends a candidate at a stage at which it collides.
 
         Args:
             k: its index.
-            stage: where it ends.
-            q: (n,) the arm positions in collision.
-            moved_W: (3,) how far the target has been moved there [m].
-            upper: bound of the clearance there [m].
+            stage: the stage.
+            q: (n,) the colliding arm positions.
+            moved_W: (3,) displacement of the target there [m].
+            upper: upper bound of the clearance there [m].
         """
         self.stop(k, stage)
         self._blocked.append((stage, upper, q.copy(), moved_W))
 
     def close(self, flip: int) -> None:
-        """Proposes nothing any more with the fingers in one way."""
+        """Closes all candidates of one finger assignment, including future ones."""
         self._closed.add(flip)
         self.open[self.flip == flip] = False
 
@@ -126,8 +126,8 @@ class ChainCandidates:
         return int(which[self.cost[which].argmin()]) if len(which) else None
 
     def blocking(self, stage: int, count: int) -> tuple[Array, Array]:
-        """Arm positions (K, n) in collision at a stage, the nearest to being free first, and how
-        far the target has been moved there (K, 3) [m]; K is at most `count`."""
+        """Arm positions (K, n) in collision at a stage, the nearest to being free first, and the
+        displacements of the target there (K, 3) [m]; K is at most `count`."""
         of = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]
         q = np.array([b[2] for b in of]).reshape(len(of), self.q.shape[-1])
         return q, np.array([b[3] for b in of]).reshape(len(of), 3)
@@ -135,12 +135,12 @@ class ChainCandidates:
 
 @dataclass(frozen=True, eq=False)
 class FollowedPostures:
-    """S postures at grasps, and what became of them at L poses of the way.
+    """S postures at grasps, followed along L poses of the path.
 
     Attributes:
-        q: (S, L, n) arm positions; NaN where they have not got to.
+        q: (S, L, n) arm positions; NaN beyond the end of a chain.
         lower, upper: (S, L) bounds of the clearance [m]; infinite where not measured.
-        stage: (S,) where they ended, `COMPLETE_CHAIN` if they did not.
+        stage: (S,) stage at which a posture failed, or `COMPLETE_CHAIN`.
     """
 
     q: Array
@@ -148,8 +148,8 @@ class FollowedPostures:
     upper: Array
     stage: Indices
 
-    def blocked(self, s: int) -> int | None:
-        """The pose at which a posture is deepest in collision; None if it is nowhere."""
+    def blocked_pose(self, s: int) -> int | None:
+        """Index of the pose at which posture `s` is deepest in collision; None if it is free."""
         worst = int(self.upper[s].argmin())
         return None if self.upper[s, worst] > 0.0 else worst
 
@@ -163,16 +163,16 @@ SEGMENT_STAGES = (
 
 
 class NumericLineSearch:
-    """Looks for chains of a serial arm in a scene.
+    """Searches chains of a serial arm in a scene.
 
     Args:
         arm: the arm on its own.
-        lines: where the hand goes.
+        lines: the hand's path.
         proximity: bounds of the arm's clearance.
         home: (n,) home posture; chains that start near it are preferred [rad].
-        settings: how thoroughly to look.
-        solutions: finds postures at hand poses, within the joint limits; numerically if None.
-        beyond: likewise, without regard to the limits.
+        settings: effort of the search.
+        solutions: solves for postures within the joint limits; numerically if None.
+        unlimited_solutions: solves for postures without the joint limits; numerically if None.
     """
 
     def __init__(
@@ -184,13 +184,15 @@ class NumericLineSearch:
         settings: ReachSettings,
         *,
         solutions: ArmSolutions | None = None,
-        beyond: ArmSolutions | None = None,
+        unlimited_solutions: ArmSolutions | None = None,
     ) -> None:
         self.arm, self.lines, self.proximity = arm, lines, proximity
         self.home, self.settings = home, settings
         margin, starts = settings.limit_margin, settings.starts
         self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
-        self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
+        self.unlimited_solutions = unlimited_solutions or NumericSolutions(
+            arm, margin, starts=starts[:1], limited=False
+        )
         self.layers, self.at_grasp = lines.layers, lines.at_grasp
 
     def lifted(self, height: float) -> NumericLineSearch:
@@ -202,7 +204,7 @@ class NumericLineSearch:
             self.home,
             self.settings,
             solutions=self.solutions,
-            beyond=self.beyond,
+            unlimited_solutions=self.unlimited_solutions,
         )
 
     def begin(self, X_AG: Array, clearance: Array) -> _NumericBatch:
@@ -210,14 +212,14 @@ class NumericLineSearch:
         return _NumericBatch(self, X_AG, clearance)
 
     def measure(self, q: Array) -> tuple[Array, Array]:
-        """Clearances of postures (S, n): lower bounds, and what has to be positive for a posture to
-        count (S,) [m]: the upper bound where the last word is Drake's, else the best guess."""
+        """Lower bounds of the clearance of postures (S, n), and their decisive clearance (S,) [m];
+        see `decisive_clearance`."""
         bounds = self.proximity.bounds(q, hand=False)
         return bounds.lower, decisive_clearance(bounds, self.settings.exact)
 
     def follow(self, X_AG: Array, q: Array) -> FollowedPostures:
-        """Follows postures from the grasp to the pregrasp; then, from the grasp, back and up to
-        the top. Those in collision on the way are not followed any further.
+        """Follows postures from the grasp to the pregrasp, and from the grasp along retreat and
+        lift. Postures that collide on a segment are not followed any further.
 
         Args:
             X_AG: (S, 4, 4) grasps in the arm's base frame.
@@ -245,7 +247,8 @@ class NumericLineSearch:
     def _step(
         self, found: FollowedPostures, X_AG: Array, pose: int, step: int, stage: int, *, bent: bool
     ) -> None:
-        """To the next pose, on from the last two; from the last one alone where the way is bent."""
+        """Continues postures to the next pose, starting from an extrapolation of the last two, or
+        from the last one where the path is `bent`."""
         alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
         before = found.q[alive, pose - step]
         start = before
@@ -275,7 +278,9 @@ class _NumericBatch:
         self._search, self._X_AG = search, X_AG
         self._deviation = np.clip(0.5 * clearance, *search.settings.deviation)
         self._round = np.zeros(len(X_AG), dtype=int)
-        self._of = [ChainCandidates.none(len(search.layers), len(search.home)) for _ in X_AG]
+        self._candidates = [
+            ChainCandidates.empty(len(search.layers), len(search.home)) for _ in X_AG
+        ]
         self._advance(list(range(len(X_AG))))
 
     def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
@@ -283,7 +288,7 @@ class _NumericBatch:
         found: dict[int, Chain | None] = {}
         left = list(grasps)
         while left:
-            best = {g: self._of[g].best() for g in left}
+            best = {g: self._candidates[g].best() for g in left}
             exhausted = [g for g in left if best[g] is None]
             finished = [g for g in exhausted if self._round[g] == self._search.solutions.rounds]
             found.update(dict.fromkeys(finished))
@@ -294,7 +299,7 @@ class _NumericBatch:
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
         """See `LineSearch`."""
-        candidates, k = self._of[grasp], chain.place
+        candidates, k = self._candidates[grasp], chain.place
         if row is None:
             candidates.open[k] = False
             return
@@ -308,11 +313,11 @@ class _NumericBatch:
 
     def close(self, grasp: int, flip: int) -> None:
         """See `LineSearch`."""
-        self._of[grasp].close(flip)
+        self._candidates[grasp].close(flip)
 
     def failure(self, grasp: int) -> Failure:
         """See `LineSearch`."""
-        search, candidates = self._search, self._of[grasp]
+        search, candidates = self._search, self._candidates[grasp]
         if not len(candidates):
             return self._beyond_limits(grasp, search.at_grasp)
         stage = int(candidates.stage[~candidates.open].max(initial=GRASP))
@@ -325,62 +330,64 @@ class _NumericBatch:
         return Failure(Outcome.NO_PATH)
 
     def _advance(self, grasps: list[int]) -> None:
-        """Goes on to the next round of postures at some grasps, and follows those that are free
-        along both lines."""
+        """Solves the next round of postures at grasps, and follows the free ones along all
+        segments."""
         search = self._search
-        for turn in sorted({int(self._round[g]) for g in grasps}):
-            members = [g for g in grasps if self._round[g] == turn]
+        for round_index in sorted({int(self._round[g]) for g in grasps}):
+            members = [g for g in grasps if self._round[g] == round_index]
             self._round[members] += 1
             X_AG = self._X_AG[members].reshape(-1, 4, 4)
-            pose, q = self._postures(X_AG, search.at_grasp, turn)
+            pose, q = self._postures(X_AG, search.at_grasp, round_index)
             added = [
-                self._of[g].add(pose[own] % 2, q[own], search.at_grasp)
+                self._candidates[g].add(pose[own] % 2, q[own], search.at_grasp)
                 for g, own in ((g, pose // 2 == at) for at, g in enumerate(members))
             ]
             self._follow(np.repeat(members, [len(k) for k in added]), np.concatenate(added))
 
-    def _postures(self, X_AG: Array, layer: int, turn: int) -> tuple[Indices, Array]:
+    def _postures(self, X_AG: Array, layer: int, round_index: int) -> tuple[Indices, Array]:
         search = self._search
         X_AH = search.lines.X_AH(X_AG, search.layers[layer])
-        pose, q = search.solutions.solve(X_AH, turn)
+        pose, q = search.solutions.solve(X_AH, round_index)
         return pose, search.arm.wrapped_near(q, search.home)
 
     def _follow(self, grasp: Indices, k: Indices) -> None:
-        """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
+        """Follows new candidates, by their grasps (S,) and indices (S,), along all segments."""
         search = self._search
         places = list(zip(grasp.tolist(), k.tolist(), strict=True))
-        flip = np.array([self._of[g].flip[j] for g, j in places], dtype=np.intp)
-        q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
+        flip = np.array([self._candidates[g].flip[j] for g, j in places], dtype=np.intp)
+        q = np.array([self._candidates[g].q[j, search.at_grasp] for g, j in places])
         q = q.reshape(len(k), len(search.home))
         found = search.follow(self._X_AG[grasp, flip], q)
         for s, (g, j) in enumerate(places):
-            stage, blocked = int(found.stage[s]), found.blocked(s)
+            stage, blocked = int(found.stage[s]), found.blocked_pose(s)
             if stage == COMPLETE_CHAIN:
-                self._of[g].complete(j, found.q[s], self._cost(found.q[s], found.lower[s]))
+                self._candidates[g].complete(j, found.q[s], self._cost(found.q[s], found.lower[s]))
             elif blocked is None:
-                self._of[g].stop(j, stage)
+                self._candidates[g].stop(j, stage)
             else:
-                moved_W = search.lines.carried(self._X_AG[g, flip[s]], search.layers[blocked])
+                moved_W = search.lines.target_displacement(
+                    self._X_AG[g, flip[s]], search.layers[blocked]
+                )
                 upper = float(found.upper[s, blocked])
-                self._of[g].block(j, stage, found.q[s, blocked], moved_W, upper)
+                self._candidates[g].block(j, stage, found.q[s, blocked], moved_W, upper)
 
     def _cost(self, q: Array, lower: Array) -> float:
-        """Of a chain: the way of the joint that moves most from layer to layer, its distance from
-        home, and doubts whether it is free."""
+        """Cost of a chain: largest joint motion from layer to layer, distance of its start from
+        home, and a penalty for postures not proven free."""
         change = np.abs(np.diff(q, axis=0)).max(axis=1).sum()
         start = START_COST * np.abs(q[0] - self._search.home).max()
         return float(change + start + ChainSearchSettings.doubt_cost * (lower <= 0.0).sum())
 
     def _refine(self, chosen: list[tuple[int, int]]) -> dict[int, Chain]:
-        """Chains whose hand goes straight and that are not in collision as far as is known; those
-        of which that is not so are put out."""
+        """Chains with a straight hand motion and no known collision, by grasp; excludes the
+        others."""
         if not chosen:
             return {}
         search = self._search
         count = len(search.layers)
         grasp = np.array([g for g, _ in chosen])
-        flip = np.array([self._of[g].flip[k] for g, k in chosen])
-        corners = np.array([self._of[g].q[k] for g, k in chosen])
+        flip = np.array([self._candidates[g].flip[k] for g, k in chosen])
+        corners = np.array([self._candidates[g].q[k] for g, k in chosen])
         X_AG = self._X_AG[grasp, flip]
         filler = NumericFiller(
             *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
@@ -398,14 +405,14 @@ class _NumericBatch:
     def _chain(
         self, grasp: int, k: int, rows: DenseRows, own: slice, lower: Array, upper: Array
     ) -> Chain | None:
-        search, of = self._search, self._of[grasp]
+        search, of = self._search, self._candidates[grasp]
         layer, flip = rows.layer[own], int(of.flip[k])
         chain = search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, k)
         blocked = ~(upper[own] > 0.0)
         bad = np.flatnonzero(rows.broken[own] | blocked)
         if len(bad):
             ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
-            on = np.searchsorted(ends, layer[bad])  # which of the ways
+            on = np.searchsorted(ends, layer[bad])  # index of the segment
             stage, bad = SEGMENT_STAGES[int(on.min())][0], bad[on == on.min()]
             row = bad[upper[own][bad].argmin()]
             if blocked[row]:
@@ -416,30 +423,34 @@ class _NumericBatch:
         return chain
 
     def _explain_no_approach(self, grasp: int) -> Failure:
-        """Whether the arm does not get along the line, or has no place at the pregrasp at all."""
+        """Why no chain reaches the pregrasp: it has no free posture, or the approach fails."""
         search = self._search
         if search.at_grasp > 0:
             X_AG, rounds = self._X_AG[grasp], range(search.solutions.rounds)
-            q = np.concatenate([self._postures(X_AG, 0, turn)[1] for turn in rounds])
+            q = np.concatenate([self._postures(X_AG, 0, round_index)[1] for round_index in rounds])
             if not len(q):
                 return self._beyond_limits(grasp, 0)
             _, upper = search.measure(q)
             if not (upper > 0.0).any():
                 order = np.argsort(-upper, kind="stable")[: ChainSearchSettings.max_explained]
                 return Failure(Outcome.ARM_COLLISION, q=q[order], moved_W=np.zeros((len(order), 3)))
-        return self._explain(Outcome.APPROACH_LINE, self._of[grasp], APPROACH)
+        return self._explain(Outcome.APPROACH_LINE, self._candidates[grasp], APPROACH)
 
     def _explain(self, outcome: Outcome, candidates: ChainCandidates, stage: int) -> Failure:
-        """Names the postures that were in the way at a stage, the nearest to being free first."""
+        """Failure with the colliding postures at a stage, the nearest to being free first."""
         q, moved_W = candidates.blocking(stage, ChainSearchSettings.max_explained)
         return Failure(outcome, q=q, moved_W=moved_W)
 
     def _beyond_limits(self, grasp: int, layer: int) -> Failure:
-        """Whether there are postures beyond the joint limits, and by how much at least."""
+        """`JOINT_LIMIT` with the smallest excess, or `NO_IK` if no posture exists without
+        limits."""
         search = self._search
         X_AH = search.lines.X_AH(self._X_AG[grasp], search.layers[layer])
         q = np.concatenate(
-            [search.beyond.solve(X_AH, turn)[1] for turn in range(search.beyond.rounds)]
+            [
+                search.unlimited_solutions.solve(X_AH, round_index)[1]
+                for round_index in range(search.unlimited_solutions.rounds)
+            ]
         )
         if not len(q):
             return Failure(Outcome.NO_IK)

@@ -44,7 +44,7 @@ class PandaPostures:
     Attributes:
         pose: (S,) index of the pose.
         parameter: (S,) index of the value of the redundant joint.
-        branch: (S,) which of the solutions, 0 to 7: 4 elbow + 2 wrist + shoulder.
+        branch: (S,) index of the solution, 0 to 7: 4 elbow + 2 wrist + shoulder.
         q: (S, 7) joint positions within the limits [rad].
     """
 
@@ -75,8 +75,8 @@ class PandaIk:
     def of(cls, arm: ArmKinematics) -> PandaIk | None:
         """The closed form of an arm, or None if it is not kinematically a Panda.
 
-        Its joints have to turn as the Panda's do, on a base frame A like that of link 0; limits and
-        the hand's place are its own.
+        Its joints have to move as the Panda's, on a base frame A like that of link 0. Limits and
+        the pose of the hand on the flange may differ.
         """
         if len(arm.lower) != len(PANDA_DH_PARAMETERS) or not (arm.turns == 1.0).all():
             return None
@@ -98,8 +98,8 @@ class PandaIk:
             q7: (M,) values of the last joint for all poses, or (N, M) for each [rad].
 
         Returns:
-            None to eight for every pair of pose and value. At singular postures (upper arm
-            upright), where a pair of joints may turn against each other, one of them is given.
+            Up to eight for every pair of pose and value. At singular postures (upper arm upright),
+            where two joints may turn against each other, one of the solutions.
 
         Raises:
             InvalidInputError: the poses are not poses, or the shapes do not fit.
@@ -127,13 +127,13 @@ class PandaIk:
         """Solves for joint 4, then 5 and 6, then 1, 2 and 3, each within its limits."""
         full_turn = 2.0 * np.pi  # Radians.
         lower, upper = self.lower, self.upper
-        for elbow, q4, bent in wrist.elbows():
+        for elbow, q4, bent in wrist.solve_elbow():
             kept = np.flatnonzero((lower[3] <= q4) & (q4 <= upper[3]))
-            for side, q5, q6, arm in bent.some(kept).turns(q4[kept]):
+            for side, q5, q6, arm in bent.select(kept).solve_wrist(q4[kept]):
                 q6 = lower[5] + (q6 - lower[5]) % full_turn
                 kept = np.flatnonzero((lower[4] <= q5) & (q5 <= upper[4]) & (q6 <= upper[5]))
-                arm, q5, q6 = arm.some(kept), q5[kept], q6[kept]
-                for back, q1, q2, q3 in arm.shoulders():
+                arm, q5, q6 = arm.select(kept), q5[kept], q6[kept]
+                for back, q1, q2, q3 in arm.solve_shoulder():
                     q = np.stack([q1, q2, q3, arm.q4, q5, q6, arm.q7], axis=1)
                     inside = ((lower <= q) & (q <= upper))[:, :3].all(axis=1)
                     branch = np.full(inside.sum(), 4 * elbow + 2 * side + back, np.int8)
@@ -151,8 +151,8 @@ class _PoseParameterPairs:
     pair: Indices
     q7: Array
 
-    def some(self, kept: Indices) -> Self:
-        """Those of some pairs."""
+    def select(self, kept: Indices) -> Self:
+        """Selects pairs by index."""
         if len(kept) == len(self.pair):
             return self
         return type(self)(**{f.name: getattr(self, f.name)[..., kept] for f in fields(self)})
@@ -160,7 +160,7 @@ class _PoseParameterPairs:
 
 @dataclass(frozen=True, eq=False)
 class _Wrist(_PoseParameterPairs):
-    """Where the wrist is.
+    """Position of the shoulder relative to the wrist.
 
     Attributes:
         v: (3, K) from the wrist to the shoulder [m].
@@ -175,7 +175,7 @@ class _Wrist(_PoseParameterPairs):
 
     @classmethod
     def of(cls, X_AF: Poses, q7: Array, first: int) -> _Wrist:
-        """From N flange poses and last joints (N, M); `first` numbers the pairs."""
+        """From N flange poses and last joints (N, M); `first` is the number of the first pair."""
         c, s = np.cos(q7), np.sin(q7)
         x, y, z = (X_AF.R[:, :, k].T[:, :, None] for k in range(3))
         x6, z6 = c * x - s * y, s * x + c * y
@@ -186,19 +186,20 @@ class _Wrist(_PoseParameterPairs):
         pair = np.arange(first, first + q7.size)
         return cls(pair, q7.ravel(), *(a.reshape(3, -1) for a in (v, x6, y6, along)))
 
-    def elbows(self) -> Iterator[tuple[int, Array, _Wrist]]:
-        """Joint 4, from the length of the triangle's side opposite to the elbow."""
+    def solve_elbow(self) -> Iterator[tuple[int, Array, _Wrist]]:
+        """Solves for joint 4 from the length of the triangle's side opposite to the elbow; yields
+        the elbow branch, q4 and the wrists with a solution."""
         p = UPPER_ARM_LENGTH * FOREARM_LENGTH - ELBOW_OFFSET**2
         q = -ELBOW_OFFSET * (UPPER_ARM_LENGTH + FOREARM_LENGTH)
         straight = 2.0 * ELBOW_OFFSET**2 + UPPER_ARM_LENGTH**2 + FOREARM_LENGTH**2
         cosine = (_dot(self.v, self.v) - straight) / (2.0 * np.hypot(p, q))
         reached = np.flatnonzero(np.abs(cosine) <= 1.0)
-        some, half = self.some(reached), np.arccos(cosine[reached])
-        yield 0, np.arctan2(q, p) - half, some
-        yield 1, np.arctan2(q, p) + half, some
+        reachable, half = self.select(reached), np.arccos(cosine[reached])
+        yield 0, np.arctan2(q, p) - half, reachable
+        yield 1, np.arctan2(q, p) + half, reachable
 
-    def turns(self, q4: Array) -> Iterator[tuple[int, Array, Array, _Arm]]:
-        """Joints 5 and 6.
+    def solve_wrist(self, q4: Array) -> Iterator[tuple[int, Array, Array, _Arm]]:
+        """Solves for joints 5 and 6; yields the wrist branch, q5, q6 and the elbow plane.
 
         In frame 4 the shoulder lies at `across` along x4 and `h` along y4 from the wrist, and y4,
         the axis of joint 5, is perpendicular to the axis of joint 6.
@@ -210,25 +211,25 @@ class _Wrist(_PoseParameterPairs):
         radius = np.sqrt(x * x + y * y)
         possible = np.flatnonzero(np.abs(h) <= radius)
         if len(possible) < len(h):
-            some = self.some(possible)
+            wrist = self.select(possible)
             q4, c4, s4, across, h, radius = (a[possible] for a in (q4, c4, s4, across, h, radius))
-            x, y, z = some.along
+            x, y, z = wrist.along
         else:
-            some = self
+            wrist = self
         rest = np.sqrt(radius * radius - h * h)
         middle, half = np.arctan2(x, y), np.arctan2(rest, h)
         for side, sign in ((0, -1.0), (1, 1.0)):
             s6 = (x * h + sign * y * rest) / (radius * radius)
             c6 = (y * h - sign * x * rest) / (radius * radius)
-            y4 = s6 * some.x6 + c6 * some.y6
-            x4 = (some.v - h * y4) / across
+            y4 = s6 * wrist.x6 + c6 * wrist.y6
+            x4 = (wrist.v - h * y4) / across
             q5 = np.arctan2(z, -sign * rest)
-            yield side, q5, middle + sign * half, _Arm(some.pair, some.q7, q4, c4, s4, x4, y4)
+            yield side, q5, middle + sign * half, _Arm(wrist.pair, wrist.q7, q4, c4, s4, x4, y4)
 
 
 @dataclass(frozen=True, eq=False)
 class _Arm(_PoseParameterPairs):
-    """Where the elbow's plane is.
+    """Orientation of the elbow's plane.
 
     Attributes:
         q4: (K,) joint 4 [rad], with its cosine and sine.
@@ -241,8 +242,9 @@ class _Arm(_PoseParameterPairs):
     x4: Array
     y4: Array
 
-    def shoulders(self) -> Iterator[tuple[int, Array, Array, Array]]:
-        """Joints 1, 2 and 3, from the orientation of frame 3."""
+    def solve_shoulder(self) -> Iterator[tuple[int, Array, Array, Array]]:
+        """Solves for joints 1, 2 and 3 from the orientation of frame 3; yields the shoulder branch
+        and the joints."""
         x4, y4 = self.x4, self.y4
         x3, z3 = self.c4 * x4 - self.s4 * y4, self.s4 * x4 + self.c4 * y4
         y3 = y4[1] * x4[2] - x4[1] * y4[2], x4[0] * y4[2] - y4[0] * x4[2]  # -z4, without its z
@@ -273,7 +275,7 @@ PANDA_DH_PARAMETERS = (
 
 
 def panda_forward(q: ArrayLike) -> Array:
-    """Flange poses `X_AF` (N, 4, 4) of joint positions (N, 7) [rad], by the table of links."""
+    """Flange poses `X_AF` (N, 4, 4) of joint positions (N, 7) [rad], by `PANDA_DH_PARAMETERS`."""
     positions = np.asarray(q, dtype=float).T
     cosines, sines = np.cos(positions), np.sin(positions)
     x, y, z = np.repeat(np.eye(3)[:, :, None], positions.shape[1], axis=2)

@@ -60,11 +60,10 @@ class Plan:
         approach: straight from there to the grasp.
         lift: straight along the lift, which begins where the retreat ends.
         close_time: time that the hand takes to close, after the approach [s].
-        opening: distance between the pads before the hand closes [m] ...
-        width: ... and once it holds the target [m]; NaN if nobody knows.
-        origin: what it is for; None if nobody has said.
-        retreat: straight back from the grasp with what the hand holds; None if the lift begins at
-            the grasp.
+        opening: distance between the pads before the hand closes [m]; NaN if unknown.
+        width: distance between the pads once the hand holds the target [m]; NaN if unknown.
+        origin: the scene, station and grasp that the plan is for; None if unknown.
+        retreat: straight back from the grasp with the target; None if the lift begins at the grasp.
     """
 
     transfer: Trajectory
@@ -78,8 +77,8 @@ class Plan:
 
     @property
     def phases(self) -> dict[str, Trajectory]:
-        """Those of `MOTION_PHASES` that there are, in their order; each begins with the row that
-        the last one ends with."""
+        """Trajectories by name, in the order of `MOTION_PHASES`; each begins with the last row of
+        the phase before."""
         close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
         parts = (self.transfer, self.approach, close, self.retreat, self.lift)
         return {
@@ -115,14 +114,14 @@ class Plan:
         """Refuses a plan for another scene or station, by their contents.
 
         Args:
-            scene, station: what it has to be for; None does not matter.
-            name: what to call the plan.
+            scene, station: what the plan has to be for; None is not checked.
+            name: name of the plan in messages.
 
         Raises:
-            InvalidInputError: it is for another one, or does not tell what it is for.
+            InvalidInputError: it is for another scene or station, or its origin is unknown.
         """
         hash_digits = 12  # Digits of a content hash in messages.
-        from burg_drake.scene import as_scene  # here: a plan alone needs none of it
+        from burg_drake.scene import as_scene  # not needed to load a plan
         from burg_drake.station import as_station
 
         wanted: list[tuple[str, Scene | Station]] = []
@@ -146,11 +145,11 @@ class Plan:
                 )
 
     def to_csv(self, path: str | Path) -> None:
-        """Writes a table that `load_plan` reads, and beside it what the plan is for.
+        """Writes a table that `load_plan` reads, and a metadata file next to it.
 
         Raises:
-            InvalidInputError: the place cannot be written to, or the samples are not evenly spaced,
-                or no finite numbers.
+            InvalidInputError: the path cannot be written to, or the samples are not evenly spaced
+                or not finite.
         """
         path, whole = Path(path), self.whole
         _require_writable(self)
@@ -166,11 +165,11 @@ class Plan:
         atomic_write_all({metadata_path(path): described + "\n", path: "\n".join(lines) + "\n"})
 
     def to_json(self, path: str | Path) -> None:
-        """Writes a document that `load_plan` reads.
+        """Writes a JSON document that `load_plan` reads.
 
         Raises:
-            InvalidInputError: the place cannot be written to, or the samples are not evenly spaced,
-                or no finite numbers.
+            InvalidInputError: the path cannot be written to, or the samples are not evenly spaced
+                or not finite.
         """
         _require_writable(self)
         whole = self.whole
@@ -193,7 +192,7 @@ class Plan:
 def load_plan(
     path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
 ) -> Plan:
-    """Reads what `Plan.to_json` or `Plan.to_csv` has written.
+    """Reads a plan that `Plan.to_json` or `Plan.to_csv` has written.
 
     Example::
 
@@ -202,13 +201,13 @@ def load_plan(
             print(name, phase.duration, phase.q[-1])
 
     Args:
-        path: the file; a name that ends in .csv is that of a table.
+        path: the file; a table if its name ends in .csv.
         scene, station: what the plan has to be for, if given.
 
     Raises:
-        InvalidInputError: there is no such file, it is not a plan, or one that is damaged: with
-            times, phases or positions that do not belong together, or beyond its own limits; or it
-            is for another scene or station, or does not tell.
+        InvalidInputError: the file does not exist or is not a plan; its times, phases or positions
+            are inconsistent or exceed its own limits; or it is for another scene or station, or its
+            origin is unknown.
     """
     path = Path(path)
     read = _read_csv if path.suffix.lower() == ".csv" else _read_json
@@ -218,12 +217,12 @@ def load_plan(
 
 
 Spans = dict[str, tuple[int, int]]
-"""First and last sample of each phase; two that follow one another share one."""
+"""First and last sample of each phase; successive phases share a sample."""
 
 
 @dataclass(frozen=True)
 class PlanDescription:
-    """What a file says of a plan beside its samples; see `Plan`."""
+    """Contents of a plan's file without the samples; see `Plan`."""
 
     rate: float
     opening: float
@@ -238,14 +237,14 @@ def _is_hand_closed(phase: str) -> bool:
 
 
 def _joint_names(plan: Plan) -> tuple[str, ...]:
-    """Names of the joints, made up if nobody has said them."""
+    """Names of the joints; `joint1`, `joint2` and so on if unknown."""
     if plan.origin is not None:
         return plan.origin.joints
     return tuple(f"joint{i + 1}" for i in range(plan.approach.q.shape[1]))
 
 
 def _phase_spans(plan: Plan) -> Spans:
-    """Where the phases are among the samples of the whole plan."""
+    """Spans of the phases among the samples of the whole plan."""
     spans, first = {}, 0
     for name, phase in plan.phases.items():
         spans[name] = (first, first + len(phase.t) - 1)
@@ -257,7 +256,7 @@ def _require_writable(plan: Plan) -> None:
     """Refuses a plan that could not be read again.
 
     Raises:
-        InvalidInputError: samples are not evenly spaced, or no finite numbers.
+        InvalidInputError: samples are not evenly spaced or not finite.
     """
     whole, rate = plan.whole, plan.approach.rate
     if not np.isfinite([whole.q, whole.v, whole.a]).all():
@@ -270,7 +269,7 @@ def _require_writable(plan: Plan) -> None:
 
 
 def _plan_metadata(plan: Plan) -> dict[str, Any]:
-    """JSON values of all of a plan but its samples."""
+    """JSON values of a plan without its samples."""
     return {
         "format": PLAN_FORMAT,
         "version": PLAN_VERSION,
@@ -285,10 +284,10 @@ def _plan_metadata(plan: Plan) -> dict[str, Any]:
 
 
 def _require_plan_version(data: Any, path: str | Path) -> None:
-    """Refuses what is not a plan, or one of another release.
+    """Refuses data that is not a plan, or has another version.
 
     Raises:
-        InvalidInputError: it is not.
+        InvalidInputError: the format or the version is another one.
     """
     if not isinstance(data, dict) or data.get("format") != PLAN_FORMAT:
         raise InvalidInputError(f"{path} is not a plan: its format is not {PLAN_FORMAT!r}")
@@ -301,7 +300,7 @@ def _require_plan_version(data: Any, path: str | Path) -> None:
 
 @contextmanager
 def _document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
-    """A part of a document, whose errors name it."""
+    """Yields a part of a document; read errors in the block become errors that name the part."""
     try:
         yield document[name]
     except BurgError:
@@ -311,10 +310,10 @@ def _document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
 
 
 def _read_plan_description(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescription:
-    """What `_plan_metadata` has written.
+    """Reads the result of `_plan_metadata`.
 
     Raises:
-        InvalidInputError: it is damaged, or of other joints.
+        InvalidInputError: it is damaged, or for other joints.
     """
     with _document_part(document, "hand") as hand:
         opening, width = (
@@ -336,17 +335,16 @@ def _read_plan_description(document: Mapping[str, Any], joints: tuple[str, ...])
 def _assemble_plan(
     description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
 ) -> Plan:
-    """A plan of its samples.
+    """Assembles a plan and checks its consistency.
 
     Args:
-        description: what else is known of it.
+        description: the plan's metadata.
         t: (T,) times of the samples [s].
-        spans: where the phases are.
+        spans: spans of the phases.
         rows: positions, velocities and accelerations, (T, n) each.
 
     Raises:
-        InvalidInputError: times, phases or positions do not belong together, or are beyond the
-            limits.
+        InvalidInputError: times, phases or positions are inconsistent, or exceed the limits.
     """
     time_tolerance = 1.0  # Nanoseconds.
     exact = np.arange(len(t)) / description.rate
@@ -376,7 +374,7 @@ def _assemble_plan(
 
 
 def _require_spans(spans: Spans, count: int) -> None:
-    """The phases cover all samples without a gap, in their order."""
+    """Requires that the phases cover all samples in order and without gaps."""
     missing = [name for name in MOTION_PHASES if name not in spans and name != "retreat"]
     if missing:
         raise InvalidInputError(f"phase {missing[0]!r} is missing")
@@ -395,7 +393,7 @@ def _require_spans(spans: Spans, count: int) -> None:
 
 
 def _require_rest(parts: Mapping[str, Trajectory], plan: Plan) -> None:
-    """The arm rests between the phases, and for as long as the hand closes."""
+    """Requires that the arm rests between the phases, and while the hand closes."""
     for name, trajectory in parts.items():
         if np.any([trajectory.v[[0, -1]], trajectory.a[[0, -1]]]):
             raise InvalidInputError(f"the arm is not at rest at the ends of phase {name!r}")
@@ -410,7 +408,7 @@ def _require_rest(parts: Mapping[str, Trajectory], plan: Plan) -> None:
 
 
 def _require_limits_kept(whole: Trajectory, origin: PlanOrigin) -> None:
-    """Every joint keeps its limits."""
+    """Requires that every joint keeps its limits."""
     limit_tolerance = 1e-5  # Radians, or relative. The timing needs less.
     limits = origin.limits
     outside = (whole.q < limits.lower - limit_tolerance) | (
@@ -435,7 +433,7 @@ def _require_limits_kept(whole: Trajectory, origin: PlanOrigin) -> None:
 
 
 def _finite_or_none(value: float) -> float | None:
-    """For JSON, which has no infinity and no NaN."""
+    """The value for JSON, which has no infinity and no NaN; None instead."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -470,7 +468,7 @@ def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
 
 
 def _read_json(path: Path) -> Plan:
-    """Reads what `Plan.to_json` has written.
+    """Reads a JSON plan.
 
     Raises:
         InvalidInputError: see `load_plan`.
@@ -517,7 +515,7 @@ def _read_points(points: list[dict[str, Any]], n: int) -> list[Array]:
 
 
 CsvRows = Sequence[tuple[int, list[str]]]
-"""Cells of samples, with the line of the file that they are on."""
+"""Line numbers and cells of the samples."""
 JOINT_COLUMNS = {
     "q": ("rad", "position of joint {}; m of a joint that slides"),
     "v": ("rad/s", "velocity of joint {}; m/s of a joint that slides"),
@@ -527,8 +525,7 @@ JOINT_COLUMNS = {
 
 
 def _read_csv(path: Path) -> Plan:
-    """Reads what `Plan.to_csv` has written; the table alone is a plan that does not tell what it is
-    for.
+    """Reads a CSV plan; without its metadata file the plan has no origin.
 
     Raises:
         InvalidInputError: see `load_plan`.
@@ -552,7 +549,7 @@ def _read_csv(path: Path) -> Plan:
 
 
 def _read_csv_metadata(path: Path, header: Sequence[str]) -> dict[str, Any]:
-    """What the file beside a table says of the plan."""
+    """Reads the plan's metadata from the file next to a table."""
     document = load_json(path)
     try:
         (data,) = document["notes"]
@@ -593,7 +590,7 @@ def _plan_from_rows(rows: CsvRows, joints: tuple[str, ...], data: Any) -> Plan:
 
 
 def _require_widths(plan: Plan, rows: CsvRows) -> None:
-    """The hand is open until it closes, and then as wide as the target in all rows."""
+    """Requires that all rows have the open width before the hand closes, and the target's after."""
     for line, (_, phase, *_, text) in rows:
         wanted = _width_cell(plan, phase)
         if text == wanted:
@@ -623,7 +620,7 @@ def _read_spans(rows: CsvRows) -> dict[str, tuple[int, int]]:
 
 
 def _describe_by_rows(rows: CsvRows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
-    """What a table alone tells of its plan."""
+    """Metadata of a plan that follow from its table alone."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:
         raise InvalidInputError("the times t do not increase from 0")
@@ -645,7 +642,7 @@ def _parse_number(text: str, name: str, line: int) -> float:
 
 
 def _width_cell(plan: Plan, phase: str) -> str:
-    """Commanded distance between the pads [m]; empty if nobody knows how wide an open hand is."""
+    """Commanded distance between the pads [m]; empty if the hand's opening is unknown."""
     width = plan.width if _is_hand_closed(phase) else plan.opening
     if np.isnan(width):
         return "0.0" if _is_hand_closed(phase) else ""
@@ -668,7 +665,7 @@ def _column_meanings(joints: Sequence[str]) -> dict[str, tuple[str, Column]]:
 
 
 def _quote_cell(text: str) -> str:
-    """A text of the header, quoted where that is needed."""
+    """A text of the header, quoted if needed."""
     quotes = any(sign in text for sign in ',"\n\r')
     return '"' + text.replace('"', '""') + '"' if quotes else text
 
@@ -676,7 +673,7 @@ def _quote_cell(text: str) -> str:
 def format_rows(values: Array, separator: str = ",") -> list[str]:
     """Each row of finite numbers (T, n) as text, which reads back bit by bit.
 
-    Rows on the grid, see `round_to_grid`, are plain decimals; others are as Python has them.
+    Rows on the grid, see `round_to_grid`, are plain decimals; others are Python's `repr`.
     """
     on_grid = (np.abs(values) <= 9000.0) & (round_to_grid(values) == values)
     on_grid &= (values != 0.0) | ~np.signbit(values)

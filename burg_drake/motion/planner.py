@@ -34,14 +34,14 @@ class Planner:
     Attributes:
         reach: finds the paths.
         limits: of the arm.
-        settings: how fast, how close to the paths.
+        settings: speeds and tolerances.
     """
 
     def __init__(self, reach: ArmReach, *, settings: TimingSettings | None = None) -> None:
-        """Takes the limits of the arm that `reach` is about.
+        """Reads the limits of the arm of `reach`.
 
         Raises:
-            InvalidInputError: an arm without limits of velocity.
+            InvalidInputError: the arm has no velocity limits.
         """
         self.reach = reach
         self.settings = settings or TimingSettings()
@@ -69,10 +69,10 @@ class Planner:
         return self.time(instance, reach.path, width)
 
     def time(self, instance: str, path: ArmPath, width: float = np.nan) -> Plan:
-        """Gives a path of `reach` its time, after shortening the transfer.
+        """Times a path of `reach`, after shortening the transfer.
 
-        What leaves the path, rounded corners and smoothed lines, is checked for collisions as the
-        path was.
+        Deviations from the path (rounded corners, smoothed lines) are checked for collisions in the
+        same way as the path.
 
         Args:
             instance: the target.
@@ -118,8 +118,8 @@ class Planner:
         )
 
     def _along(self, u_W: Array, q: Array) -> Array:
-        """(M, 3) how far the hand has come from its first pose along a unit vector (3,) in the
-        world [m]."""
+        """(M, 3) displacement of the hand from its first pose along a unit vector (3,) in the world
+        [m]."""
         arm = self.reach.diagram.station.document.arm
         assert arm is not None
         p_AH = self.reach.kinematics.forward(q)[0][:, :3, 3]
@@ -128,8 +128,8 @@ class Planner:
 
     @cached_property
     def _origin(self) -> PlanOrigin:
-        """What all plans are for, but for target and grasp; to hash documents takes as long as to
-        plan."""
+        """Origin of all plans, without target and grasp. Cached: hashing the documents takes as
+        long as planning."""
         diagram = self.reach.diagram
         return PlanOrigin(
             joints=tuple(joint.name() for joint in diagram.arm_joints),
@@ -164,20 +164,20 @@ def plan(
             print(found.outcome, found.blocker)
 
     Args:
-        scene: where the target stands.
-        station: the arm and what is around it.
+        scene: the scene with the target.
+        station: the arm and its surroundings.
         instance: the target's name in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         width: distance between the pads that hold the target [m]; NaN if it is not known.
-        reach: how thoroughly to look for a way.
-        timing: how fast to move.
+        reach: effort of the search.
+        timing: speeds and tolerances.
 
     Returns:
         The plan, or why there is none.
 
     Raises:
-        InvalidInputError: `X_OG` is not a pose, the station has no arm, in its home posture
-            something collides, or a joint has no limit of velocity.
+        InvalidInputError: `X_OG` is not a pose, the station has no arm, the arm collides in its
+            home posture, or a joint has no velocity limit.
         UnknownNameError: the scene has no such instance.
     """
     scene, station = as_scene(scene), as_station(station)

@@ -30,12 +30,12 @@ class Cubics:
 
     @classmethod
     def from_jerk_steps(cls, q0: Array, t: Array, steps: Array) -> Cubics:
-        """From rest at `q0`.
+        """Integrates a piecewise constant jerk, from rest at `q0`.
 
         Args:
-            q0: (n,) where it starts.
+            q0: (n,) start position.
             t: (K + 1,) times of the steps [s], in any order.
-            steps: (K + 1, n) by how much the jerk changes there; adds up to 0.
+            steps: (K + 1, n) changes of the jerk at these times; they add up to 0.
         """
         order = np.argsort(t, kind="stable")
         t = t[order] - t[order[0]]
@@ -48,7 +48,7 @@ class Cubics:
 
     @classmethod
     def joined(cls, parts: Sequence[Cubics]) -> Cubics:
-        """One after the other; each begins at rest where the one before has come to rest."""
+        """Concatenates motions; each begins at rest where the one before ends at rest."""
         start = np.cumsum([0.0] + [part.duration for part in parts])
         t, q, v, a = (
             np.concatenate([x[:-1] for x in knots] + [knots[-1][-1:]])
@@ -78,7 +78,7 @@ class Cubics:
         )
 
     def time_scaled(self, factor: float) -> Cubics:
-        """The same way in `factor` times the time."""
+        """The same path in `factor` times the time."""
         return Cubics(
             self.t * factor, self.q, self.v / factor, self.a / factor**2, self.j / factor**3
         )
@@ -86,7 +86,7 @@ class Cubics:
     def peaks(self) -> tuple[Array, Array, Array]:
         """(n,) each: largest absolute velocity, acceleration and jerk."""
         h = np.diff(self.t)[:, None]
-        # Knots less than 1 ns apart are one that was computed in two ways.
+        # Knots less than 1 ns apart are the same knot, computed in two ways.
         a, j = self.a[:-1], np.where(h > 1e-9, self.j, 0.0)
         turns = np.divide(-a, j, out=np.zeros_like(j), where=j != 0.0)  # where a velocity peaks
         turns = np.where((turns > 0.0) & (turns < h), turns, 0.0)
@@ -102,18 +102,18 @@ def _running_sums(start: Array, increments: Array) -> Array:
 
 @dataclass(frozen=True)
 class DoubleS:
-    """The fastest motion over a unit of way from rest to rest: a ramp of positions that two moving
-    averages make smooth.
+    """The fastest motion over a unit length from rest to rest: a linear ramp of positions, smoothed
+    by two moving averages.
 
-    It is what others compose of seven phases (Biagiotti and Melchiorri, "Trajectory Planning for
-    Automatic Machines and Robots", 2008, section 3.4); as a cascade of averages it carries over to
-    ways with corners (the same, "FIR filters for online trajectory planning with time- and
+    It equals the usual profile of seven phases (Biagiotti and Melchiorri, "Trajectory Planning for
+    Automatic Machines and Robots", 2008, section 3.4). As a cascade of averages it also applies to
+    paths with corners (the same, "FIR filters for online trajectory planning with time- and
     frequency-domain specifications", Control Engineering Practice 20, 2012).
 
     Attributes:
-        travel: time of the way at constant speed, 1 over the top speed [s].
+        travel: time of the unit length at constant speed, 1 over the top speed [s].
         rise: window of the first average: top speed over largest acceleration [s].
-        ramp: window of the second one: largest acceleration over jerk [s].
+        ramp: window of the second average: largest acceleration over jerk [s].
     """
 
     travel: float
@@ -153,15 +153,15 @@ def smooth_polyline(
 ) -> Cubics:
     """A polyline at constant speed on each segment, averaged over two windows, one after the other.
 
-    Every position is a weighted mean of those of the polyline within half of both windows around
-    it, and so is every velocity: neither leaves the range of the polyline's. After a stop at a
-    waypoint that is as long as both windows the polyline is met exactly.
+    Every position and velocity is a weighted mean of those of the polyline within half of both
+    windows around it, and so stays within their range. A stop at a waypoint that is as long as both
+    windows makes the motion pass through it exactly.
 
     Args:
         q: (M, n) waypoints.
         travel: (M - 1,) time on each segment [s].
         windows: `rise` and `ramp`.
-        dwell: (M - 2,) time to stop at each inner waypoint [s]; none if not given.
+        dwell: (M - 2,) time to stop at each inner waypoint [s]; no stops if None.
     """
     rate = np.diff(q, axis=0) / travel[:, None]
     stop = np.cumsum(travel)
@@ -175,7 +175,7 @@ def smooth_polyline(
 
 
 IsFree = Callable[[Array], bool]
-"""Whether the arm collides nowhere along rows (R, n), straight from row to row."""
+"""Whether the arm is free along rows (R, n), straight from row to row."""
 
 
 def time_polyline(
@@ -186,15 +186,15 @@ def time_polyline(
     is_free: IsFree | None = None,
     least: Array | None = None,
 ) -> Cubics:
-    """Moves along a polyline, at rest at both ends.
+    """Times a motion along a polyline, at rest at both ends.
 
     Args:
         q: (M, n) waypoints.
         limits: not to be exceeded.
-        deviation: farthest from the polyline, as Euclidean distance of joint positions [rad].
-        is_free: the check of what leaves the polyline. A corner where it fails is cut less, or the
-            arm stops there; it does at all if there is no check.
-        least: (M - 1,) least time to spend on each segment [s].
+        deviation: largest Euclidean distance of joint positions from the polyline [rad].
+        is_free: collision check of rounded corners. A corner where it fails is cut less, or the arm
+            stops there. Without a check the arm stops at all corners.
+        least: (M - 1,) shortest time on each segment [s].
 
     Returns:
         The motion; straight between two waypoints.
@@ -217,8 +217,8 @@ def time_polyline(
 def _time_rounded(
     q: Array, limits: ArmLimits, least: Array, deviation: float, is_free: IsFree
 ) -> Cubics:
-    """At rest at those corners alone that may not be rounded."""
-    pause_shares = (0.0, 0.5)  # Pauses at a corner over the one at which it is met exactly.
+    """Times a motion that stops only at corners that cannot be rounded."""
+    pause_shares = (0.0, 0.5)  # Pauses at a corner over the one that meets it exactly.
     if len(q) == 2:
         return _time_straight(q, limits, least[0])
     level = np.zeros(len(q) - 2, int)
@@ -251,12 +251,12 @@ def _time_straight(q: Array, limits: ArmLimits, least: float) -> Cubics:
 
 @dataclass(frozen=True, eq=False)
 class _TimedPolyline:
-    """A polyline in motion.
+    """A timed motion along a polyline.
 
     Attributes:
         q: (M, n) waypoints.
-        motion: along them.
-        arrival, departure: (M - 2,) when corners begin and cease to matter [s].
+        motion: along the waypoints.
+        arrival, departure: (M - 2,) times at which corners begin and end to affect the motion [s].
     """
 
     q: Array
@@ -265,7 +265,7 @@ class _TimedPolyline:
     departure: Array
 
     def is_good(self, corner: int, deviation: float, is_free: IsFree) -> bool:
-        """Whether the motion stays near a corner, and free."""
+        """Whether the motion at a corner is free and within `deviation` of the polyline."""
         finer_rows = 8  # Rows per checked row at which the deviation is measured.
         start, end = self.arrival[corner], self.departure[corner]
         velocity = self.motion.peaks()[0].max()
@@ -277,10 +277,11 @@ class _TimedPolyline:
 
 
 def _fastest_polyline(q: Array, limits: ArmLimits, least: Array, share: Array) -> _TimedPolyline:
-    """The fastest of the windows tried; `share` (M - 2,) is how exactly corners are met."""
-    # Windows over the time to full speed. Above 1 helps where a joint turns back.
+    """The fastest motion over several windows. Pauses at the corners are `share` (M - 2,) of the
+    windows' lengths."""
+    # First window over the time to full speed. Above 1 helps where a joint turns back.
     rise_factors = np.geomspace(0.2, 2.0, 12)
-    # The same of the second window. Jerk can add up where corners are close.
+    # Second window over the time to full acceleration. Jerk can add up where corners are close.
     ramp_factors = (1.0, 2.0)
     length = np.abs(np.diff(q, axis=0))
     V, A, J = (

@@ -26,11 +26,11 @@ BRANCH_CROSSINGS = np.arange(IK_BRANCHES) ^ np.array([[2], [1]])
 
 @dataclass(frozen=True, eq=False)
 class PostureRows:
-    """Some rows of an array indexed by pose, grasp, way, branch and value, ordered by the grasp.
+    """Selected rows of an array (pose, grasp, flip, branch, value), ordered by grasp.
 
     Attributes:
-        grasp, way, branch: (R,) of each row.
-        other: (2, R) numbers of the rows with the other branches.
+        grasp, flip, branch: (R,) indices of each row.
+        other: (2, R) numbers of the rows with the branches that meet each row's branch.
     """
 
     grasp: Indices
@@ -40,7 +40,7 @@ class PostureRows:
 
     @classmethod
     def where(cls, wanted: Booleans) -> PostureRows:
-        """Those wanted (n, 2, 8), with all that they can go over into."""
+        """The rows of the wanted branches (n, 2, 8), and of the branches that meet them."""
         for crossing in BRANCH_CROSSINGS:
             wanted = wanted | wanted[..., crossing]
         grasp, flip, branch = np.nonzero(wanted)
@@ -49,16 +49,16 @@ class PostureRows:
 
     @property
     def index(self) -> tuple[slice, Indices, Indices, Indices]:
-        """What picks the rows of an array (L, n, 2, 8, Q): as (L, R, Q)."""
+        """Index that selects the rows of an array (L, n, 2, 8, Q), as (L, R, Q)."""
         return slice(None), self.grasp, self.flip, self.branch
 
-    def some(self, chosen: Indices) -> PostureRows:
-        """All the rows of some grasps, by their numbers, rising."""
+    def select(self, chosen: Indices) -> PostureRows:
+        """Selects rows by their numbers, rising; for each grasp all or none."""
         other = np.searchsorted(chosen, self.other[:, chosen])
         return PostureRows(self.grasp[chosen], self.flip[chosen], self.branch[chosen], other)
 
     def number(self, grasp: int, flip: int, branch: int) -> int:
-        """The number of a row."""
+        """Number of the row of a grasp, finger assignment and branch."""
         here = (self.grasp == grasp) & (self.flip == flip) & (self.branch == branch)
         return int(np.flatnonzero(here)[0])
 
@@ -68,12 +68,12 @@ class PostureSteps:
     """Steps from each posture of R rows at L poses with Q values.
 
     Attributes:
-        length: (L - 1, S, R, Q) way of the joint that moves most [rad]; infinite where there is no
-            step. The S kinds are those in the row, by the offset of the value, then those that go
-            over into each of the other rows.
-        other: (2, R) the rows that each may go over into.
-        offsets, crossing: by how many values a step may lead up in its row, and to the others;
-            negative ones down.
+        length: (L - 1, S, R, Q) motion of the joint that moves most [rad]; infinite where there is
+            no step. The S kinds are steps within the row, by the offset of the value, then steps to
+            each of the other rows.
+        other: (2, R) the other rows that steps from each row may lead to.
+        offsets, crossing: allowed changes of the value's index in steps within a row, and to
+            another row.
     """
 
     length: Single
@@ -91,8 +91,8 @@ class PostureSteps:
         offsets: tuple[int, ...],
         crossing: tuple[int, ...],
     ) -> PostureSteps:
-        """Between postures (n, L, R, Q), NaN where there is none, by steps in which no joint moves
-        more than `travel` [rad]."""
+        """Steps between postures `q` (n, L, R, Q), NaN where there is none, in which no joint moves
+        by more than `travel` [rad]."""
         steps = cls(np.empty(0, dtype=np.float32), other, offsets, crossing)
         here, after = q[:, :-1], steps._padded(q[:, 1:], np.float32(np.nan))
         kinds = steps._kinds()
@@ -106,37 +106,37 @@ class PostureSteps:
             length[:, kind] = np.where(change <= travel, change, IMPOSSIBLE_STEP)
         return replace(steps, length=length)
 
-    def some(self, rows: Indices) -> PostureSteps:
-        """Those of some rows, each with its other ones."""
+    def select(self, rows: Indices) -> PostureSteps:
+        """Selects rows, each together with its other rows."""
         other = np.searchsorted(rows, self.other[:, rows])
         return replace(self, length=self.length[:, :, rows], other=other)
 
     def cut(self, pose: int, row: int, value: int, offset: int, crossing: int | None) -> None:
-        """Takes a step out; `crossing` is the number of the other row, None in the same row."""
+        """Removes a step; `crossing` is the index of the other row in `other`, or None."""
         self.length[pose, self._kinds().index((offset, crossing)), row, value] = IMPOSSIBLE_STEP
 
-    def onwards(self, cost: Single) -> list[Single]:
-        """Least costs (R, Q) of ways from the postures of each pose to the last pose, with the
-        costs (L, R, Q) of all postures on them."""
+    def cost_to_end(self, cost: Single) -> list[Single]:
+        """For each pose, the least costs (R, Q) of paths from its postures to the last pose,
+        including the costs (L, R, Q) of the postures on them."""
         values = [cost[-1]]
         for length, here in zip(self.length[::-1], cost[-2::-1], strict=True):
-            values.append(self._onwards(length, values[-1]).min(axis=0) + here)
+            values.append(self._cost_of_steps(length, values[-1]).min(axis=0) + here)
         return values[::-1]
 
     def follow(self, values: list[Single], row: Indices, value: Indices) -> tuple[Indices, Indices]:
-        """Rows and values (m, L) of the least ways from (m,) postures of the first pose."""
+        """Rows and values (m, L) of the cheapest paths from (m,) postures of the first pose."""
         kinds = self._kinds()
         offset = np.array([offset for offset, _ in kinds])
         target = np.array([0 if crossing is None else 1 + crossing for _, crossing in kinds])
         to = np.concatenate([np.arange(self.other.shape[1])[None], self.other])
         rows, ks = [row], [value]
-        for length, onwards in zip(self.length, values[1:], strict=True):
+        for length, next_values in zip(self.length, values[1:], strict=True):
             row, value = rows[-1], ks[-1]
             there = to[target][:, row].T
             k = value[:, None] + offset
             total = (
                 length[:, row, value].T
-                + self._padded(onwards, IMPOSSIBLE_STEP)[there, k + self._margin]
+                + self._padded(next_values, IMPOSSIBLE_STEP)[there, k + self._margin]
             )
             best = total.argmin(axis=1)
             every = np.arange(len(row))
@@ -145,13 +145,14 @@ class PostureSteps:
         return np.stack(rows, axis=1), np.stack(ks, axis=1)
 
     def joined(self, exists: Booleans) -> Booleans:
-        """(L, R, Q) which of the postures that there are lie on ways from the first to the last
-        pose."""
-        onwards = np.isfinite(self.onwards(np.where(exists, np.float32(0.0), IMPOSSIBLE_STEP)))
-        return self.reached(np.asarray(onwards))
+        """(L, R, Q) whether existing postures lie on a path from the first to the last pose."""
+        reaches_end = np.isfinite(
+            self.cost_to_end(np.where(exists, np.float32(0.0), IMPOSSIBLE_STEP))
+        )
+        return self.reached(np.asarray(reaches_end))
 
     def reached(self, usable: Booleans) -> Booleans:
-        """(L, R, Q) which usable postures are led to from the first pose over usable ones."""
+        """(L, R, Q) whether usable postures can be reached from the first pose over usable ones."""
         led = np.zeros_like(usable)
         led[0] = usable[0]
         count, margin = usable.shape[-1], self._margin
@@ -170,12 +171,12 @@ class PostureSteps:
         return max(self.offsets[-1], self.crossing[-1])
 
     def _kinds(self) -> list[tuple[int, int | None]]:
-        """By how many values a step leads up, and to which of the other rows."""
+        """Kinds of steps: change of the value's index, and index in `other` (None: same row)."""
         kinds: list[tuple[int, int | None]] = [(k, None) for k in self.offsets]
         return kinds + [(k, i) for i in range(len(self.other)) for k in self.crossing]
 
-    def _onwards(self, length: Single, value: Single) -> Single:
-        """(S, R, Q) costs of going on by each kind of step."""
+    def _cost_of_steps(self, length: Single, value: Single) -> Single:
+        """(S, R, Q) costs to the end for each kind of step."""
         padded, total = self._padded(value, IMPOSSIBLE_STEP), np.empty_like(length)
         for kind, (offset, crossing) in enumerate(self._kinds()):
             there = self._shifted(padded, offset)
@@ -188,13 +189,13 @@ class PostureSteps:
         return np.pad(values, width, constant_values=outside)
 
     def _shifted(self, padded: Single, offset: int) -> Single:
-        """The values that are up by an offset, of an array with margins."""
+        """View of a padded array, shifted by an offset of the value's index."""
         count = padded.shape[-1] - 2 * self._margin
         return padded[..., self._margin + offset : self._margin + offset + count]
 
 
 DEEP_PENETRATION = 0.01
-"""Metres. A posture between two that deep is taken to be in collision."""
+"""Metres. A posture between two postures that deep is taken to be in collision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +203,7 @@ class GridChain:
     """A chain's postures, one at each of L poses.
 
     Attributes:
-        flip: index of the finger way.
+        flip: finger assignment, 0 or 1.
         branch: (L,) of the inverse kinematics.
         parameter: (L,) indices of values of the redundant joint.
     """
@@ -213,16 +214,16 @@ class GridChain:
 
 
 class PostureGrid:
-    """Postures of n grasps at L poses each, with the fingers in two ways.
+    """Postures of n grasps at L poses each, for both finger assignments.
 
-    Arrays are indexed by pose, grasp, way, branch and value of the redundant joint.
+    Arrays are indexed by pose, grasp, finger assignment, branch and value of the redundant joint.
 
     Attributes:
         q: (7, L, n, 2, 8, Q) joint positions in single precision; NaN where there is none [rad].
         exists: (L, n, 2, 8, Q) whether there is a posture.
         joined: (L, n, 2, 8, Q) postures on chains from the first pose to the last; see `join`.
         lower, upper: (L, n, 2, 8, Q) bounds of the arm's clearance [m]; infinite until measured.
-        refused: (L, n, 2, 8, Q) postures known not to do.
+        refused: (L, n, 2, 8, Q) postures excluded from the search.
         start: (n, 2, 8, Q) cost of starting at each posture of the first pose [rad].
         parameter: (Q,) values of the redundant joint [rad].
     """
@@ -237,15 +238,15 @@ class PostureGrid:
         offsets: tuple[int, ...],
         crossing: tuple[int, ...],
     ) -> None:
-        """Makes room; see `solve`.
+        """Allocates the arrays; `solve` fills them.
 
         Args:
             ik: the inverse kinematics.
             X_AH: (L, n, 2, 4, 4) hand poses.
             parameter: (Q,) values of the redundant joint [rad].
-            travel: most that a joint may move from one pose to the next [rad].
-            offsets: by how many values the redundant joint may change there ...
-            crossing: ... and where the branch changes.
+            travel: largest motion of a joint from one pose to the next [rad].
+            offsets: allowed changes of the redundant joint's index within a branch.
+            crossing: allowed changes of the redundant joint's index where the branch changes.
         """
         shape = (*X_AH.shape[:3], IK_BRANCHES, len(parameter))
         self._ik, self._X_AH, self.parameter = ik, X_AH, parameter
@@ -266,7 +267,7 @@ class PostureGrid:
         return int(self.q.shape[1])
 
     def solve(self, poses: Indices, grasps: Indices) -> None:
-        """Finds the postures at some poses of some grasps."""
+        """Solves for the postures at the given poses of the given grasps."""
         X = self._X_AH[np.ix_(poses, grasps)]
         found = self._ik.solve(X.reshape(-1, 4, 4), self.parameter)
         pose, grasp, flip = np.unravel_index(found.pose, X.shape[:3])
@@ -275,7 +276,7 @@ class PostureGrid:
         self.exists[where] = True
 
     def join(self) -> None:
-        """Finds what postures are joined, once all have been found."""
+        """Computes the steps between postures and `joined`, after all calls of `solve`."""
         here = np.asarray(self.exists.any(axis=-1))
         for crossing in BRANCH_CROSSINGS:
             here = here | here[..., crossing]
@@ -283,10 +284,14 @@ class PostureGrid:
         self._steps = self._steps_of(self._rows)
         self.joined[self._rows.index] = self._steps.joined(self.exists[self._rows.index])
 
-    def take_over(self, grasp: int, coarse: PostureGrid, index: int, poses: list[int]) -> None:
-        """Takes postures of a grasp for as deep in collision as those are that have been measured
-        to either side of them in a coarser grid, where it has the number `index`, if both are
-        deeper than `DEEP_PENETRATION`."""
+    def copy_deep_collisions(
+        self, grasp: int, coarse: PostureGrid, index: int, poses: list[int]
+    ) -> None:
+        """Takes over deep collisions of a grasp from a coarser grid, where it has number `index`.
+
+        A posture between two measured ones that are deeper than `DEEP_PENETRATION` gets the bound
+        of the less deep one.
+        """
         at = np.interp(self.parameter, coarse.parameter, np.arange(len(coarse.parameter)))
         low, high = np.floor(at).astype(np.intp), np.ceil(at).astype(np.intp)
         for pose in poses:
@@ -302,11 +307,11 @@ class PostureGrid:
         return np.asarray(self.exists[at] & ~self.refused[at] & (self.upper[at] > 0.0))
 
     def measured_free(self, pose: int, grasp: int) -> bool:
-        """Whether any of the postures that have been measured is usable."""
+        """Whether any measured posture is usable."""
         return bool((np.isfinite(self.lower[pose, grasp]) & self.usable(pose, grasp)).any())
 
     def cut(self, grasp: int, pose: int, place: GridChain) -> None:
-        """Parts the postures of a chain at `pose` and the next one."""
+        """Removes the step of a chain from `pose` to the next one."""
         (branch, there), k = place.branch[pose : pose + 2].tolist(), int(place.parameter[pose])
         step = int(place.parameter[pose + 1]) - k
         row = self._rows.number(grasp, place.flip, branch)
@@ -314,10 +319,10 @@ class PostureGrid:
         self._steps.cut(pose, row, k, step, crossing)
 
     def best(self, grasps: Indices, doubt: float) -> list[GridChain | None]:
-        """The cheapest chain of each of some grasps.
+        """The cheapest chain of each grasp.
 
-        A chain costs the way of the joint that moves most from pose to pose, the cost of its
-        start, and for each posture a cost that rises to `doubt` as the lower bound of its
+        The cost of a chain is the sum of the largest joint motions from pose to pose, the cost of
+        its start, and for each posture a penalty that rises to `doubt` as the lower bound of its
         clearance falls from 1 cm to 0.
 
         Args:
@@ -325,18 +330,18 @@ class PostureGrid:
             doubt: cost of a posture whose clearance is not known to be positive [rad].
 
         Returns:
-            The chains; None where there is none.
+            The chains; None for grasps without one.
         """
         preferred_clearance = 0.01  # Metres. Ten times the position error of a controlled arm.
         rows, steps = self._rows, self._steps
         if len(grasps) < self.q.shape[2]:
             chosen = np.flatnonzero(np.isin(rows.grasp, grasps))
-            rows, steps = rows.some(chosen), steps.some(chosen)
+            rows, steps = rows.select(chosen), steps.select(chosen)
         at = rows.index
         usable = self.joined[at] & ~self.refused[at] & (self.upper[at] > 0.0)
         doubts = np.clip(1.0 - self.lower[at] / np.float32(preferred_clearance), 0.0, 1.0)
         cost = np.where(usable, np.float32(doubt) * doubts, IMPOSSIBLE_STEP)
-        values = steps.onwards(cost)
+        values = steps.cost_to_end(cost)
         first = values[0] + self.start[at[1:]]
         ends = np.searchsorted(rows.grasp, np.stack([grasps, grasps + 1]))
         cheapest = np.full((2, len(grasps)), -1)
@@ -353,8 +358,8 @@ class PostureGrid:
         return found
 
     def reached(self, grasp: int) -> int:
-        """The last pose that usable postures of a grasp lead to from the first; -1 if there are
-        none at the first."""
+        """The last pose that chains of usable postures of a grasp reach; -1 if the first pose has
+        none."""
         usable = self.usable(slice(None), grasp)
         only = np.zeros(self.q.shape[2:-1], dtype=bool)
         only[grasp] = usable.any(axis=(0, -1))
@@ -370,7 +375,7 @@ class PostureGrid:
 
 
 START_COST = 0.3
-"""Cost of a start for each radian of the joint that is farthest from home."""
+"""Cost of a start per radian of the joint that is farthest from home."""
 
 
 class PostureGridBuilder:
@@ -378,11 +383,11 @@ class PostureGridBuilder:
 
     Args:
         arm: the arm on its own.
-        ik: the inverse kinematics, within the limits that are to be kept.
-        lines: where the hand goes.
+        ik: the inverse kinematics, with the joint limits to keep.
+        lines: the hand's path.
         proximity: bounds of the arm's clearance.
         home: (7,) home posture; chains that start near it are preferred [rad].
-        settings: how thoroughly to look.
+        settings: effort of the search.
     """
 
     def __init__(
@@ -404,7 +409,7 @@ class PostureGridBuilder:
         return np.asarray(low + (np.arange(count) + 0.5) / count * (high - low))
 
     def grid(self, X_AG: Array, count: int) -> PostureGrid:
-        """Room for the postures of grasps (n, 2, 4, 4)."""
+        """An empty grid for the postures of grasps (n, 2, 4, 4), with `count` redundant values."""
         X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
         values = self.parameters(count)
         spacing = values[1] - values[0] if count > 1 else np.inf
@@ -418,7 +423,7 @@ class PostureGridBuilder:
         )
 
     def measure(self, grid: PostureGrid, poses: Indices, grasps: Indices, wanted: Booleans) -> None:
-        """Measures the wanted postures at some poses of some grasps that have not been measured."""
+        """Measures the clearance of wanted postures at poses of grasps, unless already measured."""
         if not len(grasps):
             return
         where = np.ix_(poses, grasps)
@@ -433,16 +438,16 @@ class PostureGridBuilder:
 
 
 def _grid_offsets(most: float) -> tuple[int, ...]:
-    """Offsets up and down that are no larger than `most`, and 0; rising."""
-    # Values of the redundant joint. Large changes need no fine choice.
+    """Rising offsets from -`most` to `most` that include 0."""
+    # Steps of the redundant joint's index. Large changes need no fine choice.
     steps = (1, 2, 4, 8, 16, 24)
     up = [k for k in steps if k <= most]
     return (*(-k for k in reversed(up)), 0, *up)
 
 
 def decisive_clearance(bounds: ClearanceBounds, exact: bool) -> Array:
-    """What has to be positive for a posture to count (K,): the upper bound where Drake has the last
-    word; otherwise infinite where it is the best guess, too."""
+    """(K,) clearance that must be positive for a posture to be kept: the upper bound if Drake
+    checks it later; otherwise infinite if it is likely free, and negative if not."""
     if exact:
         return bounds.upper
     return np.where(

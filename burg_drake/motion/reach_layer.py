@@ -1,4 +1,4 @@
-"""Map of where an arm grasps from straight above a board; the setup page draws it."""
+"""Map of the points of a board that an arm can grasp at from above; the setup page draws it."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from burg_drake.station import Station, StationLike, as_station, world_content
 
 @dataclass(frozen=True, eq=False)
 class ReachLayer:
-    """Where an arm grasps from above.
+    """Points over a board at which an arm can grasp from above.
 
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
             that cover the board.
-        height: of the grasps, that is of the middle between the pads, above the board [m].
-        yaw: (K,) turns of the hand about the vertical [rad], over half a turn: the other half are
-            the same grasps with the fingers swapped.
-        reached: (Y, X, K) at which the arm can execute a grasp.
+        height: of the middle between the pads above the board [m].
+        yaw: (K,) rotations of the hand about the vertical [rad], over half a turn: the other half
+            are the same grasps with the fingers swapped.
+        reached: (Y, X, K) whether the arm can execute the grasp.
         cell: extents of a cell along x and y [m].
     """
 
@@ -49,17 +49,17 @@ class ReachLayer:
 
     @property
     def share(self) -> Array:
-        """(Y, X) shares of the turns that are reached."""
+        """(Y, X) shares of the yaw angles that are reached."""
         return np.asarray(self.reached.mean(axis=-1))
 
     @property
     def covered(self) -> float:
-        """Share of the board's area over which some turn is reached."""
+        """Share of the board's area over which any yaw angle is reached."""
         return float(self.reached.any(axis=-1).mean())
 
     def share_at(self, p_SQ: ArrayLike) -> Array:
-        """(N,) shares at the points that are nearest to points Q (N, 2 or more) of the scene frame
-        [m]; 0 beside the board."""
+        """(N,) shares at the grid points nearest to points Q (N, 2 or more) in the scene frame [m];
+        0 outside the board."""
         p = np.asarray(p_SQ, dtype=float)[:, :2]
         size = np.array(self.cell) * (len(self.x), len(self.y))
         cell = np.floor(p / self.cell).astype(int)
@@ -76,20 +76,20 @@ def reach_from_above(
     spacing: float = 0.02,
     yaws: int = 4,
 ) -> ReachLayer:
-    """Asks where over an empty board the arm grasps straight from above.
+    """Maps the points over an empty board at which the arm can grasp straight from above.
 
-    An answer that was given before comes from the user's cache.
+    The result is kept in the user's cache.
 
     Args:
-        station: arm, hand, obstacles, and the hand's ways to a grasp and away from it.
+        station: arm, hand, obstacles, and the hand's approach, retreat and lift.
         board: A2 if None.
         height: of the grasps above the board [m].
         spacing: largest distance between neighbouring points [m].
-        yaws: turns of the hand, evenly over half a turn.
+        yaws: number of yaw angles, evenly over half a turn.
 
     Raises:
-        InvalidInputError: the station has no arm, or one that collides at home; or a number is out
-            of its range.
+        InvalidInputError: the station has no arm, the arm collides at home, or a number is out of
+            range.
     """
     station = as_station(station)
     if not (0.0 < spacing < np.inf and 0.0 <= height < np.inf and yaws >= 1):
@@ -111,7 +111,7 @@ def reach_from_above(
 
         def ask(j: NDArray[np.intp], i: NDArray[np.intp]) -> NDArray[np.bool_]:
             found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
-            return np.array([one.outcome is None for one in found]).reshape(-1, yaws)
+            return np.array([verdict.outcome is None for verdict in found]).reshape(-1, yaws)
 
         return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
 
@@ -121,8 +121,8 @@ def reach_from_above(
 
 @lru_cache(maxsize=2)
 def reach_without_objects(station: Station) -> ArmReach:
-    """The arm over an empty board, made once a process for the same `Station`: judges grasps of no
-    instance (`""`), with the station's obstacles in place.
+    """An `ArmReach` over an empty board, for grasps without an instance (`""`). It is made once per
+    process and `Station`.
 
     Raises:
         InvalidInputError: see `ArmReach`.
@@ -134,14 +134,14 @@ def reach_without_objects(station: Station) -> ArmReach:
 def answers_by_refinement(
     rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
-    """(Y, X, K) answers, of which `ask` is asked those that do not follow from their neighbours.
+    """(Y, X, K) answers of `ask` on a grid. Points whose coarse neighbours agree are not asked.
 
     Args:
         rows, columns: number of points along y and x.
-        yaws: answers a point.
-        ask: of points by their rows (N,) and columns (N,) the answers (N, K).
+        yaws: number of answers per point.
+        ask: returns the answers (N, K) for points by their rows (N,) and columns (N,).
     """
-    coarsest_stride = 4  # Grid points between those that are asked first.
+    coarsest_stride = 4  # Grid points between the points asked first.
     unknown = -1  # Not asked yet.
     found = np.full((rows, columns, yaws), unknown, dtype=np.int8)
     stride = coarsest_stride
@@ -164,12 +164,12 @@ def answers_by_refinement(
 
 
 def _coarse_nodes(count: int, stride: int) -> Indices:
-    """Every so many of some points, and the last."""
+    """Every `stride`-th of `count` points, and the last."""
     return np.unique([*range(0, count, stride), count - 1])
 
 
 def _surrounding_nodes(index: Indices, count: int, stride: int) -> tuple[Indices, Indices]:
-    """The nodes on both sides of points; twice the same for a node."""
+    """The coarse nodes on both sides of points; twice the point itself if it is a node."""
     nodes = _coarse_nodes(count, stride)
     below = np.searchsorted(nodes, index, side="right") - 1
     return nodes[below], nodes[np.searchsorted(nodes, index)]

@@ -1,4 +1,4 @@
-"""What the arm can do with a grasp: a motion, or what failed first."""
+"""Verdict of the arm on a grasp: a motion, or what failed first."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class ArmPath:
     Between two rows the arm moves straight in joint space.
 
     Attributes:
-        X_WG: (4, 4) the grasp in the world with the fingers as the arm puts them: as it was asked
-            for, or with the two swapped.
+        X_WG: (4, 4) the grasp in the world with the chosen finger assignment: as given, or with
+            the fingers swapped.
         transfer: (M, n) from the home posture to the pregrasp; M is at least 2.
         approach: (K, n) from pregrasp to grasp; the hand moves straight.
-        lift: (L, n) from there along the lift; a single row if it has no height.
+        lift: (L, n) along the lift; a single row if it has no height.
         retreat: (J, n) from the grasp straight back along the approach, with the target; None if
             the lift begins at the grasp.
-        clearance: of the hand, with what it holds, from everything on approach, retreat and
-            lift, at least [m]; NaN if it is not known.
+        clearance: lower bound of the clearance of the hand and the held target on approach,
+            retreat and lift [m]; NaN if it is not known.
     """
 
     X_WG: Array
@@ -38,20 +38,20 @@ class ArmPath:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """What the arm can do with a grasp.
+    """Verdict of the arm on a grasp.
 
     Attributes:
-        outcome: what failed first; None if nothing did.
-        blocker: what was in the way: a body, or an arm link and a body such as `panda_link5 vs
-            mug`, of the motion that came closest; empty if nothing was. Of a yes whose lift is not
-            whole, what was in the way of the whole one.
-        clearance: of a yes, how far hand and arm stay away from everything on the straight parts,
-            at least, where 0 means that no more than "free" is known; of a no, that of what was in
-            the way, negative where it overlaps [m]; NaN where nothing was.
+        outcome: what failed first; None if the arm can execute the grasp.
+        blocker: obstacle of the motion that came closest: a body, or an arm link and a body such as
+            `panda_link5 vs mug`; empty if there was none. After success with a shortened lift, the
+            obstacle of the whole lift.
+        clearance: after success, lower bound of the clearance of hand and arm on the straight
+            segments [m]; 0 if they are only known to be free. After a failure, clearance from the
+            blocker, negative if it overlaps; NaN without a blocker.
         excess: how far the best configuration is beyond a joint limit, less
             `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason.
-        path: the motion; None if there is none.
-        lift: of a yes, length of its lift [m]; NaN of a no.
+        path: the motion; None after a failure.
+        lift: length of the lift [m]; NaN after a failure.
     """
 
     outcome: Outcome | None
@@ -73,6 +73,6 @@ class Reach:
 
     @property
     def witness(self) -> ArmPath | None:
-        """`path`, by its earlier name; goes with 0.2."""
+        """Deprecated name of `path`; to be removed in 0.2."""
         warnings.warn("Reach.witness is Reach.path since 0.1", DeprecationWarning, stacklevel=2)
         return self.path

@@ -37,19 +37,19 @@ from burg_drake.station import (
 
 @dataclass(frozen=True, kw_only=True)
 class ReachabilitySettings:
-    """What is asked of the arm.
+    """Grid of points and hand orientations of a reachability map.
 
     Attributes:
         spacing: largest distance between neighbouring points over the board [m].
-        heights: of the points above the board, that is of the middle between the pads [m].
+        heights: of the middle between the pads above the board [m].
         tilts_deg: angles of the approach direction from straight down [degrees].
-        headings: for each tilt the number of directions around the vertical; numbers that grow like
+        headings: for each tilt the number of directions around the vertical; numbers that grow with
             the sine of the tilt spread the directions evenly.
-        yaws: turns of the hand about each approach direction. Half a turn is the same grasp with
-            the fingers swapped; either way to put them counts.
-        redundant: values of the redundant joint that are swept, round by round; what a round
-            reached, the next one leaves out. A round that is an odd multiple of another one has its
-            values, too, and leaves them out.
+        yaws: number of hand rotations about each approach direction, over half a turn. The other
+            half are the same grasps with the fingers swapped; either finger assignment counts.
+        redundant: number of values of the redundant joint in each round. A round skips grasps that
+            an earlier one reached. Values of an earlier round, which an odd multiple of its number
+            has, too, are skipped.
         limit_margin: distance to keep from the joint limits [rad].
     """
 
@@ -92,7 +92,7 @@ class ReachabilitySettings:
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityMap:
-    """Which hand orientations an arm reaches over a board.
+    """Hand orientations that an arm reaches over a board.
 
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
@@ -100,7 +100,7 @@ class ReachabilityMap:
         heights: (Z,) of the points above the board [m].
         tilt: (K,) angle of each orientation's approach direction from straight down [rad].
         R_WG: (K, 3, 3) orientations of the grasp frame in the world.
-        reached: (Z, Y, X, K) which of them the arm reaches.
+        reached: (Z, Y, X, K) whether the arm reaches an orientation.
         cell: extents of a cell along x and y [m].
     """
 
@@ -120,8 +120,7 @@ class ReachabilityMap:
 
     @property
     def share_from_above(self) -> Array:
-        """(Z, Y, X) shares of the turns of a hand that points straight down; NaN if there are none
-        among the orientations."""
+        """(Z, Y, X) shares of the orientations that point straight down; NaN if there are none."""
         down = self.reached[..., self.tilt == 0.0]
         if not down.shape[-1]:
             return np.full(down.shape[:-1], np.nan)
@@ -129,19 +128,19 @@ class ReachabilityMap:
 
     @property
     def covered(self) -> Array:
-        """(Z,) shares of the board's area over which some orientation is reached."""
+        """(Z,) shares of the board's area over which any orientation is reached."""
         return np.asarray(self.reached.any(axis=-1).mean(axis=(1, 2)))
 
     @property
     def covered_from_above(self) -> Array:
-        """(Z,) shares of the board's area over which the hand comes straight down, turned somehow;
-        NaN if no orientation points straight down."""
+        """(Z,) shares of the board's area over which any orientation that points straight down is
+        reached; NaN if there are none."""
         share = self.share_from_above
         return np.where(np.isnan(share[:, 0, 0]), np.nan, (share > 0.0).mean(axis=(1, 2)))
 
     def share_at(self, p_SQ: ArrayLike) -> Array:
-        """(N,) shares at the points of the grid that are nearest to points Q (N, 3) over the board
-        in the scene frame [m]; what is beside the board is taken to its edge."""
+        """(N,) shares at the grid points nearest to points Q (N, 3) in the scene frame [m]. Points
+        outside the board count as on its edge."""
         p = np.asarray(p_SQ, dtype=float)
         i, j, k = (
             np.abs(values - p[:, axis, None]).argmin(axis=1)
@@ -153,15 +152,14 @@ class ReachabilityMap:
 def map_reachability(
     scene: SceneLike, station: StationLike, *, settings: ReachabilitySettings | None = None
 ) -> ReachabilityMap:
-    """Maps what an arm reaches over the board of a scene, in between the scene's objects.
+    """Maps the hand orientations that an arm reaches over the board, among the scene's objects.
 
-    What was mapped before comes from the user's cache.
+    The result is kept in the user's cache.
 
     Args:
-        scene: its board, and all that stands on it as the document places it.
-            `without_free_objects` takes the objects away.
+        scene: the board, and the objects as the document places them; see `without_free_objects`.
         station: arm, hand and surroundings.
-        settings: what is asked.
+        settings: points and orientations.
 
     Raises:
         InvalidInputError: the station has no arm.
@@ -188,7 +186,7 @@ def map_reachability(
 
 
 def require_arm(station: Station) -> None:
-    """Refuses a station that cannot reach for anything.
+    """Refuses a station without an arm.
 
     Raises:
         InvalidInputError: it has no arm.
@@ -229,7 +227,7 @@ def grasps_over_board(X_WS: Array, x: Array, y: Array, heights: Array, R_WG: Arr
 def _reached_grasps(
     scene: Scene, station: Station, X_WG: Array, settings: ReachabilitySettings
 ) -> NDArray[np.bool_]:
-    """(N,) whether the arm has a free configuration with either way to put the fingers."""
+    """(N,) whether the arm has a free configuration with either finger assignment."""
     diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
     solutions = arm_solutions(
         ArmKinematics.of(diagram),
@@ -242,18 +240,18 @@ def _reached_grasps(
     X_AG = inverse(arm.X_WA.matrix()) @ X_WG
     X_AH = station.hand.X_AH(np.stack([X_AG, swap_fingers(X_AG)], axis=1))
     reached = np.zeros(len(X_WG), dtype=bool)
-    for turn in range(solutions.rounds):
+    for round_index in range(solutions.rounds):
         left = np.flatnonzero(~reached)
-        pose, q = solutions.solve(X_AH[left].reshape(-1, 4, 4), turn)
-        for grasp, some in _split_by_preference(left[pose // 2], q, np.array(arm.home)):
+        pose, q = solutions.solve(X_AH[left].reshape(-1, 4, 4), round_index)
+        for grasp, batch in _split_by_preference(left[pose // 2], q, np.array(arm.home)):
             new = ~reached[grasp]
-            reached[grasp[new][_are_free(proximity, collision, some[new])]] = True
+            reached[grasp[new][_are_free(proximity, collision, batch[new])]] = True
     return reached
 
 
 def _split_by_preference(grasp: Indices, q: Array, home: Array) -> Iterator[tuple[Indices, Array]]:
-    """Configurations (S, n) of grasps (S,) in parts: of each grasp the one nearest to home, then
-    the next two, four and so on, as most grasps need no more than the first."""
+    """Yields configurations (S, n) of grasps (S,) in batches: of each grasp the one nearest to
+    home, then the next two, four and so on, as the first is enough for most grasps."""
     order = np.lexsort((np.abs(q - home).max(axis=1), grasp))
     grasp, q = grasp[order], q[order]
     rank = np.arange(len(grasp)) - np.searchsorted(grasp, grasp)
@@ -263,8 +261,8 @@ def _split_by_preference(grasp: Indices, q: Array, home: Array) -> Iterator[tupl
 
 
 def _are_free(proximity: ArmProximity, collision: ArmCollision, q: Array) -> NDArray[np.bool_]:
-    """(S,) whether configurations (S, n) are free; the hand itself is known to be clear of the
-    scene. Drake is asked where the fast bounds leave it open."""
+    """(S,) whether configurations (S, n) are free, for a hand that is known to be clear of the
+    scene. Drake checks those that the fast bounds do not decide."""
     chunk_size = 20_000  # Configurations measured together. Bounds the memory to tens of MB.
     free = np.empty(len(q), dtype=bool)
     for k in range(0, len(q), chunk_size):

@@ -1,4 +1,4 @@
-"""A graph of arm configurations around the home posture, and shortest paths in it from there."""
+"""A graph of arm configurations around the home posture, and shortest paths in it from home."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from burg_drake.station import StationDiagram
 
 
 class ObjectViewLimits:
-    """When the hand of a posture looks at an object."""
+    """Limits within which the hand of a posture points at an object."""
 
     min_distance = 0.03  # Metres from the grasp frame to the origin of an object.
     max_distance = 0.30  # Metres from the grasp frame to the origin of an object.
@@ -27,7 +27,7 @@ class ObjectViewLimits:
 def random_postures(
     home: Array, lower: Array, upper: Array, count: int, rng: np.random.Generator
 ) -> Array:
-    """(count, n) postures within joint limits, uniform and around home by turns."""
+    """(count, n) random postures within joint limits, alternately around home and uniform."""
     spread = 0.25  # Standard deviation around home, over a joint's range.
     q = rng.uniform(lower, upper, (count, len(home)))
     around = home + spread * (upper - lower) * rng.standard_normal(q[::2].shape)
@@ -38,10 +38,10 @@ def random_postures(
 def postures_over_objects(
     station_diagram: StationDiagram, links: ArmLinks, home: Array, lower: Array, upper: Array
 ) -> Array:
-    """Chooses random postures by where the hand is and where it points.
+    """Random postures whose hand is near an object and points at it.
 
     Args:
-        station_diagram: says where the scene's free objects are, and what hand there is.
+        station_diagram: the scene's free objects and the hand.
         links: the arm's kinematics in the world.
         home: (n,) posture around which half of the postures are drawn.
         lower, upper: (n,) joint limits [rad or m].
@@ -68,7 +68,7 @@ def postures_over_objects(
 def _looks_at_object(
     links: ArmLinks, frame: int, X_FG: Array, objects: list[Array], q: Array
 ) -> NDArray[np.bool_]:
-    """(N,) whether the hand looks at one of the objects in postures (N, n)."""
+    """(N,) whether the hand points at one of the objects in postures (N, n)."""
     block_size = 4096  # Postures whose links are placed at once.
     looks = np.zeros(len(q), dtype=bool)
     for start in range(0, len(q), block_size):
@@ -89,7 +89,7 @@ def _looks_at_object(
 
 
 class Roadmap:
-    """Configurations around home, and segments between them that nothing speaks against yet.
+    """Configurations around home, and segments between them that have not been refuted.
 
     Attributes:
         q: (N, n) configurations, home first.
@@ -106,15 +106,14 @@ class Roadmap:
         focus: Array | None,
         nodes: int,
     ) -> None:
-        """Lays the graph out.
+        """Builds the graph, or reads it from the user's cache.
 
         Args:
             edges: judges segments.
-            home: (n,) the posture that all ways begin at.
+            home: (n,) the posture at which all paths begin.
             lower, upper: (n,) joint limits [rad or m].
-            focus: (F, n) postures like the goals to come, for two thirds of the nodes.
-            nodes: how many configurations to look for; those that home does not lead to are
-                dropped.
+            focus: (F, n) postures like the expected goals, for two thirds of the nodes.
+            nodes: number of configurations before those not connected to home are dropped.
         """
         self._edges = edges
         near = np.empty((0, len(home))) if focus is None else focus
@@ -139,8 +138,8 @@ class Roadmap:
         return np.argsort(distance, kind="stable")[:count]
 
     def check_ahead(self, nodes: NDArray[np.intp]) -> None:
-        """Judges the edges of the ways that `path` will look at first, with one batch of the fast
-        tier; the verdicts are the same."""
+        """Judges the edges that `path` will check first for these nodes, in one batch of the fast
+        tier; the verdicts do not change."""
         reached = nodes[np.isfinite(self.distance[nodes])]
         paths = (pairwise(self._chain(node)) for node in dict.fromkeys(reached.tolist()))
         asked = {(min(edge), max(edge)) for path in paths for edge in path}
@@ -152,7 +151,7 @@ class Roadmap:
             (self._free if free else self._blocked).add((first, second))
 
     def path(self, node: int) -> Array | None:
-        """The shortest free way to a node: (M, n) corners from home, or None."""
+        """The shortest free path to a node: (M, n) corners from home, or None."""
         while np.isfinite(self.distance[node]):
             chain = self._chain(node)
             refuted = next((e for e in pairwise(chain) if not self._is_free(e)), None)
@@ -164,11 +163,11 @@ class Roadmap:
         return None
 
     def _chain(self, node: int) -> list[int]:
-        """The nodes from home to one, by what is known."""
+        """The nodes from home to `node` on the shortest path that is not refuted."""
         return chain_to_root(self._before, node)[::-1]
 
     def _is_free(self, edge: tuple[int, int]) -> bool:
-        first, second = sorted(edge)  # so that the verdict is that of the edge, not of a direction
+        first, second = sorted(edge)  # so that the verdict does not depend on the direction
         if (first, second) not in self._free and (first, second) not in self._blocked:
             free = self._edges.is_free(self.q[first], self.q[second])
             (self._free if free else self._blocked).add((first, second))
@@ -176,7 +175,7 @@ class Roadmap:
 
 
 def chain_to_root(before: NDArray[np.integer], node: int) -> list[int]:
-    """The nodes from one to the root of its tree, by the node before each; negative at a root."""
+    """The nodes from `node` to the root of its tree, given each node's parent (negative: root)."""
     chain = [node]
     while before[chain[-1]] >= 0:
         chain.append(int(before[chain[-1]]))
@@ -191,7 +190,7 @@ def _build_roadmap(
     focus: Array,
     nodes: int,
 ) -> Arrays:
-    """Nodes and edges of a roadmap; for the arguments see there."""
+    """Nodes and edges of a roadmap; for the arguments see `Roadmap`."""
     node_clearance = 0.01  # Metres. Lower bound of the clearance of all nodes but home.
     clearance_margin = 1e-3  # Metres below the clearance at home, where that is small.
     rng = rng_from("burg_drake home tree", "", nodes)
@@ -210,7 +209,7 @@ def _build_roadmap(
 
 
 def _keep_clear(edges: EdgeChecker, q: Array, count: int, clearance: float) -> Array:
-    """The first `count` configurations with clearance."""
+    """Up to `count` configurations with at least this clearance, of the first 3 `count`."""
     q = q[: 3 * count]
     return q[edges.proximity.bounds(q).lower > clearance][:count]
 
@@ -218,7 +217,7 @@ def _keep_clear(edges: EdgeChecker, q: Array, count: int, clearance: float) -> A
 def _connect_neighbours(
     edges: EdgeChecker, q: Array, scale: Array
 ) -> tuple[NDArray[np.intp], Array]:
-    """(E, 2) pairs of near nodes that seem to be connected, and the displacements [m]."""
+    """(E, 2) pairs of near nodes with a segment that seems free, and the displacements [m]."""
     scaled = q * scale
     ranks = np.arange(1, min(7, len(q)) + 1)  # itself and the 6 nearest
     _, near = cKDTree(scaled).query(scaled, k=ranks, p=1.0)
@@ -230,7 +229,7 @@ def _connect_neighbours(
 
 
 def _joint_levers(edges: EdgeChecker, q: Array) -> Array:
-    """(n,) displacement per unit of each joint, the mean over postures (P, n)."""
+    """(n,) displacement per unit of each joint, averaged over postures (P, n)."""
     joint_step = 1e-3  # Radians or metres.
     q_a = np.repeat(q, q.shape[1], axis=0)
     q_b = q_a + joint_step * np.tile(np.eye(q.shape[1]), (len(q), 1))
@@ -241,7 +240,7 @@ def _joint_levers(edges: EdgeChecker, q: Array) -> Array:
 def _shortest_paths(
     ends: NDArray[np.intp], length: Array, nodes: int
 ) -> tuple[Array, NDArray[np.int32]]:
-    """(N,) distances from node 0, infinite where no way leads, and the nodes before."""
+    """(N,) distances from node 0, infinite for unreachable nodes, and the nodes before."""
     graph = csr_matrix((length, (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
     distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
     return distance, before

@@ -3,9 +3,9 @@
 Distances between links with one or two joints between them are tables over these joints. All
 other pairs are compared by their trees of balls.
 
-A table holds the signed distance of the collision geometry at the centres of cells. In between it
-is bounded through levers: while a joint moves, no point of one link moves farther, as seen from
-the other, than the joint's step times the link's lever.
+A table holds the signed distance of the collision geometry at the centres of cells. In between,
+levers bound the distance: while a joint moves, no point of one link moves farther relative to the
+other link than the joint's step times the lever.
 
 Distances come from `geometry`, as Drake's are wrong by centimetres for some boxes with parallel
 edges (drake 1.51).
@@ -47,7 +47,7 @@ from burg_drake.station import StationDiagram
 
 @dataclass(frozen=True, eq=False)
 class _Core:
-    """A shape as the sum of a polytope, a disc and a ball, in its own frame.
+    """A shape as the Minkowski sum of a polytope, a disc and a ball, in its own frame.
 
     Attributes:
         vertices: (V, 3) [m].
@@ -61,7 +61,7 @@ class _Core:
 
 
 class LinkDistance:
-    """The distance of one body of the robot from others that lie in one frame of the arm."""
+    """The distance of one body of the robot from others that are fixed in one frame of the arm."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class LinkDistance:
         """Reads the collision geometry of the bodies.
 
         Raises:
-            InvalidInputError: a geometry is of a shape that is not known.
+            InvalidInputError: a geometry has an unsupported shape.
         """
         self._links = links
         self._joints = tuple(range(links.frame_of[body], links.frame_of[others[0]]))
@@ -88,24 +88,24 @@ class LinkDistance:
 
         Args:
             positions: (C, m) of the joints between the bodies [rad or m].
-            ceiling: what is farther apart may count as infinitely far [m].
+            ceiling: larger distances may be returned as infinite [m].
 
         Returns:
-            (C,) distances. Of bodies that overlap it is 0 or less: they do so at least as deeply,
-            as far as that is known.
+            (C,) distances. For bodies that overlap it is 0 or less, and the overlap is at least as
+            deep.
         """
         size = max(1, 2**16 // self.pairs)  # bounds the memory
         starts = range(0, len(positions), size)
-        found = [self._at(positions[start : start + size], ceiling) for start in starts]
+        found = [self._distances_at(positions[start : start + size], ceiling) for start in starts]
         return np.concatenate([np.empty(0), *found])
 
     @property
     def pairs(self) -> int:
-        """Pairs of shapes of which each configuration takes the least distance."""
+        """Number of pairs of shapes that are compared in each configuration."""
         return len(self._balls)
 
-    def _at(self, positions: Array, ceiling: float) -> Array:
-        X = Poses.of(self._links.between(self._joints, positions))
+    def _distances_at(self, positions: Array, ceiling: float) -> Array:
+        X = Poses.of(self._links.relative_poses(self._joints, positions))
         pair = np.tile(np.arange(self.pairs), len(positions))
         which = np.repeat(np.arange(len(positions)), self.pairs)
         of_cores = shape_distances(
@@ -140,7 +140,7 @@ def _cores(
     return ShapeBatch(
         *(x, y, z, count),
         center=np.array([v.mean(axis=0) for v in vertices]),
-        across=(X[:, :3, 0].T.copy(), X[:, :3, 1].T.copy()),
+        disc_axes=(X[:, :3, 0].T.copy(), X[:, :3, 1].T.copy()),
         disc=np.array([core.disc for core in cores]),
         ball=np.array([core.ball for core in cores]),
     )
@@ -172,14 +172,14 @@ class Tables:
 
     max_joints = 2  # Joints between the links of a table.
     cell_angle = np.deg2rad(3.0)  # Radians. Size of the smallest cells at most.
-    cell_length = 6e-3  # Metres. The same of joints that slide.
+    cell_length = 6e-3  # Metres. Size of the smallest cells of prismatic joints at most.
     levels = 4  # Halvings of the largest cells at most.
     extra_levels = 2  # Further halvings, to decide whether links can meet.
     max_cells = 200_000  # Cells above which there is no table.
     max_distances = 500_000  # Distances of shapes above which there is no table; some seconds.
-    known_distance = 0.03  # Metres. Larger distances are bounded by about this.
-    relative_error = 0.5  # Uncertainty over distance at which a cell is not halved any more.
-    depth_margin = 0.02  # Metres that an overlap may be deeper than is known.
+    known_distance = 0.03  # Metres. Lower bounds of larger distances are about this.
+    relative_error = 0.5  # Uncertainty over distance below which a cell is not halved any more.
+    depth_margin = 0.02  # Metres that an overlap may be deeper than computed.
     accuracy = 5e-5  # Metres. Above the errors of distances, Drake's included (3e-5 m).
 
 
@@ -188,12 +188,12 @@ class JointGrid:
     """Cells over the range of m joints.
 
     Attributes:
-        joints: (m,) their numbers.
-        low, step: (m,) where the first cells begin and how large they are [rad or m].
+        joints: (m,) their indices.
+        low, step: (m,) start of the first cell and size of the cells [rad or m].
         count: (m,) numbers of cells.
-        whole: (m,) whether the cells go once around, and positions count modulo a turn.
-        lever: (m,) how far a joint moves the one link as seen from the other at most, by the
-            joint's way [m/rad, or 1].
+        whole: (m,) whether the cells cover a whole turn; positions then count modulo a turn.
+        lever: (m,) largest motion of one link relative to the other per unit of the joint [m/rad,
+            or 1].
     """
 
     joints: tuple[int, ...]
@@ -207,8 +207,8 @@ class JointGrid:
     def over(
         cls, links: ArmLinks, a: BodyBalls, several: Sequence[BodyBalls], limits: Array
     ) -> JointGrid | None:
-        """The grid for a body and some others, all in one frame beyond it; None if there are too
-        many joints between them, or too long a range.
+        """The grid for a body and others, all fixed in one frame beyond it; None if there are too
+        many joints between them, or their range is too large.
 
         Args:
             links: the arm.
@@ -235,12 +235,12 @@ class JointGrid:
         return cls(joints, low, (high - low) / count, count, tuple(whole.tolist()), lever)
 
     def centers(self, cells: Indices, level: int) -> Array:
-        """(C, m) middles of cells (C, m) that are larger by 2^level [rad or m]."""
+        """(C, m) centres of cells (C, m) that are 2^level times the smallest ones [rad or m]."""
         return np.asarray(self.low + (cells + 0.5) * (self.step * 2**level))
 
-    def within(self, cells: Indices, level: int) -> tuple[Indices, Array]:
-        """(C, F) numbers of the smallest cells in larger ones (C, m), and (F,) how far the link
-        may move between their middles and those of the larger ones [m]."""
+    def finest_cells(self, cells: Indices, level: int) -> tuple[Indices, Array]:
+        """(C, F) numbers of the smallest cells in larger cells (C, m), and (F,) largest motion of
+        the link between the centres of the two [m]."""
         part = _all_cells([2**level] * len(self.joints))
         inner = cells[:, None] * 2**level + part
         number = np.zeros(inner.shape[:2], dtype=int)
@@ -255,7 +255,7 @@ class PairTable:
 
     Attributes:
         grid: the cells.
-        lower, upper: (cells,) bounds at the middles of the smallest cells [m].
+        lower, upper: (cells,) bounds at the centres of the smallest cells [m].
     """
 
     grid: JointGrid
@@ -278,7 +278,7 @@ class PairTable:
                 | inside
                 | (level == 0)
             )
-            number, reach = grid.within(cells[done], level)
+            number, reach = grid.finest_cells(cells[done], level)
             at = found[done, None]
             lower[number] = (
                 np.where(at > 0.0, np.minimum(at, ceiling), at - Tables.depth_margin)
@@ -307,8 +307,8 @@ class PairTable:
 
 
 def may_collide(grid: JointGrid, distance: LinkDistance) -> bool:
-    """Whether two bodies overlap anywhere in the grid, or come so close that it is not sure, or
-    would take too long to find out."""
+    """Whether two bodies may overlap anywhere in the grid. True also if they come too close to
+    decide, or if deciding would take too long."""
     cells = _all_cells(grid.count // 2**Tables.levels)
     for level in range(Tables.levels, -Tables.extra_levels - 1, -1):
         slack = float(grid.step @ grid.lever) * 2**level / 2 + Tables.accuracy
@@ -324,7 +324,7 @@ def may_collide(grid: JointGrid, distance: LinkDistance) -> bool:
 
 
 def _all_cells(counts: Iterable[int]) -> Indices:
-    """(C, m) all the cells of a grid with m counts; one if m is 0."""
+    """(C, m) all cells of a grid with m counts; a single cell if m is 0."""
     sizes = tuple(int(count) for count in counts)
     return np.asarray(np.indices(sizes, dtype=np.intp).reshape(len(sizes), math.prod(sizes)).T)
 
@@ -338,10 +338,10 @@ def _halve_cells(cells: Indices) -> Indices:
 def _levers(
     links: ArmLinks, a: BodyBalls, b: BodyBalls, joints: tuple[int, ...], limits: Array
 ) -> list[float]:
-    """By each joint, how far it moves one of the bodies as seen from the other, at most.
+    """For each joint, the largest motion of one body relative to the other per unit of the joint.
 
-    The first joint's axis stands still in the first body's frame and the last one's in the
-    other's, so that the distance from it is that of points that do not move.
+    The first joint's axis is fixed in the first body's frame and the last joint's axis in the other
+    body's frame, so that their distances from the body's points are constant.
     """
     levers = []
     for joint in joints:
@@ -378,7 +378,7 @@ SELF_REFINE_BELOW = 0.022
 def collision_pairs(
     plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[BodyIndex]
 ) -> list[tuple[BodyIndex, BodyIndex]]:
-    """Pairs of bodies that Drake does not leave out of collision checks."""
+    """Pairs of bodies that Drake includes in collision checks."""
     own = {body: plant.GetCollisionGeometriesForBody(plant.get_body(body)) for body in bodies}
 
     def collide(a: BodyIndex, b: BodyIndex) -> bool:
@@ -389,13 +389,13 @@ def collision_pairs(
 
 
 class SelfClearance:
-    """The arm against itself.
+    """Clearance of the arm from itself.
 
     Args:
         trees: balls that cover the robot.
-        pairs: numbers of bodies of the trees that are compared by them, the earlier one first.
-        tables: of other pairs, which stand beside them.
-        apart: pairs that are proven not to meet within the joints' limits.
+        pairs: pairs of body indices that are compared by their trees, the earlier body first.
+        tables: tables of other pairs, with these pairs.
+        apart: pairs that are proven not to meet within the joint limits.
     """
 
     def __init__(
@@ -416,7 +416,7 @@ class SelfClearance:
     def of(
         cls, station_diagram: StationDiagram, links: ArmLinks, trees: BallTrees, limits: Array
     ) -> SelfClearance:
-        """Of all pairs that can meet within limits (n, 2) of the joints' positions [rad or m]."""
+        """Computes tables for all pairs that can meet within the joint limits (n, 2) [rad or m]."""
         inspector = station_diagram.scene_graph.model_inspector()
         bodies = [body.body for body in trees.bodies]
         counted = {
@@ -439,9 +439,9 @@ class SelfClearance:
 
         Args:
             q: (K, n) configurations.
-            poses: theirs.
-            centers: (3, B, K) places of the bodies' balls.
-            wanted: (K,) of which configurations more is wanted than a glance at those balls.
+            poses: link poses of the configurations.
+            centers: (3, B, K) centres of the balls around the bodies.
+            wanted: (K,) whether to descend into the trees for a configuration.
         """
         block_size = 2**9  # Configurations evaluated together. They fit a processor's caches.
         lower = np.full(len(q), np.inf, dtype=np.float32)
@@ -475,7 +475,8 @@ class SelfClearance:
         lower: Single,
         upper: Single,
     ) -> None:
-        """Brings in what nodes `one` and `two` of the trees are apart in configurations `which`."""
+        """Lowers `lower` and `upper` by the distances of tree nodes `one` and `two` (F,) in
+        configurations `which` (F,)."""
         chunk_size = 2**9  # Pairs of nodes compared together. They fit a processor's caches.
         trees = self._trees
         for start in range(0, len(which), chunk_size):
@@ -504,9 +505,9 @@ def _tables(
     limits: Array,
     pairs: Sequence[Pair],
 ) -> tuple[list[ClearanceTable], list[Pair]]:
-    """Tables of pairs with few joints between them, and the pairs that there is no table of.
+    """Tables of pairs with few joints between them, and the pairs without a table.
 
-    Of links that cannot meet wherever these joints stand nothing is kept.
+    Pairs of links that cannot meet at any joint positions are in neither.
     """
     close: dict[tuple[int, int], list[int]] = {}
     left = []

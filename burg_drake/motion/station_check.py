@@ -35,14 +35,14 @@ from burg_drake.station import (
 
 @dataclass(frozen=True, eq=False)
 class ArmFigures:
-    """What a station's arm can do.
+    """Key figures of a station's arm.
 
     Attributes:
         joints: names, from base to hand.
         lower, upper, home: (n,) limits and home posture [rad or m].
-        span: how far it reaches at most.
-        clearance: how near it is to anything at home.
-        reachability: what it reaches over the board.
+        span: largest reach.
+        clearance: clearance at home.
+        reachability: reachability of the board.
     """
 
     joints: tuple[str, ...]
@@ -59,10 +59,10 @@ class StationReport:
     """A station that can be used.
 
     Attributes:
-        hand: what the hand measures.
-        arm: what the arm can do; None without one.
+        hand: key figures of the hand.
+        arm: key figures of the arm; None without one.
         seen: share of the board that each camera sees.
-        warnings: what its author should know, a line each.
+        warnings: warnings to the station's author, a line each.
     """
 
     hand: HandFigures
@@ -72,7 +72,7 @@ class StationReport:
 
 
 def empty_scene(board: Board | None = None) -> Scene:
-    """A scene with a board, A2 if none is given, and nothing on it."""
+    """A scene with an empty board, A2 if None."""
     document = SceneDocument(name="empty_board", library="household", board=board or Board())
     return Scene(document, load_library("household"), data_root() / "scenes")
 
@@ -86,12 +86,12 @@ def inspect_station(
     """Runs all checks of a station.
 
     Args:
-        station: what is checked.
-        scene: what stands on it; an empty board if None.
+        station: the station.
+        scene: the scene on it; an empty board if None.
         settings: of the reachability map.
 
     Raises:
-        InvalidInputError: it cannot be used; one line says why.
+        InvalidInputError: the station cannot be used; one line says why.
     """
     station = as_station(station)
     scene = None if scene is None else as_scene(scene)
@@ -120,21 +120,21 @@ def usable_span(scene: Scene, station: Station) -> ArmSpan:
     """The span of a station's arm.
 
     Raises:
-        InvalidInputError: it cannot be used; see `require_usable_arm`.
+        InvalidInputError: the arm cannot be used; see `require_usable_arm`.
     """
     diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
     return _require_usable(diagram, ArmKinematics.of(diagram))
 
 
 def _require_usable(diagram: StationDiagram, kinematics: ArmKinematics) -> ArmSpan:
-    """The arm's span, if the arm can be used."""
+    """Returns the arm's span, or raises an error if the arm cannot be used."""
     scene, station = diagram.scene, diagram.station
     span = ArmSpan.of(kinematics, station)
     fault = unreachable_board(span, station, scene.board)
     if fault:
         raise InvalidInputError(fault)
     require_free_home(diagram, ArmCollision(diagram))
-    ArmLimits.of(diagram, kinematics)  # which no motion gets its time without
+    ArmLimits.of(diagram, kinematics)  # required to time motions
     return span
 
 
@@ -157,7 +157,7 @@ def _arm_figures(diagram: StationDiagram, settings: ReachabilitySettings | None)
 def _reach_warnings(
     arm: ArmFigures, scene: Scene, station: Station, settings: ReachabilitySettings | None
 ) -> list[str]:
-    """What of board and objects is out of reach."""
+    """Warnings about parts of the board and objects out of reach; an error if all of it is."""
     reached = arm.reachability.reached.any(axis=(0, 3))
     if not reached.any() and not _reaches_cleared(scene, station, settings):
         heights = " or ".join(f"{100 * h:g}" for h in arm.reachability.heights)
@@ -184,7 +184,7 @@ def _reach_warnings(
 
 
 def _reaches_cleared(scene: Scene, station: Station, settings: ReachabilitySettings | None) -> bool:
-    """Whether the arm reaches anything of the board once the objects are taken away."""
+    """Whether the arm reaches any part of the board without the objects."""
     if not scene.instances:
         return False
     cleared = map_reachability(without_free_objects(scene), station, settings=settings)
@@ -192,12 +192,12 @@ def _reaches_cleared(scene: Scene, station: Station, settings: ReachabilitySetti
 
 
 def _is_mapped(reachability: ReachabilityMap, scene: Scene, name: str) -> bool:
-    """Whether the map says anything of an instance: what stands on furniture is above it."""
+    """Whether the map covers an instance: objects on furniture are above it."""
     return bool(placed_vertices(scene, name)[:, 2].min() < max(reachability.heights))
 
 
 def _is_near_reached(reachability: ReachabilityMap, scene: Scene, name: str) -> bool:
-    """Whether some orientation is reached over the rectangle around an instance, at any height."""
+    """Whether any orientation is reached over the rectangle around an instance, at any height."""
     p_SV = placed_vertices(scene, name)
     within = [
         (p_SV[:, k].min() - extent <= values) & (values <= p_SV[:, k].max() + extent)
@@ -209,5 +209,5 @@ def _is_near_reached(reachability: ReachabilityMap, scene: Scene, name: str) -> 
 
 
 def format_share(share: float) -> str:
-    """A share for people; never 100 % of less than all."""
+    """A share as a whole percentage; 100 % only for 1."""
     return f"{np.floor(100.0 * share):.0f} %" if share < 1.0 else "100 %"

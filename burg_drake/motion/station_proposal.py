@@ -41,9 +41,9 @@ class StationProposal:
 
     Attributes:
         document: the station.
-        source: name of the built-in station that it is; empty for a new one.
-        misfits: why each of the built-in stations that were tried does not fit, by name.
-        warnings: what a check of the station says of it.
+        source: name of the built-in station; empty for a new one.
+        misfits: why the built-in stations tried before do not fit, by name.
+        warnings: warnings from the check of the station.
     """
 
     document: StationDocument
@@ -56,14 +56,14 @@ def propose_station(scene: Scene, path: Path) -> StationProposal:
     """A station that the scene fits on: a built-in one with an arm, else a new one.
 
     Args:
-        scene: what is to stand on it.
-        path: where the station is going to be; a new one is named after the file.
+        scene: the scene.
+        path: future file of the station; a new one is named after it.
 
     Returns:
-        The station; it passes `inspect_station`. Where no place for an arm is found, it has none.
+        The station; it passes `inspect_station`. Without a place for an arm, it has no arm.
 
     Raises:
-        InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
+        InvalidInputError: the scene fits no station, for example because its objects overlap.
     """
     fitting, misfits = find_built_in(scene)
     if fitting is not None:
@@ -90,28 +90,28 @@ def find_built_in(scene: Scene) -> tuple[Station | None, dict[str, str]]:
     """The first built-in station with an arm that a scene fits on; None if there is none.
 
     Returns:
-        The station, and why each of those that were tried before does not fit, by name.
+        The station, and why the stations tried before do not fit, by name.
 
     Raises:
-        InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
+        InvalidInputError: the scene fits no station, for example because its objects overlap.
     """
     require_valid_scene(scene, _without_arm(scene, Path("station.yaml")))
     misfits: dict[str, str] = {}
     for name in sorted(builtin_names("stations"), key=lambda name: name != "panda_tabletop"):
         station = load_station(name)
-        reason = misfit(scene, station)
+        reason = misfit_reason(scene, station)
         if not reason:
             return station, misfits
         misfits[name] = reason
     return None, misfits
 
 
-def misfit(scene: Scene, station: Station) -> str:
+def misfit_reason(scene: Scene, station: Station) -> str:
     """Why a scene does not fit on a station, in a few words; empty if it does.
 
-    Everything that is fixed has to be on the station's table and clear of its obstacles, by
-    bounding boxes; objects, base and home posture of the arm have to be free, and all free objects
-    within its span.
+    By bounding boxes, board and objects have to be on the station's table, and fixed objects clear
+    of its obstacles. Objects, base and home posture of the arm have to be free of collisions, and
+    all free objects within the arm's span.
     """
     if station.document.arm is None:
         return "it has no arm"
@@ -143,7 +143,7 @@ def misfit(scene: Scene, station: Station) -> str:
 
 
 def _without_arm(scene: Scene, path: Path) -> Station:
-    """A table for all that stands in a scene, with its frame as the world's."""
+    """A station with a table under the whole scene; the scene frame is the world frame."""
     usual = load_station("panda_tabletop")
     points = [
         _board_corners(scene),
@@ -159,11 +159,11 @@ def _without_arm(scene: Scene, path: Path) -> Station:
 
 
 def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
-    """The table with an arm that looks at the free objects from one side after the other, where
-    there is room for its base."""
+    """Yields stations with an arm that faces the free objects, one for each base pose with enough
+    room, best first."""
     # Metres from base to objects, best first. Half a Panda's reach is 0.43.
     base_distances = (0.5, 0.6, 0.4, 0.7)
-    # From x of the scene; in front of the board first.
+    # Degrees from x of the scene; in front of the board first.
     headings_deg = (90.0, 45.0, 135.0, 0.0, 180.0, -45.0, -135.0, -90.0)
     base_half_width = 0.12  # Metres. Half the side of the square that the base needs.
     shoulder_height = 0.6  # Metres above the base that must be free.
@@ -204,14 +204,14 @@ def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
 
 
 def _support_height(scene: Scene) -> float:
-    """Height of what the lowest free object stands on [m]; 0 where that is the board."""
+    """Height of the support of the lowest free object [m]; 0 if it stands on the board."""
     lowest = [float(placed_vertices(scene, name)[:, 2].min()) for name in scene.instances]
     floor = min(lowest, default=0.0)
-    return round(floor, 3) if floor > 0.05 else 0.0  # what is lower is no furniture
+    return round(floor, 3) if floor > 0.05 else 0.0  # lower supports are not furniture
 
 
 def _coarse_map(scene: Scene) -> ReachabilitySettings:
-    """A reachability map at the board and at the free objects, quickly."""
+    """Settings of a coarse, fast reachability map at the board and at the free objects."""
     support = _support_height(scene)
     raised = tuple(support + height for height in BOARD_CHECK_HEIGHTS) if support else ()
     # At most 20 cells along the board's longer side.
@@ -244,6 +244,6 @@ def _table_under(points: Array) -> Table:
 
 
 def _overlap_depth(a: Array, b: Array) -> float:
-    """How deep the bounding boxes of points (N, 3) and (M, 3) are in each other [m]; below 0 if
-    they are apart."""
+    """Penetration depth of the bounding boxes of points (N, 3) and (M, 3) [m]; negative if they
+    are apart."""
     return float(np.minimum(a.max(axis=0) - b.min(axis=0), b.max(axis=0) - a.min(axis=0)).min())

@@ -1,4 +1,4 @@
-"""Moves a grasped object past all others: back along the approach, and along the lift."""
+"""Collision checks of a grasped object against all others, on retreat and lift."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from burg_drake.geometry import CONTACT_TOLERANCE, Body, HandScreen, swept_body
 
 @dataclass(frozen=True, eq=False)
 class PathBlockers:
-    """What is in the way of an object on N ways.
+    """Obstacles of an object on N paths.
 
     Attributes:
-        by: (N,) the first body, in order of their names given, that it gets too deep into; "" where
-            the way is free.
-        depth: (N,) deepest overlap with it [m]; 0 where the way is free.
-        at: (N,) how far along the way that is [m]; NaN where the way is free.
+        by: (N,) the first body, in the given order, that the object penetrates too deeply; "" where
+            the path is free.
+        depth: (N,) deepest overlap with that body [m]; 0 where the path is free.
+        at: (N,) distance along the path of the deepest overlap [m]; NaN where the path is free.
     """
 
     by: NDArray[np.object_]
@@ -28,21 +28,21 @@ class PathBlockers:
     at: Array
 
     @classmethod
-    def nowhere(cls, n: int) -> PathBlockers:
-        """On none of n ways."""
+    def empty(cls, n: int) -> PathBlockers:
+        """No obstacles on n paths."""
         return cls(np.full(n, "", dtype=object), np.zeros(n), np.full(n, np.nan))
 
     def repeated(self, n: int) -> PathBlockers:
-        """The only way n times."""
+        """Repeats the single path n times."""
         return PathBlockers(np.repeat(self.by, n), np.repeat(self.depth, n), np.repeat(self.at, n))
 
 
 class TargetSweep:
-    """Moves one object, which does not turn.
+    """Sweeps one object, without rotation, past the others.
 
     Args:
-        target: where it stands.
-        others: where they stand, those that decide first.
+        target: the object at its placement.
+        others: the other bodies at their placements, in the order in which they are reported.
     """
 
     def __init__(self, target: Body, others: Mapping[str, Body]) -> None:
@@ -56,8 +56,9 @@ class TargetSweep:
         self._lifts: dict[float, HandScreen] = {}
 
     def retreat(self, u_W: Array, length: float) -> PathBlockers:
-        """From its place straight along unit vectors (N, 3) in the world by a length [m]."""
-        found = PathBlockers.nowhere(len(u_W))
+        """Checks straight paths from the placement along unit vectors (N, 3) in the world, of a
+        length [m]."""
+        found = PathBlockers.empty(len(u_W))
         ends = (
             self._box.low + np.minimum(length * u_W, 0.0),
             self._box.high + np.maximum(length * u_W, 0.0),
@@ -71,23 +72,23 @@ class TargetSweep:
     def lift(
         self, start_W: Array, u_W: Array, height: float, swept: Mapping[str, Body]
     ) -> PathBlockers:
-        """From beside its place straight along one direction.
+        """Checks straight paths from displaced poses along one direction.
 
         Args:
-            start_W: (N, 3) how far it has been moved before [m].
+            start_W: (N, 3) displacements from the placement at the start [m].
             u_W: (3,) unit vector in the world.
-            height: length of the way [m].
-            swept: what the others sweep where they move against it by that length instead.
+            height: length of the paths [m].
+            swept: the other bodies, swept in the opposite direction by that length.
         """
         if height not in self._lifts:
             below = {name: swept[name] for name in self._boxes}
             self._lifts[height] = HandScreen(self._target.pieces, below)
         screen = self._lifts[height]
-        found = PathBlockers.nowhere(len(start_W))
+        found = PathBlockers.empty(len(start_W))
         path = self._poses(start_W)
         for name in self._boxes:
             rows = np.flatnonzero(found.by == "")
-            # An upper bound, which is quick and settles most.
+            # A fast upper bound, which decides most paths.
             bound = screen.deepest(path[rows], [name], faces_only=True)[1]
             rows = rows[bound > CONTACT_TOLERANCE]
             if len(rows):
@@ -105,22 +106,22 @@ class TargetSweep:
         u_W: Array,
         length: float,
     ) -> None:
-        """Notes for some ways (S,) whether the object gets too deep into one body on them."""
+        """Enters the body into `found` for the paths (S,) on which it is penetrated too deeply."""
         places = np.linspace(0.0, length, int(np.ceil(length / 1e-3)) + 1)
         size = max(1, 2**17 // len(places))  # bounds the memory to about 20 MB
         for k in range(0, len(rows), size):
-            some = slice(k, k + size)
-            p_W = start_W[some, None] + places[:, None] * u_W[some, None]
+            batch = slice(k, k + size)
+            p_W = start_W[batch, None] + places[:, None] * u_W[batch, None]
             depths = self._still.deepest(self._poses(p_W.reshape(-1, 3)), [name])[1]
             depths = depths.reshape(-1, len(places))
             deepest = depths.argmax(axis=1)
             depth = depths[np.arange(len(depths)), deepest]
             hit = depth > self._allowed(name)
-            at = rows[some][hit]
+            at = rows[batch][hit]
             found.by[at], found.depth[at], found.at[at] = name, depth[hit], places[deepest[hit]]
 
     def _allowed(self, name: str) -> float:
-        """Depth in a body up to which nothing is in the way [m]."""
+        """Largest overlap with a body that does not block the path [m]."""
         depth_tolerance = 1e-3  # Metres deeper than at rest that a moved object may get.
         if name not in self._depths_allowed:
             at_rest = self._X_WO[None]
@@ -131,7 +132,7 @@ class TargetSweep:
         return self._depths_allowed[name]
 
     def _poses(self, moved_W: Array) -> Array:
-        """(N, 4, 4) poses of the object once it has been moved by (N, 3) [m]."""
+        """(N, 4, 4) poses of the object after displacements (N, 3) [m]."""
         X = np.repeat(self._X_WO[None], len(moved_W), axis=0)
         X[:, :3, 3] += moved_W
         return X

@@ -1,4 +1,4 @@
-"""Trajectories of an arm, and what a plan of them is for."""
+"""Trajectories of an arm, and the origin of a plan."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Motion(Protocol):
         """Position, velocity, acceleration and jerk, each (T, n), at times (T,) [s]."""
 
     def time_scaled(self, factor: float) -> Motion:
-        """The same way in `factor` times the time."""
+        """The same path in `factor` times the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,11 @@ class Trajectory:
 
     @classmethod
     def of(cls, motion: Motion, start: Array, end: Array, rate: float) -> Trajectory:
-        """Samples of a motion, rounded to 12 decimals, with which they are quickly written.
+        """Samples a motion, rounded to 12 decimals, so that it is written fast.
 
         Args:
-            motion: from rest to rest; is stretched to a whole number of samples.
-            start, end: (n,) its ends, to the last bit.
+            motion: from rest to rest; it is stretched to a whole number of samples.
+            start, end: (n,) exact first and last positions.
             rate: samples per second.
         """
         count = max(1, int(np.ceil(motion.duration * rate - 1e-6)))
@@ -63,14 +63,14 @@ class Trajectory:
 
     @classmethod
     def rest(cls, q: Array, duration: float, rate: float) -> Trajectory:
-        """Stays at q (n,) for a time [s]."""
+        """Rests at q (n,) for a duration [s]."""
         t = np.arange(max(1, int(np.ceil(duration * rate - 1e-6))) + 1) / rate
         still = np.zeros((len(t), len(q)))
         return cls(t, still + q, still, still)
 
     @classmethod
     def joined(cls, parts: Sequence[Trajectory]) -> Trajectory:
-        """One after the other; where one ends and the next begins there is one row."""
+        """Concatenates trajectories; the last row of one is the first row of the next."""
         t, rows = [parts[0].t], [slice(None)] + [slice(1, None)] * (len(parts) - 1)
         for part in parts[1:]:
             t.append(round_to_grid(t[-1][-1] + part.t[1:]))
@@ -91,15 +91,15 @@ class Trajectory:
 
     @property
     def rate(self) -> float:
-        """Samples per second; where they are evenly spaced, `t` is `arange(T) / rate` bit by bit
-        for rates of up to six decimals."""
+        """Samples per second. For evenly spaced samples and rates of up to six decimals, `t` is
+        `arange(T) / rate` bit by bit."""
         rate = 1.0 / float(self.t[1])
         near = round(rate, 6)
         return near if near and 1.0 / near == self.t[1] else rate
 
     def at(self, time: float | Array) -> Array:
-        """Positions (..., n) at times (...) [s], by cubic polynomials between the samples; the ends
-        before and after."""
+        """Positions (..., n) at times (...) [s], by cubic polynomials between the samples, clamped
+        to the ends."""
         when = np.clip(np.asarray(time, dtype=float), 0.0, self.duration)
         k = np.clip(np.searchsorted(self.t, when, side="right") - 1, 0, len(self.t) - 2)
         h = (self.t[k + 1] - self.t[k])[..., None]
@@ -109,11 +109,10 @@ class Trajectory:
         return np.asarray(self.q[k] + u * (ahead + (1.0 - u) * ((1.0 - u) * start + u * end)))
 
     def peaks(self) -> tuple[Array, Array, Array]:
-        """(n,) each: largest absolute velocity, acceleration and jerk that the samples show.
+        """(n,) each: largest absolute velocity, acceleration and jerk of the samples.
 
-        By differences of the samples alone, as a controller sees them: velocities of positions,
-        accelerations of velocities, jerks of accelerations; for the first two the samples of
-        velocity and acceleration count, too.
+        They are finite differences of positions, velocities and accelerations, as a controller
+        computes them; velocities and accelerations also include the samples themselves.
         """
         h = np.diff(self.t)[:, None]
         rates = [np.abs(np.diff(x, axis=0) / h).max(axis=0) for x in (self.q, self.v, self.a)]
@@ -121,7 +120,7 @@ class Trajectory:
         return velocity, np.maximum(rates[1], np.abs(self.a).max(axis=0)), rates[2]
 
     def to_drake(self) -> PiecewisePolynomial:
-        """The same for Drake's `TrajectorySource`: cubic polynomials between the samples."""
+        """Cubic polynomials between the samples, for Drake's `TrajectorySource`."""
         from pydrake.trajectories import PiecewisePolynomial
 
         motion: PiecewisePolynomial = PiecewisePolynomial.CubicHermite(self.t, self.q.T, self.v.T)
@@ -129,21 +128,20 @@ class Trajectory:
 
 
 MOTION_PHASES = ("transfer", "approach", "close", "retreat", "lift")
-"""What happens one after the other; while the hand closes the arm rests, and without a retreat the
-lift follows at once."""
+"""Phases of a plan in order. The arm rests while the hand closes; the retreat is optional."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlanOrigin:
-    """What a plan is for.
+    """Scene, station and grasp that a plan is for.
 
     Attributes:
         joints: names of the n joints, in the order of the trajectories' columns.
         limits: of these joints.
         station, scene: names.
-        station_content, scene_content: hashes of what the names stood for.
+        station_content, scene_content: content hashes of station and scene.
         instance: the target in the scene; empty if there is none.
-        X_WG: (4, 4) the grasp in the world with the fingers as the arm puts them.
+        X_WG: (4, 4) the grasp in the world, with the chosen finger assignment.
     """
 
     joints: tuple[str, ...]
@@ -157,10 +155,10 @@ class PlanOrigin:
 
 
 def round_to_grid(values: Array) -> Array:
-    """The nearest numbers with 12 decimals; what is beyond 9000 in size stays as it is.
+    """Rounds to 12 decimals; numbers larger than 9000 do not change.
 
-    Multiples of the grid are exact up to there: text and number read back with the same bits, as
-    both are the floating-point number nearest to the same decimal.
+    Up to 9000, the text and the number have the same bits after a round trip, as both are the
+    floating-point number nearest to the same decimal.
     """
     grid_scale = 1e12  # steps in a unit: a thousandth of a nanometre or nanoradian
     small = np.abs(values) <= 9000.0

@@ -1,4 +1,4 @@
-"""Refuses arms that cannot be used; caches the answer, so that Drake need not be loaded again."""
+"""Refuses arms that cannot be used; caches the result, so that Drake need not be loaded again."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ from burg_drake.station import Station, world_content
 
 
 def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
-    """Refuses an arm of which no grasp of a scene needs to be asked; done in a moment.
+    """Refuses an arm that can execute no grasp of a scene, by fast checks.
 
     Args:
-        scene: what stands on the station.
+        scene: the scene on the station.
         station: with or without an arm.
 
     Returns:
         A line for each object of the scene that is certainly out of the arm's reach.
 
     Raises:
-        InvalidInputError: the whole board is out of reach, the arm stands in something solid, or
-            it collides in its home posture, or limits of its joints are missing; one line says
-            where.
+        InvalidInputError: the whole board is out of reach, the arm's base is inside a body, the arm
+            collides in its home posture, or joint limits are missing; one line says where.
     """
     if station.document.arm is None:
         return ()
 
     def check() -> Arrays:
-        from burg_drake.motion.station_check import usable_span  # which builds a diagram
+        from burg_drake.motion.station_check import usable_span  # loads Drake
 
         span = usable_span(scene, station)
         return {"p_WJ": span.p_WJ, "radius": np.array(span.radius)}

@@ -22,34 +22,34 @@ Quadric = list[float]
 
 
 def collapse_edges(
-    vertices: Array, faces: NDArray[np.int64], most_distance: float, least_faces: int, ratio: float
+    vertices: Array, faces: NDArray[np.int64], max_distance: float, min_faces: int, ratio: float
 ) -> Iterator[tuple[Array, NDArray[np.int64]]]:
-    """Ever coarser surfaces.
+    """Yields ever coarser surfaces, made by edge collapses.
 
     Args:
         vertices: (N, 3) [m].
         faces: (F, 3) of a closed manifold.
-        most_distance: root mean square distance from the planes that a vertex stands for, at which
-            it ends [m].
-        least_faces: number of faces at which it ends.
-        ratio: faces of each surface over those of the one before.
+        max_distance: largest root mean square distance of a vertex from the planes of the faces
+            that were merged into it [m].
+        min_faces: smallest number of faces.
+        ratio: number of faces of a surface over that of the previous one.
 
     Yields:
         Vertices and faces, of the same topology.
     """
-    surface = _CollapsingSurface(vertices, faces, most_distance)
+    surface = _CollapsingSurface(vertices, faces, max_distance)
     wanted = ratio * len(faces)
-    while surface.count > least_faces and surface.collapse():
+    while surface.count > min_faces and surface.collapse():
         if surface.count <= wanted:
             wanted = ratio * surface.count
             yield surface.arrays()
 
 
 class _CollapsingSurface:
-    """A surface while edges of it collapse."""
+    """A surface whose edges are collapsed one after another."""
 
-    def __init__(self, vertices: Array, faces: NDArray[np.int64], most_distance: float) -> None:
-        self.most_distance = most_distance
+    def __init__(self, vertices: Array, faces: NDArray[np.int64], max_distance: float) -> None:
+        self.max_distance = max_distance
         self.points: list[Point] = [tuple(p) for p in vertices.tolist()]
         self.faces: list[tuple[int, int, int] | None] = [tuple(f) for f in faces.tolist()]
         self.count = len(faces)
@@ -65,12 +65,12 @@ class _CollapsingSurface:
             self._queue_edge(i, j)
 
     def collapse(self) -> bool:
-        """Collapses the cheapest edge that can be; False if none is left below the most."""
+        """Collapses the cheapest admissible edge; False if none is within `max_distance`."""
         while self.heap:
             cost, i, j, version_i, version_j, point = heapq.heappop(self.heap)
             if (version_i, version_j) != (self.version[i], self.version[j]):
                 continue
-            if cost > self.most_distance**2:
+            if cost > self.max_distance**2:
                 return False
             if self._can_merge(i, j, point):
                 self._merge_vertices(i, j, point)
@@ -78,7 +78,7 @@ class _CollapsingSurface:
         return False
 
     def arrays(self) -> tuple[Array, NDArray[np.int64]]:
-        """Vertices and faces that are left."""
+        """Remaining vertices and faces."""
         left = np.array([face for face in self.faces if face is not None])
         used, place = np.unique(left, return_inverse=True)
         return np.array(self.points)[used], place.reshape(-1, 3)
@@ -95,7 +95,7 @@ class _CollapsingSurface:
         return found
 
     def _can_merge(self, i: int, j: int, point: Point) -> bool:
-        """Whether the surface stays a manifold, and no face turns over or becomes a sliver."""
+        """Whether the collapse keeps the surface a manifold without flipped or sliver faces."""
         shared = self.around[i] & self.around[j]
         common = self._neighbours(i) & self._neighbours(j)
         if len(shared) != 2 or len(common) != 2:
@@ -106,7 +106,7 @@ class _CollapsingSurface:
             corners = self.faces[face] or (i, i, i)
             before = [self.points[k] for k in corners]
             after = [point if k in (i, j) else self.points[k] for k in corners]
-            if not _is_valid_face_change(before, after, self.most_distance):
+            if not _is_valid_face_change(before, after, self.max_distance):
                 return False
         return True
 
@@ -146,8 +146,8 @@ def _vertex_quadrics(vertices: Array, faces: NDArray[np.int64]) -> Array:
 
 
 def _cheapest_point(q: Quadric, a: Point, b: Point) -> tuple[Point, float]:
-    """Where the mean squared distance to a quadric's planes is smallest near an edge, and what it
-    is there [m^2]."""
+    """The point near an edge with the smallest mean squared distance to a quadric's planes, and
+    that distance [m^2]."""
     # Share of the trace below which the cost is flat; the point stays at the middle.
     flat_share = 1e-6
     xx, xy, xz, yy, yz, zz, xd, yd, zd, _, planes = q
@@ -176,17 +176,17 @@ def _quadric_cost(q: Quadric, x: float, y: float, z: float) -> float:
     )
 
 
-def _is_valid_face_change(before: list[Point], after: list[Point], most_distance: float) -> bool:
-    """Whether a face is turned and moved by little, and is no sliver, or none lower than it was."""
+def _is_valid_face_change(before: list[Point], after: list[Point], max_distance: float) -> bool:
+    """Whether a face turns and moves little and becomes no sliver lower than it was."""
     min_turn_cosine = 0.5  # Cosine of the largest turn of a face in one collapse.
-    min_height = 2e-5  # Metres of height that a collapse leaves of a face.
+    min_height = 2e-5  # Metres; smallest height of a face after a collapse.
     old, old_height = _face_normal_and_height(before)
     new, height = _face_normal_and_height(after)
     if height < min_height and height < old_height:
         return False
     moved = [q[k] - p[k] for p, q in zip(before, after, strict=True) if p != q for k in range(3)]
     away = old[0] * moved[0] + old[1] * moved[1] + old[2] * moved[2]
-    if away * away > most_distance**2 * sum(v * v for v in old):
+    if away * away > max_distance**2 * sum(v * v for v in old):
         return False
     turned = old[0] * new[0] + old[1] * new[1] + old[2] * new[2]
     lengths = math.sqrt(sum(v * v for v in old) * sum(v * v for v in new))
@@ -205,7 +205,7 @@ def _face_normal_and_height(corners: list[Point]) -> tuple[Point, float]:
 
 
 DEVIATION_RESOLUTION = 1e-6
-"""Metres below which deviations count as none."""
+"""Metres; smaller deviations count as zero."""
 
 
 def is_closed(surface: trimesh.Trimesh) -> bool:
@@ -214,8 +214,8 @@ def is_closed(surface: trimesh.Trimesh) -> bool:
 
 
 def unite_bodies(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
-    """Overlapping bodies as one, so that their overlap counts once; cavities stay, and bodies that
-    lie apart stay as they are, as do those that touch without a face in common.
+    """Unites overlapping bodies, so that their overlap counts once. Cavities, separate bodies and
+    bodies that touch without a common face stay as they are.
 
     Args:
         surface: closed, wound outward, cavities inward.
@@ -259,16 +259,15 @@ def unite_bodies(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
 
 
 def split_bodies(surface: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """A surface whose bodies touch along edges, with these edges doubled so that it counts as
-    closed; None if it is not that."""
+    """Doubles the edges along which bodies touch, so that the surface counts as closed; None if
+    that does not close it."""
     manifold = _to_manifold(surface)
     result = None if manifold is None else from_manifold(manifold)
     return result if result is not None and is_closed(result) else None
 
 
 def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh, list[str]]:
-    """The surface with at most `max_faces` faces if that can be had within the largest
-    tolerance, and otherwise with as few as that gives.
+    """Reduces a surface to `max_faces` faces, or to as few as the largest tolerance allows.
 
     Args:
         surface: closed, wound outward.
@@ -279,7 +278,7 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
     """
     # Shares of the diagonal, tried in turn: 0.02 to 0.4 mm on a mug.
     tolerances = (1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3)
-    max_face_share = 0.5  # Share of the faces; if more remain, the surface is that rough.
+    max_face_share = 0.5  # Share of the faces; more remain only on rough surfaces.
     max_points = 10_000  # Points that are measured.
     count = len(surface.faces)
     if count <= max_faces:
@@ -306,22 +305,22 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
     ]
 
 
-def coarser_surfaces(surface: trimesh.Trimesh, most_distance: float) -> list[trimesh.Trimesh]:
-    """The surface itself, and ever coarser ones, each made of the one before.
+def coarser_surfaces(surface: trimesh.Trimesh, max_distance: float) -> list[trimesh.Trimesh]:
+    """The surface and ever coarser versions of it, each made from the previous one.
 
     Args:
         surface: closed, wound outward.
-        most_distance: about how far the coarsest are from it, in the mean [m].
+        max_distance: approximate mean distance of the coarsest version from the surface [m].
 
     Returns:
-        Closed surfaces, finest first, each with about 0.9 times the faces of the one before.
+        Closed surfaces, finest first, each with about 0.9 times the faces of the previous one.
     """
     # Metres; Manifold is fast and removes most faces before edges collapse.
     tolerances = (1e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.2e-4)
     enough_faces = 20_000  # Faces that edge collapse handles quickly.
     max_faces = 100_000  # More would take longer than 20 s.
     min_faces = 20  # Faces of the coarsest surface.
-    face_ratio = 0.9  # Faces of each surface over those of the one before.
+    face_ratio = 0.9  # Faces of each surface over those of the previous one.
     found, manifold = [surface], _to_manifold(surface)
     for tolerance in tolerances:
         if manifold is None or len(found[-1].faces) <= enough_faces:
@@ -332,7 +331,7 @@ def coarser_surfaces(surface: trimesh.Trimesh, most_distance: float) -> list[tri
     if len(finest.faces) > max_faces:
         return found
     rungs = collapse_edges(
-        np.asarray(finest.vertices), finest.faces, most_distance, min_faces, face_ratio
+        np.asarray(finest.vertices), finest.faces, max_distance, min_faces, face_ratio
     )
     for vertices, faces in rungs:
         _append_if_closed(found, trimesh.Trimesh(vertices, faces, process=False))
@@ -348,8 +347,8 @@ def one_sided_hausdorff(points: Array, surface: trimesh.Trimesh) -> float:
     """Largest distance of points (N, 3) from a surface [m], exact above `DEVIATION_RESOLUTION`.
 
     The distance to the faces of the nearest samples is an upper bound. The points are measured
-    against all faces that are nearer than that, in the order of the bound, until it is below what
-    was found.
+    against all nearer faces, largest bound first, until the bound is below the largest distance
+    found.
     """
     sample_count = 50_000  # Samples on the surface.
     candidates = 8  # Faces compared for each point.
@@ -378,7 +377,7 @@ def _bounding_boxes_overlap(parts: list[trimesh.Trimesh]) -> bool:
 
 
 def _to_manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold | None:
-    """None if the mesh is not closed in Manifold's eyes."""
+    """Manifold solid of a mesh; None if Manifold does not accept the mesh as closed."""
     # Copies, as Manifold refuses arrays that cannot be written to, such as its own results.
     vertices = np.array(mesh.vertices, dtype=float, order="C")
     faces = np.array(mesh.faces, dtype=np.uint64, order="C")
@@ -394,7 +393,7 @@ def _with_merged_vertices(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def from_manifold(manifold: manifold3d.Manifold) -> trimesh.Trimesh:
-    """The surface of a solid of Manifold."""
+    """Surface mesh of a Manifold solid."""
     mesh = manifold.to_mesh64()
     faces = np.asarray(mesh.tri_verts).astype(np.int64)
     return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], faces, process=False)

@@ -41,8 +41,8 @@ def run_coacd(
         KeyboardInterrupt: the child was interrupted, as the user interrupts all processes.
     """
     package = io.BytesIO()
-    told = json.dumps({"timeout": timeout, "options": options})
-    np.savez(package, vertices=vertices, faces=faces, told=told)
+    request = json.dumps({"timeout": timeout, "options": options})
+    np.savez(package, vertices=vertices, faces=faces, request=request)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     child = subprocess.run(
         [sys.executable, "-P", str(Path(__file__))],
@@ -65,15 +65,15 @@ def run_coacd(
 
 def _main() -> None:
     out = os.dup(1)
-    os.dup2(2, 1)  # what the library prints must not mix with the result
+    os.dup2(2, 1)  # keeps the library's output apart from the result
     import coacd
 
     with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
         mesh = coacd.Mesh(given["vertices"], given["faces"].astype(np.int32))
-        told = json.loads(str(given["told"]))
-    signal.setitimer(signal.ITIMER_PROF, told["timeout"])  # SIGPROF ends the process
+        request = json.loads(str(given["request"]))
+    signal.setitimer(signal.ITIMER_PROF, request["timeout"])  # SIGPROF ends the process
     coacd.set_log_level("off")
-    parts = coacd.run_coacd(mesh, **told["options"])
+    parts = coacd.run_coacd(mesh, **request["options"])
     result = io.BytesIO()
     named: dict[str, Any] = {f"part{i}": np.asarray(v) for i, (v, _) in enumerate(parts)}
     np.savez(result, count=len(parts), seconds=time.process_time(), **named)

@@ -22,10 +22,10 @@ MAX_CONTACT_DISTANCE = 2.5e-4
 """Metres between the object's surface and the contact surface, either way."""
 
 MAX_NORMAL_ANGLE = float(np.deg2rad(10.0))
-"""Radians from which a normal counts as turned; 3/4 of the friction cone at 0.24."""
+"""Radians from which a normal counts as turned; 3/4 of the friction cone for friction 0.24."""
 
 MAX_TURNED_SHARE = 0.05
-"""Share of the area whose normals may be turned, as next to moved edges."""
+"""Share of the area whose normals may be turned, for example next to moved edges."""
 
 
 AVERAGING_RADIUS = 2e-3  # Metres; less than half a pad. Faces of scans vary within it.
@@ -43,10 +43,10 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
         closed: whether it is watertight, wound outward.
 
     Returns:
-        The surface, closed and wound outward, and how well it fits.
+        The surface, closed and wound outward, and its fit.
 
     Raises:
-        MeshError: why there is none.
+        MeshError: there is no such surface; the message says why.
     """
     max_faces = 10_000  # More faces cost more in simulation than they gain.
     decimals = 7  # Decimals of coordinates in metres.
@@ -71,7 +71,7 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
 
 
 class SurfaceNormals:
-    """The normals of a surface, at each place and in the mean around it.
+    """The normals of a surface, local and averaged over the neighbourhood.
 
     Args:
         surface: [m].
@@ -80,43 +80,46 @@ class SurfaceNormals:
     def __init__(self, surface: trimesh.Trimesh) -> None:
         self.triangles = np.asarray(surface.triangles)
         self.normals = np.asarray(surface.face_normals)
-        self.samples, self.owner = spread_samples(surface, OBJECT_SAMPLES)
-        self.every = np.concatenate([self.owner, np.arange(len(self.triangles))])
-        self.places = cKDTree(np.vstack([self.samples, self.triangles.mean(axis=1)]))
-        self.even = cKDTree(self.samples)
-        alike = AVERAGING_RADIUS * self.normals[self.owner]
-        self.alike = cKDTree(np.hstack([self.samples, alike]))
+        self.samples, self.sample_faces = spread_samples(surface, OBJECT_SAMPLES)
+        self.candidate_faces = np.concatenate([self.sample_faces, np.arange(len(self.triangles))])
+        self.point_tree = cKDTree(np.vstack([self.samples, self.triangles.mean(axis=1)]))
+        self.sample_tree = cKDTree(self.samples)
+        alike = AVERAGING_RADIUS * self.normals[self.sample_faces]
+        self.oriented_tree = cKDTree(np.hstack([self.samples, alike]))
 
     def turned_share(self, mesh: trimesh.Trimesh) -> float:
-        """Share of a mesh's area whose normals are more than `MAX_NORMAL_ANGLE` off the
-        surface's, both of the nearest place and of the mean around it."""
+        """Share of a mesh's area whose normals differ by more than `MAX_NORMAL_ANGLE` from both the
+        nearest and the averaged normals of the surface."""
         points, face = spread_samples(mesh, RESULT_SAMPLES)
         normals = np.asarray(mesh.face_normals)[face]
-        own = self._nearest(points, normals)
-        mean = self._mean(points, own)
+        own = self._nearest_normals(points, normals)
+        mean = self._mean_normals(points, own)
         cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
         return float((cosine < np.cos(MAX_NORMAL_ANGLE)).mean())
 
-    def _nearest(self, points: Array, normals: Array) -> Array:
-        """Normals (N, 3) of the surface at the nearest places: within
-        `MAX_CONTACT_DISTANCE` at those that face the same way, as near a thin wall its other side
-        may be nearer."""
-        _, near = self.places.query(points, min(NEAREST_FACES, len(self.every)))
-        _, alike = self.alike.query(np.hstack([points, AVERAGING_RADIUS * normals]), NEAREST_FACES)
-        which = np.hstack([self.every[near], self.owner[alike]])
+    def _nearest_normals(self, points: Array, normals: Array) -> Array:
+        """Normals (N, 3) of the surface at the nearest points. Within `MAX_CONTACT_DISTANCE`,
+        points that face the same way are preferred, as the other side of a thin wall may be
+        nearer."""
+        _, near = self.point_tree.query(points, min(NEAREST_FACES, len(self.candidate_faces)))
+        _, alike = self.oriented_tree.query(
+            np.hstack([points, AVERAGING_RADIUS * normals]), NEAREST_FACES
+        )
+        which = np.hstack([self.candidate_faces[near], self.sample_faces[alike]])
         apart = triangle_distances(points[:, None], self.triangles[which])
         facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
         near_and_facing = facing & (apart <= MAX_CONTACT_DISTANCE)
         apart -= np.where(near_and_facing, MAX_CONTACT_DISTANCE, 0.0)
         return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])
 
-    def _mean(self, points: Array, own: Array) -> Array:
-        """Normals (N, 3) in the mean around points, of what faces the same way as `own`."""
-        distance, around = self.even.query(
+    def _mean_normals(self, points: Array, own: Array) -> Array:
+        """Mean surface normals (N, 3) around points, of the parts that face the same way as
+        `own`."""
+        distance, around = self.sample_tree.query(
             points, AVERAGED_NORMALS, distance_upper_bound=AVERAGING_RADIUS
         )
         within = np.isfinite(distance)
-        others = self.normals[self.owner[np.where(within, around, 0)]]
+        others = self.normals[self.sample_faces[np.where(within, around, 0)]]
         facing = within & ((others * own[:, None]).sum(axis=2) > 0.0)
         mean = (others * facing[..., None]).sum(axis=1)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
@@ -124,7 +127,7 @@ class SurfaceNormals:
 
 
 def max_excess(mesh: trimesh.Trimesh, pieces: Sequence[trimesh.Trimesh]) -> float:
-    """How far a surface stands out of the union of convex pieces, at most [m]."""
+    """Largest distance by which a surface stands out of the union of convex pieces [m]."""
     points = np.vstack([mesh.vertices, spread_samples(mesh, RESULT_SAMPLES)[0]])
     height = np.full(len(points), np.inf)
     for piece in pieces:
@@ -161,15 +164,15 @@ def contact_geometry(
     pieces: Sequence[trimesh.Trimesh],
     folder: Path,
 ) -> ContactGeometry:
-    """What of an object touches others.
+    """Chooses the contact geometry of an object.
 
     Args:
-        kind: as the user wants it; None: a primitive where one fits, else the surface where it is
-            closed and can be decimated, else the pieces.
+        kind: the kind that the user asked for. None: a primitive if one fits, else the surface if
+            it is closed and can be decimated, else the pieces.
         surface: of the object [m].
         closed: whether it is watertight, so that its volume can be trusted.
-        pieces: its convex pieces, at least one for a surface.
-        folder: the object's; the mesh of kinds `surface` and `mesh` is written into it.
+        pieces: the object's convex pieces; at least one for the kind `surface`.
+        folder: the object's folder; the mesh of kinds `surface` and `mesh` is written into it.
 
     Returns:
         The contact geometry, whose mesh is relative to `folder`.
@@ -204,11 +207,11 @@ def contact_geometry(
 
 
 def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
-    """What to say where pads touch pieces that were not asked for; empty elsewhere.
+    """Message for an object whose pads touch pieces although these were not asked for, else empty.
 
     Args:
         contact: of the object.
-        pieces: how many it has.
+        pieces: number of convex pieces.
     """
     if not contact.reason:
         return ""
@@ -219,11 +222,11 @@ def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
 
 
 def describe_pad_contact(library: ObjectLibrary, name: str) -> str:
-    """What of an object gripper pads touch, such as `a cylinder, at most 0.2 mm from the mesh`.
+    """Names the shape that gripper pads touch, such as `a cylinder, at most 0.2 mm from the mesh`.
 
     Raises:
         UnknownNameError: no such object, or the file of its surface is missing.
-        MeshError: that file is damaged.
+        MeshError: the file of its surface is damaged.
     """
     entry = library.entry(name)
     contact = entry.contact

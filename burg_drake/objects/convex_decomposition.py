@@ -41,7 +41,7 @@ def convex_pieces(
     Args:
         surface: in metres, wound outward.
         closed: whether the surface is watertight, so that its volume can be trusted.
-        parameters: how finely.
+        parameters: how finely to cut.
 
     Raises:
         MeshError: nothing solid is left, or CoACD fails.
@@ -58,7 +58,7 @@ def convex_pieces(
 
 
 def check_given_pieces(pieces: Sequence[trimesh.Trimesh]) -> ConvexPieces:
-    """Checks pieces that come with an object and takes them as they are.
+    """Checks convex pieces that come with an object, and returns them unchanged.
 
     Raises:
         MeshError: a piece is not closed, not convex, or wound inward.
@@ -77,14 +77,14 @@ def check_given_pieces(pieces: Sequence[trimesh.Trimesh]) -> ConvexPieces:
 
 
 def join_parts(parts: Sequence[Array], budget: float) -> list[Array]:
-    """Joins convex parts, cheapest pair first, until the volume added would exceed a budget.
+    """Joins convex parts, cheapest pair first, while the added volume is within a budget.
 
     Args:
         parts: vertices (Ni, 3) of each part [m].
-        budget: share of the parts' volume that may be added in all.
+        budget: total added volume allowed, as a share of the parts' volume.
 
     Returns:
-        Vertices of the hulls that are left.
+        Vertices of the remaining hulls.
     """
     max_gap = 1e-3  # Metres between the bounding boxes of pieces that may be joined.
     hulls = [convex_hull(p) for p in parts]
@@ -92,14 +92,14 @@ def join_parts(parts: Sequence[Array], budget: float) -> list[Array]:
     volume = {i: float(h.volume) for i, h in enumerate(hulls)}
     left = budget * sum(volume.values())
 
-    def added(i: int, j: int) -> float:
+    def hull_growth(i: int, j: int) -> float:
         a, b = points[i], points[j]
         gap = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
         if gap.max() > max_gap:
             return np.inf
         return float(convex_hull(np.vstack([a, b])).volume) - volume[i] - volume[j]
 
-    cost = {(i, j): added(i, j) for i in points for j in points if i < j}
+    cost = {(i, j): hull_growth(i, j) for i in points for j in points if i < j}
     while cost:
         (i, j), added_volume = min(cost.items(), key=lambda item: (item[1], item[0]))
         if added_volume > left:
@@ -110,7 +110,7 @@ def join_parts(parts: Sequence[Array], budget: float) -> list[Array]:
         del volume[i], volume[j]
         cost = {pair: c for pair, c in cost.items() if i not in pair and j not in pair}
         points[new], volume[new] = hull.points[hull.vertices], float(hull.volume)
-        cost.update({(k, new): added(k, new) for k in points if k != new})
+        cost.update({(k, new): hull_growth(k, new) for k in points if k != new})
     return list(points.values())
 
 

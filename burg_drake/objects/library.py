@@ -41,7 +41,7 @@ DEFAULT_FRICTION = 0.24
 """Friction coefficient, as in BURG-Toolkit (Rudorfer et al., 2022)."""
 
 UPRIGHT_TOLERANCE = math.radians(10.0)
-"""Radians from a stable pose up to which the object stands as its mesh does."""
+"""Radians; a stable pose within this angle of the mesh's orientation counts as the mesh's pose."""
 
 Inertia = tuple[float, float, float, float, float, float]
 """Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2]."""
@@ -276,26 +276,27 @@ class ObjectEntry:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it can only be background of a scene, as it has no mass."""
+        """Whether the object has no mass, so that it can only be background of a scene."""
         return self.mass_properties.source == "fixed"
 
     @property
     def files(self) -> tuple[str, ...]:
-        """All files that the entry names, relative to the library's folder."""
+        """All files of the entry, relative to the library's folder."""
         files = (self.mesh, self.surface, self.sdf, *self.pieces, self.contact.mesh)
         return tuple(file for file in files if file)
 
     @property
     def proposed_pose(self) -> int:
-        """Number of the stable pose in which the object stands as its mesh does, as a scan mostly
-        is; of the most probable one, 0, if it cannot stand so."""
+        """Number of the stable pose with the orientation of the mesh, as most scans have it; 0, the
+        most probable pose, if there is none."""
         up = [float(pose.X_SO.matrix()[2, 2]) for pose in self.stable_poses]
         if not up or max(up) < math.cos(UPRIGHT_TOLERANCE):
             return 0
         return up.index(max(up))
 
     def X_SO(self, stable_pose: int = 0) -> Array:
-        """(4, 4) object in its k-th stable pose, centre of mass above the origin of S."""
+        """(4, 4) pose of the object in its k-th stable pose, centre of mass above the origin of
+        S."""
         if not 0 <= stable_pose < len(self.stable_poses):
             raise InvalidInputError(
                 f"stable pose {stable_pose} does not exist; give 0 to {len(self.stable_poses) - 1}"
@@ -383,8 +384,8 @@ class ObjectLibrary:
             name: of the object.
 
         Returns:
-            Its mesh in the object frame O [m], without colours; vertices that the file repeats for
-            their normals and texture coordinates are merged.
+            Its mesh in the object frame O [m], without colours. Vertices that the file repeats for
+            different normals or texture coordinates are merged.
 
         Raises:
             UnknownNameError: no such object, or its mesh file is missing.
@@ -396,7 +397,7 @@ class ObjectLibrary:
         return mesh
 
     def mesh(self, relative: str) -> trimesh.Trimesh:
-        """A mesh file of the library, such as a convex piece, as it is [m], without colours.
+        """A mesh file of the library, such as a convex piece, unchanged but without colours [m].
 
         Raises:
             UnknownNameError: the file is missing.
@@ -407,20 +408,23 @@ class ObjectLibrary:
         path = self.path(relative)
         try:
             mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-            corners = np.asarray(mesh.vertices)[mesh.faces]  # fails for faces of no vertices
-        except Exception as error:  # the reader raises whatever it stumbles over
+            corners = np.asarray(mesh.vertices)[
+                mesh.faces
+            ]  # fails if faces refer to missing vertices
+        except Exception as error:  # the reader raises errors of any type
             raise self.damaged(path) from error
         if not len(corners) or not np.isfinite(corners).all():
             raise self.damaged(path)
         return mesh
 
     def damaged(self, path: Path) -> MeshError:
-        """The error of a mesh file that is not as it was built."""
+        """The error for a damaged mesh file."""
         return MeshError(f"{path} is damaged or not a mesh; build library {self.name!r} again")
 
     @cached_property
     def content(self) -> dict[str, str]:
-        """Build hash by object name, with the files of packages that an object's model names."""
+        """Build hashes by object name; they include the package files that an object's model refers
+        to."""
         return {name: self._content(entry) for name, entry in self.objects.items()}
 
     def _content(self, entry: ObjectEntry) -> str:
@@ -430,8 +434,8 @@ class ObjectLibrary:
         return content_hash(entry.build, referenced_files(model, NO_PACKAGES))
 
     def save(self) -> None:
-        """Writes `library.yaml`, and `package.xml`, by which Drake's Parser and ROS know the folder
-        as a package: `package://NAME/mug/mug.sdf`."""
+        """Writes `library.yaml`, and the `package.xml` that makes the folder a package for Drake's
+        Parser and ROS: `package://NAME/mug/mug.sdf`."""
         manifest = self.root / "package.xml"
         package = package_manifest(package_name(self.name), "Object library")
         if not manifest.is_file() or manifest.read_text() != package:
@@ -468,12 +472,12 @@ def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibra
 
 
 def package_name(name: str) -> str:
-    """A name as packages of ROS and Drake may have it, made of a document's name."""
+    """Makes a package name that is valid in ROS and Drake from a document's name."""
     return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "library"
 
 
 def package_manifest(package: str, description: str) -> str:
-    """A ROS package manifest (format 3, REP 149) with nothing but what it must have."""
+    """A minimal ROS package manifest (format 3, REP 149)."""
     return f"""<?xml version="1.0"?>
 <package format="3">
   <name>{package}</name>

@@ -23,7 +23,7 @@ DEFAULT_DENSITY = 300.0
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Geometry of a solid as mass properties need it.
+    """Volume, centroid and second moments of a solid.
 
     Attributes:
         volume: [m^3].
@@ -49,7 +49,7 @@ def solid_of_surface(surface: trimesh.Trimesh) -> Solid:
 
 
 def solid_of_pieces(pieces: Sequence[trimesh.Trimesh]) -> Solid:
-    """The sum of convex pieces; where pieces overlap, the overlap counts for each of them.
+    """Sum of the integrals over convex pieces; overlaps count for each piece.
 
     Args:
         pieces: convex, wound outward.
@@ -81,13 +81,13 @@ def mass_properties(
 
     Args:
         solid: geometry; that of the wall of a hollow body, see `solid_of_shell`.
-        mass: [kg]; goes before `density`.
+        mass: [kg]; has precedence over `density`.
         density: of the material [kg/m^3]; `DEFAULT_DENSITY` if neither is given.
-        center_of_mass: `p_OOcm` in place of the centroid [m]. Without `inertia`, the inertia is
-            that of uniform density about the centroid, taken to be that about the centre of mass:
-            right where a heavy part sits near the given centre, and else an estimate.
+        center_of_mass: `p_OOcm` in place of the centroid [m]. Without `inertia`, the inertia of
+            uniform density about the centroid is used about this centre: correct if a heavy part
+            sits near it, otherwise an estimate.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2].
-        wall_thickness: of the hollow body that `solid` is [m]; only noted in the result.
+        wall_thickness: of a hollow body [m]; only copied to the result.
         bounds: (2, 3) corners of the bounding box in O [m]; a given centre of mass must be inside.
 
     Raises:
@@ -125,7 +125,7 @@ def mass_properties(
 
 
 def inertia_matrix(inertia: Inertia) -> Array:
-    """(3, 3) of Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    """Inertia matrix (3, 3) of Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
     xx, yy, zz, xy, xz, yz = inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -133,7 +133,7 @@ def inertia_matrix(inertia: Inertia) -> Array:
 def implausible_properties(
     properties: MassProperties, lower: Vector3, upper: Vector3
 ) -> tuple[str, ...]:
-    """What no household thing of this size has, one sentence each; empty if all is plausible.
+    """Mass properties that are implausible for a household object of this size, a sentence each.
 
     Args:
         properties: in the object frame O.
@@ -222,7 +222,7 @@ def _tetrahedron_integrals(triangles: Array) -> tuple[float, Array, Array]:
 
 
 def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
-    """The wall between a closed surface and the surface that lies the thickness inside it.
+    """The wall between a closed surface and its inner surface, offset inward by the thickness.
 
     Exact where three planes or fewer meet at each vertex: a box's inner side is the smaller box.
 
@@ -250,10 +250,10 @@ def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
 
 
 def _depth_inside_surface(surface: trimesh.Trimesh) -> float:
-    """How far it is from the surface, straight inward, to the other side [m], at the least but for
-    a share `thin_share` of the area."""
-    thin_share = 0.15  # Share of the area that may have no depth for two walls, as at rims.
-    start_share = 1e-6  # Start of the rays inside the surface, over its size.
+    """Smallest distance straight inward from the surface to the other side [m], ignoring the
+    thinnest `thin_share` of the area."""
+    thin_share = 0.15  # Share of the area that may be too thin for two walls, as at rims.
+    start_share = 1e-6  # Inset of the start of the rays, over the size of the surface.
     areas = surface.area_faces
     sound = areas > 1e-9 * areas.sum() / len(areas)
     normals, centres = surface.face_normals[sound], surface.triangles_center[sound]

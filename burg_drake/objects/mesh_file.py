@@ -22,7 +22,7 @@ from burg_drake.core import MeshError, content_hash, one_line, suppress_numpy_wa
 from burg_drake.objects.model_files import face_palette
 
 MAX_MESH_TRIANGLES = 2_000_000
-"""Triangles of a mesh; half as many for an open mesh that becomes a wall."""
+"""Triangles per mesh; half as many for an open mesh that becomes a wall."""
 
 MAX_TEXTURE_PIXELS = 2**26
 """Pixels of a texture, 8192 x 8192; readers ignore larger ones silently."""
@@ -60,12 +60,12 @@ def check_bytes(path: Path) -> None:
 
 
 def check_triangles(count: int, name: str, *, wall: bool = False) -> None:
-    """Refuses a mesh of too many triangles.
+    """Refuses a mesh with too many triangles.
 
     Args:
-        count: of its triangles or polygons.
-        name: how messages call the mesh.
-        wall: an open surface becomes a wall.
+        count: number of triangles or polygons.
+        name: name of the mesh in messages.
+        wall: the surface is open and becomes a wall.
 
     Raises:
         MeshError: there are more than `MAX_MESH_TRIANGLES`, or half as many for a wall.
@@ -80,8 +80,8 @@ def check_triangles(count: int, name: str, *, wall: bool = False) -> None:
 
 
 def announced_triangle_count(path: Path) -> int:
-    """How many triangles or polygons a file holds by its header or lines; 0 where that cannot be
-    told without reading it whole."""
+    """Number of triangles or polygons according to the file's header or lines; 0 if only reading
+    the whole file would tell."""
     header_bytes = 65536  # Bytes of a PLY or OFF file that are searched for the count.
     suffix, size = path.suffix.lower(), path.stat().st_size
     with path.open("rb") as file:
@@ -118,14 +118,14 @@ def _check_image_size(picture: Any, name: str) -> None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(picture) as image:  # its header alone
+            with Image.open(picture) as image:  # reads only the header
                 width, height = image.size
     except Image.DecompressionBombError as error:
         raise MeshError(
             f"{name}: the image is too large for a texture: at most {_max_texture_text()}"
         ) from error
     except (OSError, ValueError, SyntaxError):
-        return  # no picture that anybody could read
+        return  # not a readable image
     if width * height > MAX_TEXTURE_PIXELS:
         raise MeshError(
             f"{name}: {width} x {height} pixels; a texture may have {_max_texture_text()}"
@@ -138,7 +138,7 @@ def _max_texture_text() -> str:
 
 
 def _gltf_images(path: Path) -> Iterator[bytes]:
-    """The pictures of a glTF file; none of one that is damaged."""
+    """The images of a glTF file; empty for a damaged file."""
     data, binary = path.read_bytes(), b""
     if path.suffix.lower() == ".glb":
         length = int.from_bytes(data[12:16], "little")
@@ -160,7 +160,7 @@ def _gltf_images(path: Path) -> Iterator[bytes]:
 
 
 def _gltf_content(path: Path, uri: str) -> bytes:
-    """What a glTF file refers to: in the reference itself, or a file beside it."""
+    """Content that a glTF URI refers to: embedded in the URI, or a file beside the glTF file."""
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
     file = path.parent / unquote(uri)
@@ -179,7 +179,7 @@ UNKNOWN_CONTENT_MESSAGE = "its contents are neither text nor a known binary form
 
 
 def mesh_name(mesh: str | Path | trimesh.Trimesh) -> str:
-    """How messages call a mesh."""
+    """Name of a mesh in messages."""
     return "mesh in memory" if isinstance(mesh, trimesh.Trimesh) else str(mesh)
 
 
@@ -228,14 +228,14 @@ def source_rgba(mesh: trimesh.Trimesh) -> tuple[float, float, float, float] | No
 
 
 def make_opaque(mesh: trimesh.Trimesh) -> float | None:
-    """Takes the alpha out of the colours of a mesh, in place; images have none where they are used.
+    """Makes the colours of a mesh opaque, in place; the alpha of images is ignored anyway.
 
-    Exporters leave an alpha in colours that is not meant to be seen: glTF ignores that of materials
-    that do not blend, and scanners fill that of vertices with anything. What is to be seen through
-    is told by the source's `rgba`.
+    Exporters leave meaningless alpha values in colours: glTF ignores the alpha of materials that do
+    not blend, and scanners write arbitrary values for vertices. Transparency comes from the
+    source's `rgba`.
 
     Returns:
-        The lowest alpha that was taken out, 0 to 1; None if the mesh was opaque.
+        The lowest alpha that was removed, 0 to 1; None if the mesh was opaque.
     """
     visual = mesh.visual
     if visual is None or not visual.defined or texture_image(mesh) is not None:
@@ -259,8 +259,8 @@ def make_opaque(mesh: trimesh.Trimesh) -> float | None:
 
 
 def find_companion_files(path: Path) -> list[Path]:
-    """Materials, textures and buffers of a mesh: files in its folder, or in a folder in it, that
-    its text names, and that those name in turn.
+    """Material, texture and buffer files of a mesh, in its folder or a subfolder, that the mesh
+    file or one of these files names.
 
     Args:
         path: of the mesh.
@@ -291,7 +291,7 @@ def find_companion_files(path: Path) -> list[Path]:
 
 
 def missing_textures(path: Path) -> list[str]:
-    """A sentence for each picture or file of materials that a mesh names and that is not there.
+    """A sentence for each missing image or material file of a mesh.
 
     Args:
         path: of the mesh.
@@ -323,7 +323,7 @@ def missing_textures(path: Path) -> list[str]:
 
 
 def _material_files(path: Path) -> list[str]:
-    """Files of materials that an OBJ file names; a line may name several."""
+    """Material files of an OBJ file; a line may name several."""
     names: list[str] = []
     for text in _lines_with_keyword(path, "mtllib"):
         names += [text] if (path.parent / text).is_file() else text.split()
@@ -336,7 +336,7 @@ def _texture_name(materials: Path, text: str) -> str:
 
 
 def _image_uris(path: Path) -> list[str]:
-    """Pictures beside a glTF file; none of one that is damaged."""
+    """URIs of image files of a glTF file; empty for a damaged file."""
     try:
         images = json.loads(path.read_bytes()).get("images", ())
         uris = [str(image.get("uri", "data:")) for image in images]
@@ -346,7 +346,7 @@ def _image_uris(path: Path) -> list[str]:
 
 
 def _lines_with_keyword(path: Path, keyword: str, until: str = "") -> list[str]:
-    """What follows a keyword at the start of a line of a text."""
+    """Rest of each line of a text file that begins with a keyword."""
     max_bytes = 65536  # Bytes of a line that are searched for a file name.
     names = []
     words = keyword.lower().split()
@@ -362,7 +362,7 @@ def _lines_with_keyword(path: Path, keyword: str, until: str = "") -> list[str]:
 
 def _check_file(path: Path) -> None:
     name = os.fsencode(path)
-    if name.decode(errors="replace") != str(path):  # its readers could not be told the name
+    if name.decode(errors="replace") != str(path):  # its readers could not open a file of this name
         shown = name.decode(errors="backslashreplace")
         raise MeshError(f"{shown}: the path is not valid UTF-8; rename the file or its folder")
     if path.is_symlink() and not path.exists():
@@ -386,7 +386,7 @@ def _check_file(path: Path) -> None:
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
-    """The triangles of a file; a scene of several bodies becomes one mesh.
+    """Reads the triangles of a file; a scene with several bodies becomes one mesh.
 
     Raises:
         MeshError: file missing, unreadable, without triangles, or too large.
@@ -395,20 +395,20 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     check_triangles(announced_triangle_count(path), str(path))
     check_textures(path, find_companion_files(path))
     log = logging.getLogger("trimesh")
-    if not log.handlers:  # or remarks on materials would go to standard error
+    if not log.handlers:  # otherwise remarks on materials go to standard error
         log.addHandler(logging.NullHandler())
     try:
         with suppress_numpy_warnings():  # of numbers that overflow
             scene = trimesh.load_scene(path, process=False)
         parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
         mesh = _join_meshes(parts) if parts else None
-    except Exception as error:  # the readers raise whatever their parsing stumbles over
+    except Exception as error:  # the readers raise errors of any type
         reason = one_line(error)
         if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
             reason = UNKNOWN_CONTENT_MESSAGE
         raise _unreadable_error(path, _missing_stl_bytes(path) or reason) from error
     if mesh is None:
-        # Where a package that guesses encodings is installed, trimesh takes any bytes for a text.
+        # With a package installed that guesses encodings, trimesh reads any bytes as text.
         damage = _missing_stl_bytes(path) or _binary_content_error(path)
         if damage:
             raise _unreadable_error(path, damage)
@@ -421,14 +421,15 @@ def _unreadable_error(path: Path, reason: str) -> MeshError:
 
 
 def _binary_content_error(path: Path) -> str:
-    """What is wrong with a file of a text format that holds something else, or nothing."""
+    """Error message if a file of a text format has binary content, else empty."""
     text_formats = (".obj", ".off")  # Formats that have no binary form.
     binary = path.suffix.lower() in text_formats and b"\0" in path.read_bytes()
     return UNKNOWN_CONTENT_MESSAGE if binary else ""
 
 
 def _missing_stl_bytes(path: Path) -> str:
-    """What a binary STL file lacks by the number of triangles that it announces, or nothing."""
+    """Error message if a binary STL file is shorter than its triangle count requires, else
+    empty."""
     size = path.stat().st_size
     if path.suffix.lower() != ".stl" or size < STL_HEADER_BYTES:
         return ""
@@ -439,8 +440,8 @@ def _missing_stl_bytes(path: Path) -> str:
 
 
 def _join_meshes(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """One mesh of several: textures are packed into one, and where there is a part without a
-    texture, each part gets its main colour."""
+    """Joins several meshes. Textures are packed into one; if a part has no texture, each part gets
+    its main colour instead."""
     # Colour of parts without one, beside parts that have one.
     default_colour = (204, 204, 204, 255)
     if len(parts) == 1:

@@ -40,18 +40,18 @@ R_ZUP_YUP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 @dataclass(frozen=True, kw_only=True)
 class Preparation:
-    """What becomes of a surface that is open or very fine.
+    """Preparation of surfaces that are open or very fine.
 
     Attributes:
-        wall_thickness: of the wall that an open surface becomes [m]; if None 2 mm, or 2 % of the
-            mesh's diagonal where that is less. Only with a thickness given, a perfectly flat
-            surface becomes a wall as well.
-        openings: what becomes of a surface whose openings are too wide to be small holes: a `wall`
-            centred on it (a towel, a bowl that is a single sheet), or the solid that flat caps over
-            its openings make (`close`: a scan that lacks its underside).
-        max_faces: closed surfaces with more faces are decimated, as contact, mass and resting poses
-            gain nothing from them; scans with the usual 16 thousand stay as they are. A wall may
-            have twice as many, for its two sides.
+        wall_thickness: thickness of the wall that an open surface becomes [m]; if None, 2 mm, or 2
+            % of the mesh's diagonal if that is less. A perfectly flat surface becomes a wall only
+            if a thickness is given.
+        openings: how to close a surface whose openings are too wide to be small holes: as a `wall`
+            centred on it (a towel, a bowl that is a single sheet), or with flat caps over its
+            openings (`close`: a scan that lacks its underside).
+        max_faces: closed surfaces with more faces are decimated, as more faces do not improve
+            contact, mass and resting poses; scans with the usual 16 thousand stay as they are. A
+            wall, with its two sides, may have twice as many.
     """
 
     wall_thickness: float | None = None
@@ -72,12 +72,12 @@ class SurfaceMesh:
 
     Attributes:
         surface: geometry for physics: vertices merged, winding outward.
-        visual: geometry for display: the surface, or where the source has a texture or a few face
-            colours the given triangles with these (neither thickened nor decimated).
+        visual: geometry for display: the surface, or, if the source has a texture or a few face
+            colours, its own triangles with these (neither thickened nor decimated).
         repairs: what was changed, one sentence each.
         closed: whether the surface is watertight with consistent winding.
         rgba: main colour of the source, if it has one and neither texture nor a few face colours.
-        wall: thickness of the wall that an open surface became [m]; None for others.
+        wall: thickness of the wall that an open surface became [m]; None for other surfaces.
     """
 
     surface: trimesh.Trimesh
@@ -97,11 +97,11 @@ def load_mesh(
         mesh: file (one of `MESH_FORMATS`; a scene of several bodies becomes one mesh), or a mesh in
             memory.
         scale: factor from the mesh's unit to metres, such as `unit_scale("mm")`.
-        preparation: what becomes of an open or very fine surface.
+        preparation: how to prepare an open or very fine surface.
 
     Raises:
-        MeshError: file missing or unreadable, no faces, NaN vertices, flat, or a size that tells
-            of a wrong unit.
+        MeshError: file missing or unreadable, no faces, NaN vertices, flat, or a size that suggests
+            a wrong unit.
     """
     name = mesh_name(mesh)
     if not (np.isfinite(scale) and scale > 0.0):
@@ -141,14 +141,14 @@ def load_mesh(
 
 
 def check_size(mesh: str | Path | trimesh.Trimesh, scale: float) -> None:
-    """Checks the size of a mesh alone, which takes a small part of the time of `load_mesh`.
+    """Checks only the size of a mesh, in a small part of the time of `load_mesh`.
 
     Args:
         mesh: file, or a mesh in memory.
         scale: factor from the mesh's unit to metres.
 
     Raises:
-        MeshError: the file cannot be read, or its size tells of a wrong unit.
+        MeshError: the file cannot be read, or its size suggests a wrong unit.
     """
     raw = mesh if isinstance(mesh, trimesh.Trimesh) else read_mesh(Path(mesh))
     _check_coordinates(raw, mesh_name(mesh))
@@ -156,7 +156,7 @@ def check_size(mesh: str | Path | trimesh.Trimesh, scale: float) -> None:
 
 
 def read_piece(file: Path, scale: float) -> trimesh.Trimesh:
-    """A convex piece of an object [m] from a mesh file in the object's own frame and unit.
+    """Reads a convex piece of an object [m] from a mesh file in the object's own frame and unit.
 
     Raises:
         MeshError: the file cannot be read.
@@ -167,7 +167,7 @@ def read_piece(file: Path, scale: float) -> trimesh.Trimesh:
 
 
 def _read_mesh_z_up(file: Path) -> trimesh.Trimesh:
-    """A mesh file with z up, as which glTF is read turned."""
+    """Reads a mesh file with z up; glTF, with y up, is rotated."""
     mesh = read_mesh(file)
     if file.suffix.lower() in (".glb", ".gltf"):
         mesh.apply_transform(make_pose(R_ZUP_YUP))
@@ -182,7 +182,7 @@ def _max_extent(mesh: trimesh.Trimesh) -> float:
 def _close_surface(
     raw: trimesh.Trimesh, name: str, preparation: Preparation
 ) -> tuple[RepairedMesh, float | None]:
-    """The repaired and closed surface, and the thickness of the wall that it became, if any."""
+    """The repaired and closed surface, and the thickness of the wall if it became one."""
     check_triangles(len(raw.faces), name)
     repaired = repair(raw)
     if preparation.openings == "wall" and not is_closed(repaired.mesh):
@@ -233,7 +233,7 @@ def _check_hull(surface: trimesh.Trimesh, name: str) -> None:
     extent = surface.extents if len(surface.faces) else np.zeros(3)
     limit = MIN_VOLUME_SHARE * extent.max() ** 3
     points = np.asarray(surface.vertices)
-    # the few points farthest out tell most often, and at once
+    # a quick test with few points, which mostly suffices
     if _hull_volume(_extreme_points(points)) <= limit and _hull_volume(points) <= limit:
         size = " x ".join(f"{1000 * e:.3g}" for e in extent)
         cure = "wall_thickness makes it a wall"

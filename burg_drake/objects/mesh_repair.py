@@ -9,7 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 MAX_HOLE_WIDTH = 0.15
-"""Width of a hole that is closed, over the mesh's diagonal."""
+"""Largest width of a hole that is filled, over the mesh's diagonal."""
 
 
 @dataclass
@@ -19,7 +19,7 @@ class RepairedMesh:
     Attributes:
         mesh: the result.
         inverted: whether the whole surface was turned inside out.
-        sentences: what was changed.
+        sentences: the changes, one sentence each.
     """
 
     mesh: trimesh.Trimesh
@@ -28,7 +28,7 @@ class RepairedMesh:
 
 
 def repair(raw: trimesh.Trimesh) -> RepairedMesh:
-    """A clean copy of a surface, without texture.
+    """Returns a repaired copy of a surface, without texture.
 
     Args:
         raw: surface in metres with finite vertices.
@@ -84,8 +84,8 @@ def _merge_vertices(result: RepairedMesh) -> None:
 
 
 def _keep_bodies_apart(result: RepairedMesh, given: trimesh.Trimesh) -> None:
-    """Where bodies that the file keeps apart have corners in common, merging glues them together;
-    if each is closed by itself, its corners are merged with one another only."""
+    """Merges corners within each body only, if the bodies that the file keeps apart share corners
+    and each is closed by itself."""
     labels = trimesh.graph.connected_component_labels(given.edges, len(given.vertices))
     if labels.max() < 1:
         return
@@ -102,8 +102,8 @@ def _keep_bodies_apart(result: RepairedMesh, given: trimesh.Trimesh) -> None:
 
 
 def _drop_degenerate(result: RepairedMesh) -> None:
-    """Drops faces without three corners, and of faces with the same corners all but one; or all,
-    where the surface already is closed without them (a fin without thickness)."""
+    """Drops faces without three different corners and duplicate faces. If the surface is closed
+    without the duplicates (a fin without thickness), no copy of them is kept."""
     mesh = result.mesh
     f = mesh.faces
     proper = (f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])
@@ -181,7 +181,7 @@ def _fill_holes(result: RepairedMesh) -> None:
 
 
 def rim_edges(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
-    """Edges (E, 2) of only one face, in its direction."""
+    """Edges (E, 2) that belong to only one face, in the direction of that face."""
     _, inverse, count = np.unique(
         mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True
     )
@@ -233,8 +233,8 @@ def _orient_outward(result: RepairedMesh) -> None:
 
 
 def _inverted_bodies(mesh: trimesh.Trimesh, groups: list[NDArray[np.int64]]) -> list[bool]:
-    """Which bodies to flip: those with negative volume that are no cavity of another body, and
-    what lies inside those."""
+    """Bodies to flip: those with negative volume that are not cavities of another body, and the
+    bodies inside these."""
     rounding_share = 1e-9  # Volume over bounding box that is rounding error.
     parts = [mesh.submesh([g], append=True, repair=False) for g in groups]
     volumes = [signed_volume(p) for p in parts]
@@ -273,12 +273,12 @@ MAX_SELF_OVERLAP = 0.003
 
 
 def self_overlap(surface: trimesh.Trimesh, seed: int = 0) -> float:
-    """Share of the volume inside a surface that it is wound about more than once, or the wrong way:
-    of the length of random lines, uniform in position and direction.
+    """Share of the volume inside a surface whose winding number is not 1, estimated from the
+    lengths of random lines, uniform in position and direction.
 
     Args:
         surface: closed, wound outward.
-        seed: of the lines.
+        seed: seed of the random lines.
     """
     ray_count = 1000  # Random rays through the surface.
     rng = np.random.default_rng(seed)
@@ -289,11 +289,13 @@ def self_overlap(surface: trimesh.Trimesh, seed: int = 0) -> float:
     points, ray, face = surface.ray.intersects_location(start, direction, multiple_hits=True)
     depth = np.einsum("ij,ij->i", points - start[ray], direction[ray])
     entering = -np.einsum("ij,ij->i", surface.face_normals[face], direction[ray])
-    # a line is drawn once for each point where it meets the surface, the more so the flatter
+    # lines are drawn by their intersections with the surface, and more often at flat angles
     density = np.bincount(ray, 1.0 / np.maximum(np.abs(entering), 1e-9), minlength=ray_count)
     order = np.lexsort([depth, ray])
     ray, depth, entering = ray[order], depth[order], np.sign(entering[order])
-    sound = np.bincount(ray, entering, minlength=ray_count)[ray] == 0.0  # else it met an edge
+    sound = (
+        np.bincount(ray, entering, minlength=ray_count)[ray] == 0.0
+    )  # otherwise the line met an edge
     ray, depth, entering = ray[sound], depth[sound], entering[sound]
     inside = np.cumsum(entering)[:-1]
     step = np.where(ray[1:] == ray[:-1], np.diff(depth) / density[ray[1:]], 0.0)

@@ -21,11 +21,11 @@ DEFAULT_RGBA: Rgba = (0.8, 0.8, 0.78, 1.0)
 
 
 def face_palette(mesh: trimesh.Trimesh) -> tuple[NDArray[np.uint8], NDArray[np.int64]] | None:
-    """The colours of a mesh whose faces have a few.
+    """The palette of a mesh with a few face colours.
 
     Returns:
-        (C, 4) colours as bytes and (F,) index of each face's one; None where the faces have no
-        colours of their own, or only one, or more than 16.
+        (C, 4) colours as bytes and (F,) colour index of each face; None if the faces have no
+        colours, a single one, or more than 16.
     """
     max_colours = 16  # A mesh with more face colours is a scan, not a few materials.
     if mesh.visual is None or mesh.visual.kind != "face":
@@ -42,8 +42,8 @@ def write_visual(
     Args:
         mesh: surface in metres; with texture coordinates if `image` is given.
         path: the OBJ file.
-        rgba: colour, if there is no image; without either, the mesh's `face_palette` is used, and
-            without that `DEFAULT_RGBA`.
+        rgba: colour if there is no image. Without both, the mesh's `face_palette` is used, or else
+            `DEFAULT_RGBA`.
         image: texture (PIL image).
     """
     palette = face_palette(mesh) if rgba is None and image is None else None
@@ -143,12 +143,13 @@ LINK_NAME = "body"
 
 @dataclass(frozen=True, kw_only=True)
 class ContactParameters:
-    """How objects touch, whatever their shape.
+    """Contact parameters of objects of any shape.
 
     Attributes:
-        modulus: hydroelastic modulus of compliant pieces [Pa], as the pads have.
+        modulus: hydroelastic modulus of compliant pieces [Pa], the same as of the pads.
         dissipation: Hunt-Crossley dissipation [s/m].
-        faceting: how far the facets that Drake makes of a cylinder or a sphere may be inside [m].
+        faceting: largest distance of Drake's facets inside the surface of a cylinder or a sphere
+            [m].
     """
 
     modulus: float = 1e7
@@ -176,8 +177,8 @@ def model_sdf(
         friction: coefficient, static and dynamic.
         visual: path of the visual mesh relative to the SDF.
         pieces: paths of the convex pieces relative to the SDF.
-        contact: what touches; its mesh lies beside the SDF.
-        material: how it touches.
+        contact: contact geometry; its mesh lies beside the SDF.
+        material: contact parameters.
     """
     ixx, iyy, izz, ixy, ixz, iyz = (f"{v!r}" for v in mass_properties.inertia)
     x, y, z = (f"{v!r}" for v in mass_properties.center_of_mass)
@@ -212,11 +213,12 @@ def model_sdf(
 
 
 def resolution_hint(primitive: Primitive, faceting: float) -> float:
-    """Edge length [m] at which Drake's facets of a round primitive lie less than `faceting` inside.
+    """Largest edge length [m] with which Drake's facets of a round primitive lie less than
+    `faceting` inside it.
 
-    Of a cylinder it makes a prism, whose sides are chords. A sphere starts as an octahedron whose
-    faces are cut into four, L times, until a quarter circle over 2^L is at most the hint; the worst
-    facet then lies 0.92 to 1.00 radius / 4^L inside (measured for L from 2 to 6).
+    Drake replaces a cylinder by a prism, whose sides are chords. A sphere starts as an octahedron
+    whose faces are divided into four, L times, until a quarter circle over 2^L is at most the hint;
+    the worst facet then lies 0.92 to 1.00 radius / 4^L inside (measured for L from 2 to 6).
     """
     radius = primitive.size[0]
     if primitive.shape == "sphere":
@@ -300,7 +302,7 @@ def _pose_element(primitive: Primitive) -> str:
 
 
 def _resolution_element(primitive: Primitive, material: ContactParameters) -> list[str]:
-    """How finely Drake cuts a round primitive; a box needs no cutting."""
+    """Resolution hint of a round primitive for Drake; a box needs none."""
     if primitive.shape == "box":
         return []
     hint = resolution_hint(primitive, material.faceting)

@@ -24,10 +24,10 @@ from burg_drake.objects.mesh_repair import (
 
 
 def vertex_offsets(mesh: trimesh.Trimesh) -> Array:
-    """How vertices move when every face's plane moves by a unit distance along its normal.
+    """Vertex displacements when every face's plane moves by a unit distance along its normal.
 
-    Where the faces of a vertex have three normals or more, no move suits all of them; then it is
-    the one with the least sum of squared errors, weighted with the faces' angles at the vertex.
+    If more than three different normals meet at a vertex, no displacement suits all faces. The
+    least-squares solution is used, weighted by the faces' angles at the vertex.
 
     Args:
         mesh: wound consistently, vertices merged.
@@ -59,8 +59,8 @@ def vertex_offsets(mesh: trimesh.Trimesh) -> Array:
 
 
 def smooth_offsets(mesh: trimesh.Trimesh) -> Array:
-    """Offsets (V, 3) of unit length that vary little from vertex to vertex: they do not fold a
-    rough surface, but keep the distance only on the whole."""
+    """Smoothed offsets (V, 3) of unit length. They do not fold a rough surface, but keep the
+    distance only approximately."""
     rounds = 20  # Rounds of averaging over neighbours.
     edges = mesh.edges_unique
     normals = vertex_offsets(mesh)
@@ -74,7 +74,7 @@ def smooth_offsets(mesh: trimesh.Trimesh) -> Array:
 
 
 def folded_share(mesh: trimesh.Trimesh, moved: Array) -> float:
-    """Share of the area, in [0, 1], that turns over when the vertices go to `moved` (V, 3)."""
+    """Share of the area, in [0, 1], that turns over when the vertices move to `moved` (V, 3)."""
     t = moved[mesh.faces]
     normal = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
     over = np.einsum("ij,ij->i", normal, mesh.face_normals) <= 0.0
@@ -83,25 +83,25 @@ def folded_share(mesh: trimesh.Trimesh, moved: Array) -> float:
 
 
 def default_wall(mesh: trimesh.Trimesh) -> float:
-    """Thickness of the wall that an open surface becomes where none is given [m]."""
+    """Default thickness of the wall that an open surface becomes [m]."""
     usual_thickness = 2e-3  # Metres, about that of crockery or a plastic box.
     max_diagonal_share = 0.02  # Thickness over the mesh's diagonal.
     return min(usual_thickness, max_diagonal_share * float(np.linalg.norm(mesh.extents)))
 
 
 def thicken_sheet(sheet: trimesh.Trimesh, thickness: float) -> trimesh.Trimesh | None:
-    """A closed wall, half its thickness on either side of an open surface.
+    """Makes an open surface a closed wall, with half the thickness on either side.
 
-    Where more than two faces meet at an edge, each sheet ends there with a rim of its own, and the
-    walls overlap.
+    If more than two faces meet at an edge, each sheet ends there with its own rim, and the walls
+    overlap.
 
     Args:
         sheet: open surface [m].
         thickness: of the wall [m].
 
     Returns:
-        The wall, wound outward; None if the surface has only one side (a Moebius strip), or is so
-        crumpled that its two sides pass through each other.
+        The wall, wound outward; None if the surface has only one side (a Moebius strip) or is so
+        crumpled that its two sides would intersect.
     """
     max_folded_share = 0.02  # Share of the area that may turn over in creases.
     min_volume_ratio = 0.5  # Volume over area times thickness; below it the wall intersects itself.
@@ -122,8 +122,8 @@ def thicken_sheet(sheet: trimesh.Trimesh, thickness: float) -> trimesh.Trimesh |
 
 
 def separate_faces(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """A copy in which no more than two faces meet at an edge and one fan of faces at a vertex:
-    where there are more, vertices are doubled."""
+    """Duplicates vertices so that at most two faces meet at an edge and one fan of faces at a
+    vertex."""
     faces = mesh.faces
     corners = np.arange(3 * len(faces)).reshape(-1, 3)
     start = corners.reshape(-1)
@@ -165,13 +165,13 @@ def close_openings(
     """Closes a repaired surface that is still open.
 
     Args:
-        result: changed in place, with a sentence on what was done; left open where neither way
-            gives a sound solid.
+        result: changed in place, with a sentence on the change; stays open if neither way gives a
+            sound solid.
         openings: a `wall` centred on the surface, or `close` for flat caps.
         thickness: of the wall [m]; `default_wall` if None.
 
     Returns:
-        Thickness of the wall that it became [m]; None if it became none.
+        Thickness of the wall [m]; None if the surface did not become one.
     """
     mesh = result.mesh
     if is_closed(mesh) or not len(mesh.faces):
@@ -238,7 +238,7 @@ def _thicken_sheets(
 
 def _close_with_caps(result: RepairedMesh, count: int, opening: str) -> bool:
     capped = _cap_openings(result.mesh, skirt=False)
-    if not is_closed(capped):  # a rim that zigzags: an edge of the cap may be one of the surface
+    if not is_closed(capped):  # the cap of a zigzag rim may reuse an edge of the surface
         capped = _cap_openings(result.mesh, skirt=True)
     if not is_closed(capped) or signed_volume(capped) == 0.0:
         return False
@@ -254,8 +254,8 @@ def _close_with_caps(result: RepairedMesh, count: int, opening: str) -> bool:
 
 
 def _split_open_sheets(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
-    """A surface as its closed part, which may be empty, and the open sheets that hang on it or lie
-    apart."""
+    """Splits a surface into its closed part, which may be empty, and its open sheets, attached or
+    separate."""
     patch = trimesh.graph.connected_component_labels(mesh.face_adjacency, len(mesh.faces))
     _, edge, count = np.unique(mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True)
     free = (count[edge.reshape(-1)] == 1).reshape(-1, 3).any(axis=1)
@@ -280,7 +280,7 @@ def _rim_width(points: Array) -> float:
 
 
 def _group_by_plane(mesh: trimesh.Trimesh, loops: list[list[int]]) -> list[list[list[int]]]:
-    """Rims of one body that lie in one plane, together."""
+    """Groups the rims of one body that lie in one plane."""
     plane_tolerance = 0.02  # Cosine below 1, and distance over width, within one plane.
     body = trimesh.graph.connected_component_labels(mesh.edges_unique, len(mesh.vertices))
     groups: list[list[list[int]]] = []
@@ -304,15 +304,15 @@ def _group_by_plane(mesh: trimesh.Trimesh, loops: list[list[int]]) -> list[list[
 
 
 def _polygon_normal(points: Array) -> Array:
-    """Unit normal of a closed polygon (N, 3) by its area vector."""
+    """Unit normal of a closed polygon (N, 3), from its area vector."""
     p = points - points.mean(axis=0)
     area = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
     return np.asarray(area / max(float(np.linalg.norm(area)), 1e-300))
 
 
 def _cap_openings(mesh: trimesh.Trimesh, skirt: bool) -> trimesh.Trimesh:
-    """A surface with caps over its openings, to the rims themselves or to the foot of a skirt that
-    goes from each rim straight to the plane through its outermost point."""
+    """A surface with caps over its openings. The caps end at the rims or, with `skirt`, at a
+    straight skirt from each rim to the plane through its outermost point."""
     mesh = separate_faces(mesh)
     vertices, faces = [np.asarray(mesh.vertices)], [np.asarray(mesh.faces)]
     count = len(mesh.vertices)
@@ -338,7 +338,7 @@ def _cap_openings(mesh: trimesh.Trimesh, skirt: bool) -> trimesh.Trimesh:
 
 
 def _plane_axes(normal: Array) -> Array:
-    """(3, 2) axes across a unit normal, which they form a right-handed frame with."""
+    """(3, 2) axes perpendicular to a unit normal, right-handed with it."""
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     across /= max(float(np.linalg.norm(across)), 1e-300)
     return np.column_stack([across, np.cross(normal, across)])

@@ -21,14 +21,15 @@ SEARCH_DIRECTIONS = 600  # Directions whose extreme corners the search uses.
 
 
 def fit_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitive, Fit] | None:
-    """The primitive that stands for a surface.
+    """Fits a primitive to a surface.
 
     Args:
         surface: of the object [m].
-        volume: inside it [m^3].
+        volume: volume inside the surface [m^3].
 
     Returns:
-        The one with the smallest Hausdorff distance, and its fit; None if none is near enough.
+        The primitive with the smallest Hausdorff distance, and its fit; None if none is near
+        enough.
     """
     max_distance = 1.5e-3  # Metres, Hausdorff.
     # Hausdorff distance over the object's diagonal; the smaller limit holds.
@@ -39,7 +40,7 @@ def fit_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitive, F
 
 
 def nearest_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitive, Fit] | None:
-    """As `fit_primitive`, however far it is; None if the volumes of all are too different."""
+    """As `fit_primitive`, without a limit on the distance; None if all volumes differ too much."""
     volume_ratios = (0.97, 1.06)  # Volume of the primitive over that of the object.
     max_start_ratio = 1.5  # Volume over the object's, above which turning does not help.
     hull = convex_hull(np.asarray(surface.vertices))
@@ -67,7 +68,7 @@ def primitive_volume(primitive: Primitive) -> float:
 
 
 def primitive_mesh(primitive: Primitive, segments: int = 96) -> trimesh.Trimesh:
-    """A primitive's surface in the object frame; corners of a round one lie on it."""
+    """A primitive's surface in the object frame; vertices of round primitives lie on it."""
     if primitive.shape == "sphere":
         mesh = trimesh.creation.icosphere(subdivisions=4, radius=primitive.size[0])
     elif primitive.shape == "cylinder":
@@ -80,26 +81,27 @@ def primitive_mesh(primitive: Primitive, segments: int = 96) -> trimesh.Trimesh:
 
 
 def _enclosing_primitives(
-    surface: trimesh.Trimesh, points: Array, most: float
+    surface: trimesh.Trimesh, points: Array, max_volume: float
 ) -> Iterator[Primitive]:
-    """The smallest primitives around points, from starts with at most that volume [m^3]."""
+    """The smallest enclosing primitives of points, from initial ones of volume up to `max_volume`
+    [m^3]."""
     corners = points
     if len(points) > SEARCH_DIRECTIONS:
         corners = points[np.unique((points @ _even_directions(SEARCH_DIRECTIONS).T).argmax(axis=0))]
     yield _enclosing_sphere(corners, points)
     axes = _face_normal_axes(surface)
-    if np.prod(np.ptp(points @ axes, axis=0)) <= most:
+    if np.prod(np.ptp(points @ axes, axis=0)) <= max_volume:
         yield _enclosing_box(corners, points, axes)
     for column in range(3):
         R_OP = np.roll(axes, 2 - column, axis=1)
         extent = np.ptp(points @ R_OP, axis=0)
-        if np.pi / 4.0 * extent[:2].max() ** 2 * extent[2] <= most:
+        if np.pi / 4.0 * extent[:2].max() ** 2 * extent[2] <= max_volume:
             yield _enclosing_cylinder(corners, points, R_OP)
 
 
 def _face_normal_axes(surface: trimesh.Trimesh) -> Array:
-    """(3, 3) orthonormal axes as columns: the commonest direction of the faces' normals, then the
-    commonest across it."""
+    """(3, 3) orthonormal axes as columns: the most common direction of the face normals, then the
+    most common one perpendicular to it."""
     normals = np.asarray(surface.face_normals)
     area = np.asarray(surface.area_faces)
     first = _most_common_direction(normals, area)
@@ -115,7 +117,7 @@ def _face_normal_axes(surface: trimesh.Trimesh) -> Array:
 
 
 def _most_common_direction(directions: Array, weight: Array) -> Array:
-    """Of unit vectors (N, 3), up to sign, the one that most weight is close to; then the mean."""
+    """Mean of the densest cluster, by weight, of unit vectors (N, 3) up to sign."""
     max_candidates = 200  # Largest faces whose normals are compared.
     min_cosine = np.cos(np.deg2rad(5.0))  # Normals within 5 degrees belong to one face of a box.
     some = directions[np.argsort(-weight, kind="stable")[:max_candidates]]
@@ -155,7 +157,7 @@ def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
     for _ in range(MAX_STEPS):
         p = corners @ R_OP
         extent = np.maximum(np.ptp(p, axis=0), 1e-9)
-        # seen from axes turned by w, p moves by p x w: columns are w, upper and lower bounds
+        # in axes rotated by w, p moves by p x w; columns: w, upper and lower bounds
         turned = _cross_matrix(p)
         rows, limits = [], []
         for k in range(3):
@@ -179,7 +181,7 @@ def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
 
 
 def _enclosing_cylinder(corners: Array, points: Array, R_OP: Array) -> Primitive:
-    """The cylinder whose axis starts out along the last column of `R_OP`."""
+    """The enclosing cylinder found from an initial axis along the last column of `R_OP`."""
     p = corners @ R_OP
     X_OP = make_pose(R_OP, R_OP @ ((p.min(axis=0) + p.max(axis=0)) / 2))
     X_best, best = X_OP, np.inf
@@ -201,13 +203,13 @@ def _enclosing_cylinder(corners: Array, points: Array, R_OP: Array) -> Primitive
 
 
 def _shrinking_motion(p: Array) -> Array:
-    """The motion (4, 4) of a cylinder about z that makes it smaller around points (N, 3)."""
+    """The motion (4, 4) that shrinks an enclosing cylinder of points (N, 3) about z."""
     n = len(p)
     radius = np.maximum(np.hypot(p[:, 0], p[:, 1]), 1e-12)
     size, height = float(radius.max()), float(np.ptp(p[:, 2]))
     u = np.column_stack([p[:, :2] / radius[:, None], np.zeros(n)])
     turned = _cross_matrix(p)[..., :2]
-    # columns are the turn about x and y, the shift along x and y, radius, upper, lower
+    # columns: rotation about x and y, shift along x and y, radius, upper, lower
     radial = np.einsum("nk,nkj->nj", u, turned)
     rows = np.zeros((3 * n, 7))
     rows[:n] = np.hstack([radial, -u[:, :2], np.tile([-1.0, 0.0, 0.0], (n, 1))])
@@ -243,12 +245,12 @@ def _as_triple(values: Array) -> tuple[float, float, float]:
 
 
 _CACHED_CORNERS: dict[tuple[tuple[Path, int], ...], Array] = {}
-"""Corners by the files and the times of their last change."""
+"""Corners by files and their modification times."""
 
 
 def support_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
-    """(N, 3) corners of the hull with which an object rests on a plane, in O [m]: of its primitive,
-    else of its pieces. Its stable poses, its feet and its fall in simulation go by it.
+    """(N, 3) hull corners of an object's primitive, or else of its pieces, in O [m]. Its stable
+    poses, feet and fall in simulation follow from them.
 
     Raises:
         UnknownNameError: a file of the library is missing.
@@ -260,7 +262,7 @@ def support_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
 
 
 def hull_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
-    """(N, 3) corners of the hull of all that touches others of an object, in O [m].
+    """(N, 3) corners of the hull of an object's whole contact geometry, in O [m].
 
     Raises:
         UnknownNameError: a file of the library is missing.

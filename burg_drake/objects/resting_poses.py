@@ -25,7 +25,7 @@ TILT_MARGIN = np.deg2rad(6.0)
 
 
 ROLL_MARGIN = np.deg2rad(10.0)
-"""Radians of tilt whose rise does not stop rolling: a prism rolls with 18 sides and more."""
+"""Radians of tilt whose height rise does not stop rolling: prisms with 18 or more sides roll."""
 
 
 Index = NDArray[np.signedinteger]
@@ -46,8 +46,8 @@ class RestingFacet:
     height: float
 
     def rank(self) -> tuple[float, ...]:
-        """Sorts by probability; of mirror images and the like, the one that is down as the object
-        stands in its frame comes first, however the surface is cut into triangles."""
+        """Sort key by probability. Among equally probable facets, such as mirror images, the one
+        that is lowest in the object's frame comes first, independent of the triangulation."""
         x, y, z = (float(v) for v in np.round(self.down, 4))
         return (-round(self.probability, 6), z, y, x)
 
@@ -57,10 +57,10 @@ class NeutralEquilibrium:
     """Directions of O between which an object rolls without rising much.
 
     Attributes:
-        normals: (K, 3) facets that can be down on the way.
-        arcs: (E, 2, 3) pairs of them that share an edge.
-        corners: (C, 3) hull vertices about the centre of mass [m] that it can stand on on the way;
-            all their facets are among these.
+        normals: (K, 3) normals of the facets that the object rolls over.
+        arcs: (E, 2, 3) pairs of normals of facets that share an edge.
+        corners: (C, 3) hull vertices about the centre of mass [m] all of whose facets are among
+            these.
         points: (V, 3) all hull vertices about the centre of mass [m].
     """
 
@@ -70,12 +70,13 @@ class NeutralEquilibrium:
     points: Array
 
     @property
-    def span(self) -> float:
-        """Largest turn away from the first normal [rad]."""
+    def max_angle(self) -> float:
+        """Largest angle from the first normal [rad]."""
         return float(np.arccos(np.clip(self.normals @ self.normals[0], -1.0, 1.0)).max())
 
     def angle(self, down: Array) -> float:
-        """From direction `down` (3,) of O to the nearest of these [rad]; 0 among them."""
+        """Angle from direction `down` (3,) of O to the nearest of these directions [rad]; 0
+        inside."""
         lowest = self.points[(self.points @ down).argmax()]
         if len(self.corners) and (np.linalg.norm(self.corners - lowest, axis=1) < 1e-12).any():
             return 0.0
@@ -87,7 +88,7 @@ class NeutralEquilibrium:
             turns = length > 1e-9
             a, b, across = a[turns], b[turns], across[turns] / length[turns, None]
             foot = down - (across @ down)[:, None] * across
-            # on the arc: on its inner side as seen from either end
+            # on the arc: on the inner side of both ends
             inside = (np.einsum("ij,ij->i", np.cross(a, foot), across) > 0.0) & (
                 np.einsum("ij,ij->i", np.cross(foot, b), across) > 0.0
             )
@@ -97,7 +98,7 @@ class NeutralEquilibrium:
 
 
 class PotentialLandscape:
-    """Facets of the hull, what they topple to and what lies between them.
+    """Potential energy over orientation: the facets of the hull, and the passes between them.
 
     Args:
         support: (N, 3) points of O whose hull rests on the plane [m].
@@ -106,7 +107,7 @@ class PotentialLandscape:
     Attributes:
         points: (V, 3) of the hull, about the centre of mass [m].
         normals: (F, 3) outward, of the hull's triangles.
-        heights: (F,) of the centre of mass over them [m].
+        heights: (F,) heights of the centre of mass above the facets [m].
     """
 
     def __init__(self, support: Array, p_OOcm: Array) -> None:
@@ -121,14 +122,14 @@ class PotentialLandscape:
         self._basins_by_margin: dict[float, Index] = {}
 
     def height(self, down: Array) -> Array:
-        """Of the centre of mass with directions `down` (..., 3) of O down, (...) [m]."""
+        """Heights (...) of the centre of mass if directions `down` (..., 3) of O point down [m]."""
         return (down @ self.points.T).max(axis=-1)
 
     def minima(self, tilt_margin: float = TILT_MARGIN) -> list[RestingFacet]:
-        """Ways to rest, most probable first.
+        """Minima in which the object can rest, most probable first.
 
         Args:
-            tilt_margin: minima parted by a smaller tilt are one [rad].
+            tilt_margin: minima separated by a smaller tilt are merged [rad].
         """
         face, successor = self._faces, self._toppled_faces
         share = np.bincount(face, weights=_solid_angles(self._triangles)) / (4.0 * np.pi)
@@ -146,19 +147,19 @@ class PotentialLandscape:
                 found.append(facet)
         return sorted(found, key=RestingFacet.rank)
 
-    def basin(self, down: Array) -> Array:
+    def minimum_below(self, down: Array) -> Array:
         """(3,) direction of the minimum that `down` (3,) leads to."""
         facet = int((self.normals @ down).argmax())
         return self.normals[self._basins(TILT_MARGIN)[facet]]
 
-    def neutral(self, down: Array, margin: float = ROLL_MARGIN) -> NeutralEquilibrium:
-        """Where it rolls from direction `down` (3,), rising and falling by less than a tilt by
-        `margin` would do."""
+    def neutral_equilibrium(self, down: Array, margin: float = ROLL_MARGIN) -> NeutralEquilibrium:
+        """Directions that the object can roll to from `down` (3,), with height changes smaller than
+        that of a tilt by `margin`."""
         start = int((self.normals @ down).argmax())
         rows, other, passes = self._edge_passes
         level = self.heights[start]
         flat = passes * np.cos(margin) <= level
-        low = self.heights < level * np.cos(margin)  # it would fall there, and not come back
+        low = self.heights < level * np.cos(margin)  # it would fall there and not return
         flat &= ~(low[rows] | low[other])
         count = len(self.heights)
         graph = coo_matrix((np.ones(flat.sum()), (rows[flat], other[flat])), (count, count))
@@ -167,7 +168,7 @@ class PotentialLandscape:
         edges = flat & within[rows]
         complete = np.ones(len(self._hull_points), dtype=bool)
         complete[self._corners[~within]] = False
-        # tips are not passed; the corners of a sphere of few faces rise more than its edges
+        # rolling avoids vertices; those of a coarse sphere rise more than its edges
         complete &= np.linalg.norm(self._hull_points, axis=1) * np.cos(2.0 * margin) <= level
         used = np.unique(self._corners)
         return NeutralEquilibrium(
@@ -178,14 +179,14 @@ class PotentialLandscape:
         )
 
     def rolls(self, down: Array) -> bool:
-        """Whether it can roll on from `down` (3,) by 60 degrees."""
-        # Radians that an object turns without a higher pass if it rolls.
+        """Whether the object can roll by 60 degrees from direction `down` (3,)."""
+        # Radians; an object rolls if it can turn this far without a higher pass.
         min_span = np.deg2rad(60.0)
-        return bool(self.neutral(down).span >= min_span)
+        return bool(self.neutral_equilibrium(down).max_angle >= min_span)
 
     @cached_property
     def _faces(self) -> Index:
-        """(F,) number of the face that each triangle belongs to."""
+        """(F,) face number of each triangle."""
         coplanar_angle = 1e-3  # Radians between facets of one face; vertices in files are rounded.
         count = len(self.heights)
         rows, k = np.nonzero(np.arange(count)[:, None] < self._neighbors)
@@ -210,8 +211,7 @@ class PotentialLandscape:
 
     @cached_property
     def _toppled_faces(self) -> Index:
-        """(faces,) the face that each face topples to, itself where the centre of mass is above
-        it."""
+        """(faces,) the face that each face topples to; itself if the centre of mass is above it."""
         foot = self.normals * self.heights[:, None]
         beyond = np.empty(self._neighbors.shape)
         for k in range(3):  # neighbour k lies across the edge opposite to corner k
@@ -226,15 +226,15 @@ class PotentialLandscape:
         rows = np.arange(len(face))
         order = np.lexsort((-beyond[rows, k], face))
         _, at = np.unique(face[order], return_index=True)
-        worst = order[at]  # the triangle of each face with the edge that is passed the farthest
+        worst = order[at]  # the triangle of each face with the farthest-passed edge
         towards = to[worst, k[worst]]
         falls = (beyond[worst, k[worst]] > 0.0) & (self._face_heights[towards] < self._face_heights)
         return np.where(falls, towards, np.arange(len(worst)))
 
     @cached_property
     def _edge_passes(self) -> tuple[Index, Index, Array]:
-        """Edges between facets: one facet, the other facet (E,) and the height of the centre of
-        mass when it passes over the edge (E,) [m]."""
+        """Edges between facets: the two facets (E,), and the height of the centre of mass when it
+        passes over the edge (E,) [m]."""
         rows, k = np.nonzero(np.arange(len(self.heights))[:, None] < self._neighbors)
         other = self._neighbors[rows, k]
         a, b = self._triangles[rows, (k + 1) % 3], self._triangles[rows, (k + 2) % 3]
@@ -247,10 +247,10 @@ class PotentialLandscape:
         return rows, other, np.where(between, np.maximum(reach, higher), higher)
 
     def _basins(self, tilt_margin: float) -> Index:
-        """(F,) the lowest facet of each facet's basin; basins parted by a small tilt are one.
+        """(F,) the lowest facet of each facet's basin; basins separated by a small tilt are merged.
 
-        Edges are taken by the height of the pass over them. A pass joins two basins when, from the
-        higher one's minimum, it is less than the tilt margin up.
+        Edges are processed by the height of their pass. A pass joins two basins if it is less than
+        the tilt margin above the higher of their minima.
         """
         if tilt_margin in self._basins_by_margin:
             return self._basins_by_margin[tilt_margin]
@@ -294,10 +294,10 @@ def stable_poses(
     """Resting poses, most probable first.
 
     Args:
-        surface: in O [m]; tells which poses are the same by symmetry.
+        surface: in O [m]; determines which poses are equal by symmetry.
         support: (N, 3) points of O whose hull rests on the plane [m].
         p_OOcm: (3,) centre of mass [m].
-        search: of the surface about `p_OOcm`, where others need it as well; made if None.
+        search: symmetry search of the surface about `p_OOcm`, if available; made if None.
 
     Returns:
         At least one pose; probabilities sum to one.
@@ -320,8 +320,8 @@ def stable_poses(
 
 
 def resting_pose(down: Array, height: float, p_OOcm: Array) -> Array:
-    """`X_SO` (4, 4) with `down` (3,) of O pointing down by the shortest turn, and the centre of
-    mass `height` [m] above the origin of S."""
+    """`X_SO` (4, 4) that turns `down` (3,) of O downwards by the shortest rotation, with the centre
+    of mass `height` [m] above the origin of S."""
     R_SO = _shortest_rotation(down, np.array([0.0, 0.0, -1.0]))
     return make_pose(R_SO, np.array([0.0, 0.0, height]) - R_SO @ p_OOcm)
 
@@ -360,13 +360,14 @@ def is_symmetric_minimum(
     Several facets can belong to one minimum, of which b is one.
     """
     return any(
-        float(landscape.basin(image) @ b) > np.cos(TILT_MARGIN) for image in symmetries.images(a, b)
+        float(landscape.minimum_below(image) @ b) > np.cos(TILT_MARGIN)
+        for image in symmetries.images(a, b)
     )
 
 
 def _shortest_rotation(a: Array, b: Array) -> Array:
-    """(3, 3) rotation that takes unit vector a to unit vector b by the shortest turn (about x where
-    they are opposite)."""
+    """(3, 3) shortest rotation that takes unit vector a to unit vector b (about x if they are
+    opposite)."""
     v, c = np.cross(a, b), float(a @ b)
     if c < -1.0 + 1e-9:
         return np.diag([1.0, -1.0, -1.0])
@@ -375,20 +376,20 @@ def _shortest_rotation(a: Array, b: Array) -> Array:
 
 
 class PoseClasses:
-    """Tells the pose of an object that has come to rest.
+    """Classifies the orientation of an object that has come to rest as one of its stable poses.
 
-    An orientation belongs to a pose that is near; to a rolling one if it can roll there; to that
-    in whose basin of the landscape it is, unless it is much higher up; and to the pose for which
-    such a one is the same by symmetry.
+    An orientation belongs to a pose if it is near the pose, if it can roll there, or if it is in
+    the basin of the pose and not much higher; and likewise to a pose that is equal by symmetry to
+    one of these.
 
     Args:
-        poses: the known poses.
-        landscape: of the object.
-        search: gives that for the symmetries of the surface about the centre of mass; called if
-            they are needed.
+        poses: the stable poses.
+        landscape: potential landscape of the object.
+        search: returns the search for symmetries of the surface about the centre of mass; called
+            only if needed.
 
     Attributes:
-        downs: (3,) unit vector of O that points down, of each pose.
+        downs: for each pose the unit vector (3,) of O that points down.
     """
 
     def __init__(
@@ -403,19 +404,19 @@ class PoseClasses:
         self._neutral: dict[int, NeutralEquilibrium] = {}
 
     def angle(self, k: int, down: Array) -> float:
-        """From pose k to direction `down` (3,), rolling not counted [rad]."""
+        """Angle from pose k to direction `down` (3,), not counting rolling [rad]."""
         turn = angle_between(self.downs[k], down)
         if self.poses[k].rolls:
             if k not in self._neutral:
-                self._neutral[k] = self.landscape.neutral(self.downs[k])
+                self._neutral[k] = self.landscape.neutral_equilibrium(self.downs[k])
             turn = min(turn, self._neutral[k].angle(down))
         return turn
 
     def find(self, down: Array) -> tuple[int, float] | None:
-        """The pose that an object with `down` (3,) down is in.
+        """Finds the stable pose of an object with `down` (3,) pointing down.
 
         Returns:
-            Number of the pose, and the angle from it up to symmetry [rad]; None if it is in none.
+            Number of the pose, and the angle from it up to symmetry [rad]; None if no pose matches.
         """
         # Radians of tilt from a pose within which an orientation belongs to it.
         near_angle = TILT_MARGIN
@@ -424,7 +425,7 @@ class PoseClasses:
         k = int(np.argmin(angles))
         if angles[k] <= near_angle:
             return k, angles[k]
-        lowest = self.landscape.basin(down)
+        lowest = self.landscape.minimum_below(down)
         level = float(self.landscape.height(lowest))
         height = float(self.landscape.height(down))
         if angle_between(lowest, down) > near_angle and height * np.cos(ROLL_MARGIN) > level:
@@ -445,5 +446,5 @@ class PoseClasses:
 
 
 def angle_between(a: Array, b: Array) -> float:
-    """Of unit vectors (3,), exact for small angles [rad]."""
+    """Angle between unit vectors (3,), accurate for small angles [rad]."""
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

@@ -24,7 +24,7 @@ FIT_SAMPLES = 8000
 
 
 UNION_GROWTH = 1e-6
-"""Metres by which parts grow before their union, which closes slits from rounding."""
+"""Metres by which parts grow before their union, to close slits from rounding."""
 
 
 RAY_DIRECTIONS = np.array(
@@ -34,7 +34,7 @@ RAY_DIRECTIONS = np.array(
 
 
 def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volume: float) -> Fit:
-    """How well convex parts stand for a surface.
+    """Measures the fit of convex parts to a surface.
 
     Args:
         surface: of the object [m].
@@ -52,11 +52,11 @@ def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volu
 
 
 def relative_deviation(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
-    """How coarse convex pieces are: above 1, grasps are judged on another shape than the object's.
+    """Coarseness of convex pieces. Above 1, grasps are evaluated on a shape unlike the object's.
 
     Args:
-        fit: of the pieces; None, of a surface that is not closed, is 0.
-        surface: of the object, or the diagonal of its bounding box [m].
+        fit: fit of the pieces; None (the surface is not closed) gives 0.
+        surface: surface of the object, or the diagonal of its bounding box [m].
     """
     max_volume_ratio = 1.25  # Volume of the pieces over that of the surface.
     max_hausdorff_share = 0.05  # Hausdorff distance over the object's diagonal.
@@ -69,12 +69,13 @@ def relative_deviation(fit: Fit | None, surface: trimesh.Trimesh | float) -> flo
 
 
 def deviation_warning(fit: Fit | None, diagonal: float, threshold: float | None) -> str:
-    """What to say of coarse pieces; empty if they are not.
+    """Warning about coarse convex pieces; empty if they fit well.
 
     Args:
-        fit: of the pieces, if it is known.
+        fit: fit of the pieces, if known.
         diagonal: of the object [m].
-        threshold: that they were cut with; None for pieces that came with the object.
+        threshold: concavity threshold of the decomposition; None for pieces that came with the
+            object.
     """
     if fit is None or relative_deviation(fit, diagonal) <= 1.0:
         return ""
@@ -85,7 +86,7 @@ def deviation_warning(fit: Fit | None, diagonal: float, threshold: float | None)
 
 
 def describe_fit(fit: Fit) -> str:
-    """For people."""
+    """The fit in words."""
     return f"{fit.volume_ratio:.2f} times the volume, up to {1e3 * fit.hausdorff:.1f} mm off"
 
 
@@ -107,32 +108,34 @@ def union_mesh(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     return from_manifold(Manifold.batch_boolean(solids, OpType.Add))
 
 
-def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh, enough: float = np.inf) -> float:
-    """Hausdorff distance of two surfaces [m]: of vertices and dense samples, both ways.
+def surface_distance(
+    one: trimesh.Trimesh, other: trimesh.Trimesh, stop_above: float = np.inf
+) -> float:
+    """Symmetric Hausdorff distance of two surfaces [m], from vertices and dense samples.
 
-    Where it is above `enough`, a distance above that is found sooner.
+    If it exceeds `stop_above`, the search stops at any distance above `stop_above`.
     """
     points = _sample_points(other)[0]
-    largest = _max_distance(points[:: max(1, len(points) // FIT_SAMPLES)], one, enough)
+    largest = _max_distance(points[:: max(1, len(points) // FIT_SAMPLES)], one, stop_above)
     for some, surface in ((points, one), (_sample_points(one)[0], other)):
-        if largest <= enough:
-            largest = max(largest, _max_distance(some, surface, enough))
+        if largest <= stop_above:
+            largest = max(largest, _max_distance(some, surface, stop_above))
     return largest
 
 
 def surface_overlap(one: trimesh.Trimesh, other: trimesh.Trimesh, floor: float) -> float:
-    """How deep the deepest point of one surface is inside the other one, either way [m].
+    """Penetration depth of two surfaces: depth of the deepest point of one inside the other [m].
 
-    That is at most the way by which they would have to be moved apart. Points are taken on the
-    faces and edges of both, 2 mm apart at most.
+    It is a lower bound of the translation that separates them. Points are sampled on the faces and
+    edges of both, at most 2 mm apart.
 
     Args:
         one, other: surfaces in one frame, wound outward. Nothing is inside a surface that is not
             closed.
-        floor: lower depths need not be known [m].
+        floor: smaller depths are not measured [m].
 
     Returns:
-        The depth; 0 where it is not above the floor.
+        The depth; 0 if it is not above the floor.
     """
     return max(_depth_inside(one, other, floor), _depth_inside(other, one, floor))
 
@@ -155,8 +158,8 @@ def _depth_inside(surface: trimesh.Trimesh, solid: trimesh.Trimesh, floor: float
 
 
 def _points_in_box(surface: trimesh.Trimesh, box: Array) -> Array:
-    """Points (N, 3) of a surface within a box (2, 3): vertices, and middles of edges, of triangles
-    that are halved until no edge is longer than 2 mm."""
+    """Points (N, 3) of a surface within a box (2, 3): vertices and edge midpoints of triangles that
+    are halved until no edge is longer than 2 mm."""
     max_spacing = 2e-3  # Metres between neighbouring points of the surface.
     found = [np.asarray(surface.vertices)]
     triangles = np.asarray(surface.triangles)
@@ -177,7 +180,7 @@ def _points_in_box(surface: trimesh.Trimesh, box: Array) -> Array:
 
 
 def _sample_points(surface: trimesh.Trimesh) -> tuple[Array, Array]:
-    """Vertices and samples (N, 3) of a surface, and its normals there."""
+    """Vertices and samples (N, 3) of a surface, and their normals."""
     points, normals = sample_surface(surface, FIT_SAMPLES)
     used = np.unique(surface.faces)
     return (
@@ -189,7 +192,7 @@ def _sample_points(surface: trimesh.Trimesh) -> tuple[Array, Array]:
 def _reachable_from_outside(
     points: Array, normals: Array, parts: Sequence[trimesh.Trimesh]
 ) -> NDArray[np.bool_]:
-    """Whether a ball on the outer side of points (N, 3) of the union is clear of all parts."""
+    """Whether a ball that touches the union from outside at points (N, 3) is clear of all parts."""
     ball_radius = 1e-3  # Metres; a ball enters no gap that reduced parts leave between them.
     centers = points + ball_radius * normals
     clear = np.ones(len(points), dtype=bool)
@@ -203,8 +206,8 @@ def _reachable_from_outside(
         planes = np.asarray(part.face_normals)
         offset = (planes * part.triangles[:, 0]).sum(axis=1)
         own = (points[near] @ planes.T - offset).max(axis=1) <= 10.0 * UNION_GROWTH
-        # above a corner of its own part the ball's centre is lower than its radius over the faces,
-        # but what lies on two parts may be where a gap between them ends
+        # above a corner of its own part the ball's centre is lower than its radius over the
+        # faces, but a point on two parts may be where a gap between them ends
         lenient = own & (owners[near] == 0)
         owners[near] += own
         height = (centers[near] @ planes.T - offset).max(axis=1)
@@ -212,12 +215,13 @@ def _reachable_from_outside(
     return clear
 
 
-def _max_distance(points: Array, surface: trimesh.Trimesh, enough: float = np.inf) -> float:
+def _max_distance(points: Array, surface: trimesh.Trimesh, stop_above: float = np.inf) -> float:
     """Largest distance of points (N, 3) to a surface [m].
 
-    The distance to the nearest sample is an upper bound of that to the surface, that to the
-    triangles of the nearest samples a better one, mostly exact. Points are looked at in the order
-    of these bounds, until they are below what was found, or that is above `enough`.
+    The distance to the nearest sample bounds the distance to the surface from above; the distance
+    to the triangles of the nearest samples is a tighter bound, mostly exact. Points are measured in
+    the order of these bounds, until the bounds are below the largest distance found, or this is
+    above `stop_above`.
     """
     candidates = 12  # Samples around a point whose triangles are measured exactly.
     resolution = 1e-7  # Metres below which distances are equal.
@@ -232,12 +236,12 @@ def _max_distance(points: Array, surface: trimesh.Trimesh, enough: float = np.in
     largest = 0.0
     for start in range(0, len(order), batch_size):
         some = points[order[start : start + batch_size]]
-        if bound[order[start]] <= largest + resolution or largest > enough:
+        if bound[order[start]] <= largest + resolution or largest > stop_above:
             break
         _, near = tree.query(some, k=min(candidates, len(samples)))
         nearer = triangle_distances(some[:, None], triangles[faces[near]]).min(axis=1)
         for i in np.argsort(-nearer, kind="stable"):
-            if nearer[i] <= largest + resolution or largest > enough:
+            if nearer[i] <= largest + resolution or largest > stop_above:
                 break
             possible = np.linalg.norm(middle - some[i], axis=1) - reach <= nearer[i] + 1e-12
             exact = triangle_distances(some[i][None], triangles[possible])
@@ -246,7 +250,7 @@ def _max_distance(points: Array, surface: trimesh.Trimesh, enough: float = np.in
 
 
 def _dense_samples(surface: trimesh.Trimesh) -> tuple[Array, Array]:
-    """Samples (T, 3) over a surface, each triangle's centre among them, and their faces (T,)."""
+    """Samples (T, 3) over a surface, including each triangle's centre, and their faces (T,)."""
     sample_count = 20000  # Points by which the triangles near a point are found.
     points, face = spread_samples(surface, sample_count)
     middle = np.asarray(surface.triangles).mean(axis=1)

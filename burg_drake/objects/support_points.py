@@ -12,7 +12,7 @@ from burg_drake.core import Array
 SUPPORT_HEIGHT_TOLERANCE = 1.5e-4
 """Metres above the lowest corner up to which corners carry the object."""
 MAX_CARRYING_CORNERS = 12
-"""Carrying corners kept: those that reach farthest in this many directions."""
+"""Number of directions; the carrying corners that reach farthest in them are kept."""
 HULL_TOLERANCE = 4e-3
 """Metres that the feet may fall short of the hull where no object comes to rest."""
 ROLLING_TOLERANCE = 3e-4
@@ -29,14 +29,14 @@ def support_feet(
 ) -> NDArray[np.intp]:
     """Chooses the feet of an object among the corners of its hull.
 
-    The choice is the object's own: which way it is turned about the vertical does not enter.
+    The choice does not depend on the rotation about the vertical.
 
     Args:
         corners: (N, 3) corners of the hull that rests on a plane, in O [m].
-        ups: (3,) the plane's normals in O, in poses in which the object rests: it is carried in
-            them as by all its corners.
-        rolling: (3,) those of poses from which it can roll on.
-        carrying: corners that carry it in the first of `ups`; by default the lowest ones.
+        ups: normals (3,) of the plane in O for the poses in which the object rests. In these poses
+            the feet support it as all corners would.
+        rolling: normals (3,) for the poses from which the object can roll.
+        carrying: corners that carry the object in the first of `ups`; by default the lowest ones.
 
     Returns:
         Indices of corners, in their order.
@@ -59,27 +59,27 @@ def support_feet(
 
 
 def carrying_corners(
-    corners: Array, up: Array, center_of_mass: Array, most: float
+    corners: Array, up: Array, center_of_mass: Array, max_height: float
 ) -> NDArray[np.intp]:
     """The lowest corners that carry an object which rests on a plane.
 
-    Corners count from the lowest one on until the centre of mass is over their polygon: what came
-    to rest on something soft may stand on fewer when nothing yields.
+    Corners are added from the lowest upwards until the centre of mass is above their polygon: an
+    object that came to rest on a soft support may touch a rigid one with fewer corners.
 
     Args:
         corners: (N, 3) corners of the hull in O [m].
         up: (3,) normal of the plane in O.
         center_of_mass: (3,) of O [m].
-        most: height over the lowest corner up to which others may count [m].
+        max_height: largest height of a carrying corner above the lowest one [m].
 
     Returns:
-        Indices of corners; where that is no support, of those within
-            `SUPPORT_HEIGHT_TOLERANCE` of the lowest one.
+        Indices of corners; if these do not support the object, those within
+        `SUPPORT_HEIGHT_TOLERANCE` of the lowest one.
     """
-    min_inner_distance = 5e-4  # Metres of the centre of mass from the sides of its support polygon.
+    min_inner_distance = 5e-4  # Metres from the centre of mass to the sides of its support polygon.
     heights = np.round(corners @ up, 9)
     order = np.argsort(heights, kind="stable")
-    order = order[heights[order] <= heights.min() + most]
+    order = order[heights[order] <= heights.min() + max_height]
     directions = _circle_directions(AXIS_DIRECTIONS) @ _perpendicular_vectors(up)
     beyond = np.maximum.accumulate((corners[order] - center_of_mass) @ directions.T, axis=0)
     stands = np.flatnonzero(beyond.min(axis=1) >= min_inner_distance)
@@ -93,9 +93,9 @@ def carrying_corners(
 def _missing_corners(
     corners: Array, directions: Array, tolerance: float, chosen: Sequence[int]
 ) -> list[int]:
-    """Which of the corners (N, 3) are missing among those that are chosen, so that these reach as
-    far as all of them, to a tolerance [m], in directions (D, 3); the worst missed comes first."""
-    reach = np.round(corners @ directions.T, 9)  # what is as far is as far, however it is turned
+    """Corners (N, 3) to add to the chosen ones so that these reach as far as all corners, within a
+    tolerance [m], in directions (D, 3); the farthest missing one comes first."""
+    reach = np.round(corners @ directions.T, 9)  # so that ties do not depend on orientation
     full = reach.max(axis=0)
     now = reach[list(chosen)].max(axis=0, initial=-np.inf)
     added: list[int] = []
@@ -107,16 +107,15 @@ def _missing_corners(
 
 
 def _lowest_corners(corners: Array, up: Array) -> NDArray[np.intp]:
-    """Indices of the corners (N, 3) that carry, where `up` is the plane's normal."""
+    """Indices of the corners (N, 3) that carry the object; `up` is the plane's normal."""
     heights = corners @ up
     return np.flatnonzero(heights <= heights.min() + SUPPORT_HEIGHT_TOLERANCE)
 
 
 def _rolling_directions(corners: Array, up: Array) -> Array:
-    """(D, 3) directions of O about the axis that an object rolls on: the line along which it
-    touches the plane. What touches it at a point, as an egg does, may roll on any axis: about two
-    of them."""
-    max_line_ratio = 0.5  # Width over length of the contact from which it is no line to roll on.
+    """(D, 3) directions of O around the axis of rolling, the line along which an object touches the
+    plane. An object with point contact, such as an egg, can roll about any axis; two are used."""
+    max_line_ratio = 0.5  # Width over length; a wider contact is no line to roll on.
     low = corners[_lowest_corners(corners, up)] @ _perpendicular_vectors(up).T
     low = low - low.mean(axis=0)
     axes = np.linalg.svd(low)[2]
@@ -133,7 +132,7 @@ def _rolling_directions(corners: Array, up: Array) -> Array:
 
 
 def _perpendicular_vectors(up: Array) -> Array:
-    """(2, 3) unit vectors of O across a unit vector."""
+    """(2, 3) unit vectors of O perpendicular to a unit vector."""
     first = np.cross(up, np.eye(3)[np.argmin(np.abs(np.round(up, 6)))])
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(up, first)])

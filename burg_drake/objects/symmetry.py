@@ -27,9 +27,9 @@ class Symmetries:
     """Rotations about a point that take an object onto itself.
 
     Attributes:
-        rotations: (N, 3, 3) in O, the identity first; of a body of revolution one of each kind.
-        axis: (3,) unit vector about which any turn does; None if there is none.
-        sphere: any rotation does.
+        rotations: (N, 3, 3) in O, the identity first; for a body of revolution one of each kind.
+        axis: (3,) unit vector; any rotation about it is a symmetry. None if there is no such axis.
+        sphere: any rotation is a symmetry.
     """
 
     rotations: Array
@@ -37,11 +37,12 @@ class Symmetries:
     sphere: bool = False
 
     def images(self, direction: Array, towards: Array) -> Array:
-        """Where the symmetries take a direction.
+        """Images of a direction under the symmetries.
 
         Args:
             direction: (3,) unit vector of O.
-            towards: (3,) unit vector; of all turns about `axis` the one that comes nearest counts.
+            towards: (3,) unit vector; of all rotations about `axis`, the one whose image is nearest
+                to it is used.
 
         Returns:
             (M, 3) unit vectors.
@@ -59,7 +60,7 @@ class Symmetries:
         radius = np.sqrt(np.maximum(1.0 - along**2, 0.0))
         return along[:, None] * self.axis + radius[:, None] * across / length
 
-    def same(self, a: Array, b: Array, max_angle: float) -> bool:
+    def maps_close(self, a: Array, b: Array, max_angle: float) -> bool:
         """Whether a symmetry takes direction a (3,) to within `max_angle` [rad] of b (3,)."""
         return bool((self.images(a, b) @ b).max() >= np.cos(max_angle))
 
@@ -69,13 +70,13 @@ class SymmetrySearch:
 
     Args:
         surface: in O [m].
-        p_OC: (3,) point that all turns are about, such as the centre of mass [m].
-        tolerance: largest deviation that counts as the same [m]; if None 0.2 mm, or 0.5 % of the
-            diagonal where that is less.
+        p_OC: (3,) fixed point of all rotations, such as the centre of mass [m].
+        tolerance: largest deviation that counts as equal [m]; if None, 0.2 mm, or 0.5 % of the
+            diagonal if that is less.
         covered: share of the surface that must be within the tolerance.
 
     Attributes:
-        tolerance: largest deviation that counts as the same [m].
+        tolerance: largest deviation that counts as equal [m].
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class SymmetrySearch:
         order = _evenly_spread_order(SURFACE_POINTS)[:: SURFACE_POINTS // PROBE_POINTS]
         normals = _triangle_normals(self._triangles)
         self._probe, self._probe_normals = self._sample[order], normals[face[order]]
-        # centres of triangles stand for those that are too small to have a point
+        # triangles too small to have a sample are represented by their centres
         self._face = np.concatenate([face, np.arange(len(self._triangles))])
         self._points = np.vstack([self._sample, self._triangles.mean(axis=1)])
         self._normals = normals[self._face]
@@ -105,8 +106,7 @@ class SymmetrySearch:
         self._tree = cKDTree(np.hstack([self._points, weight * self._normals]))
 
     def find(self) -> Symmetries:
-        """All symmetries of the surface, looked for once. The order depends on nothing but the
-        surface."""
+        """All symmetries of the surface, computed once. Their order depends only on the surface."""
         return self._symmetries
 
     @cached_property
@@ -140,7 +140,8 @@ class SymmetrySearch:
         return Symmetries(np.stack(found), axis)
 
     def turns_about(self, axis: Array) -> bool:
-        """Whether the surface is one of revolution about an axis (3,) through the point."""
+        """Whether the surface is a surface of revolution about an axis (3,) through the fixed
+        point."""
         # Shares of a full turn; no multiples of one another, so prisms fail.
         turn_shares = (0.0382, 0.1459, 0.2361, 0.3090, 0.4271)
         return all(
@@ -149,17 +150,17 @@ class SymmetrySearch:
         )
 
     def fits(self, R: Array) -> bool:
-        """Whether a rotation (3, 3) lays the surface onto itself."""
+        """Whether a rotation (3, 3) maps the surface onto itself."""
         few = self._share_within_tolerance(R, COARSE_POINTS)
         if not few > self._covered - 0.1:
             return False
         return self._share_within_tolerance(R, PROBE_POINTS) >= self._covered
 
     def _farthest_directions(self) -> list[Array]:
-        """Unit vectors to the farthest corners, farthest first, none near another.
+        """Unit vectors to the farthest corners, farthest first, without near-duplicates.
 
-        The farthest point of a surface is a corner, and where a turn takes it the surface has a
-        corner that is as far, within the tolerance.
+        The farthest point of a surface is a corner. A symmetry takes it to a corner at the same
+        distance, within the tolerance.
         """
         same_angle = np.deg2rad(8.0)  # Radians below which two directions are one.
         max_directions = 12  # Directions to the most distant corners that are tried.
@@ -187,7 +188,7 @@ class SymmetrySearch:
         return float(near.mean())
 
     def _candidate_rotations(self, a: Array, b: Array) -> Iterator[Array]:
-        """Rotations (3, 3) that take direction a to b, those that fit best by areas first."""
+        """Rotations (3, 3) that take direction a to b, those whose area profiles fit best first."""
         max_angles = 8  # Angles about an axis that are refined.
         profile_a, profile_b = self._area_profile(a), self._area_profile(b)
         shape_a, shape_b = profile_a.sum(axis=0), profile_b.sum(axis=0)
@@ -210,7 +211,7 @@ class SymmetrySearch:
                 return
 
     def _area_profile(self, down: Array) -> Array:
-        """(SECTORS, bins) area by azimuth, height and radius, about the vertical."""
+        """(SECTORS, bins) area by azimuth, height and radius, about the direction `down`."""
         p = self._sample @ rotation_from_down(down).T
         azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * FIRST_SEARCH_ANGLES
         radius = np.hypot(p[:, 0], p[:, 1]) / self.diagonal
@@ -228,8 +229,8 @@ class SymmetrySearch:
         )
 
     def _refine_rotation(self, R: Array) -> Array | None:
-        """The rotation near R (3, 3) that lays the surface closest onto itself; None if that is
-        not near.
+        """The rotation near R (3, 3) that maps the surface best onto itself; None if it does not
+        fit.
 
         Iterated closest points, with distances along the normals.
         """
@@ -242,7 +243,7 @@ class SymmetrySearch:
                 facing = self._normals[index]
                 apart = self._points[index] - turned
                 slope = np.cross(turned, facing)
-                # what slides along itself, as a cylinder does about its axis, is not turned
+                # surfaces that slide along themselves, as a cylinder about its axis, are not turned
                 step = np.linalg.lstsq(slope, (apart * facing).sum(axis=1), rcond=1e-3)[0]
                 R = Rotation.from_rotvec(step).as_matrix() @ R
                 if float(np.linalg.norm(step)) < 1e-5:
@@ -252,12 +253,12 @@ class SymmetrySearch:
         return R
 
     def _nearest(self, points: Array, normals: Array, count: int) -> NDArray[np.int64]:
-        """(N,) or (N, count) numbers of the surface's points that are nearest."""
+        """(N,) or (N, count) indices of the nearest points of the surface."""
         weight = NORMAL_WEIGHT * self.diagonal
         return np.asarray(self._tree.query(np.hstack([points, weight * normals]), k=count)[1])
 
     def _close_group(self, found: Sequence[Array]) -> list[Array]:
-        """The rotations with their products, which are symmetries as well."""
+        """The rotations and their products, which are symmetries as well."""
         max_rotations = 120  # Rotations kept; polyhedra have at most 60.
         group = list(found)
         for a in group:  # grows meanwhile
@@ -277,7 +278,7 @@ class SymmetrySearch:
 
 
 def _second_moments(triangles: Array) -> Array:
-    """(3, 3) mean of p p^T over triangles (F, 3, 3), by area."""
+    """(3, 3) area-weighted mean of p p^T over triangles (F, 3, 3)."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1)
     total = triangles.sum(axis=1)
@@ -288,21 +289,21 @@ def _second_moments(triangles: Array) -> Array:
 
 
 def _is_known_rotation(R: Array, found: Sequence[Array]) -> bool:
-    """Whether a rotation is near one of those found."""
+    """Whether a rotation is near one of the rotations in `found`."""
     same_angle = np.deg2rad(3.0)  # Radians below which two rotations are one.
     traces = np.einsum("kij,ij->k", np.stack(found), R)
     return bool(traces.max() >= 1.0 + 2.0 * np.cos(same_angle))
 
 
 def sample_surface(surface: trimesh.Trimesh, count: int) -> tuple[Array, Array]:
-    """Points (count, 3) evenly spread over a surface, and its normals there; no randomness."""
+    """Points (count, 3) spread evenly over a surface, and their normals; deterministic."""
     points, face = spread_samples(surface, count)
     order = _evenly_spread_order(count)
     return points[order], _triangle_normals(np.asarray(surface.triangles))[face][order]
 
 
 def _evenly_spread_order(count: int) -> NDArray[np.int64]:
-    """(count,) a permutation in which every run of numbers is spread over all of them."""
+    """(count,) permutation in which every run is spread evenly over the whole range."""
     return np.argsort((np.arange(count) * 0.6180339887498949) % 1.0, kind="stable")
 
 
@@ -314,8 +315,8 @@ def _triangle_normals(triangles: Array) -> Array:
 
 
 def spread_samples(surface: trimesh.Trimesh, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Points (count, 3) evenly spread over a surface, in the order of its triangles, and the number
-    (count,) of the triangle of each; no randomness.
+    """Points (count, 3) spread evenly over a surface, in the order of its triangles, and their
+    triangle indices (count,); deterministic.
 
     Systematic sampling by area, with the points of each triangle from the R2 sequence.
     """

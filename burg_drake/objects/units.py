@@ -37,7 +37,7 @@ def unit_scale(name: str) -> float:
 
 
 def format_length(metres: float) -> str:
-    """A length as messages write it: in millimetres, and in metres above one."""
+    """A length as text for messages: in millimetres, or in metres above one metre."""
     return f"{metres:.4g} m" if metres > 1.0 else f"{1000.0 * metres:.4g} mm"
 
 
@@ -65,8 +65,8 @@ def check_extent(extent: float, name: str, scale: float) -> None:
 
 
 def _fitting_units(extent: float) -> dict[str, float]:
-    """Units with their scales that would make something usual of a mesh with this largest extent in
-    its own unit, or else something possible."""
+    """Units and scales with which a mesh of this largest extent, in its own unit, gets a usual
+    size, or else a possible one."""
     for low, high in (USUAL_EXTENTS, (MIN_EXTENT, MAX_EXTENT)):
         if fits := {u: s for u, s in UNITS.items() if low <= s * extent <= high}:
             return fits
@@ -74,7 +74,7 @@ def _fitting_units(extent: float) -> dict[str, float]:
 
 
 def _unit_hint(extent: float, units: Mapping[str, float]) -> str:
-    """What to try with a mesh with this largest extent in its own unit."""
+    """Advice on the unit of a mesh with this largest extent in its own unit."""
     if not units:
         scale = 10.0 ** (-1.0 - np.ceil(np.log10(extent)))  # 10 to 100 mm
         return f"try scale={scale:g}"

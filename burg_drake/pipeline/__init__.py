@@ -1,7 +1,7 @@
 """Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked.
 
-Read `object_source` first, then `library_build` and `object_build`; `library_recipe` is what is
-asked for.
+Read `object_source` first, then `library_build` and `object_build`; `library_recipe` reads the
+recipe, which lists the objects to build.
 """
 
 import lazy_loader

@@ -44,14 +44,14 @@ BUILD_VERSION = 3
 
 @dataclass(frozen=True)
 class StageKeys:
-    """Content hashes of what each stage is made from.
+    """Content hashes of the inputs of each build stage.
 
     Attributes:
         file: SHA-256 of the mesh file's bytes; of the arrays for a mesh in memory.
-        mesh: hash of the mesh with all that its file refers to.
+        mesh: hash of the mesh and of all files that its file refers to.
         visual: the visual mesh.
-        pieces: the surface, its convex pieces, and how well they fit.
-        rest: what touches, the volume, the centre of mass, and the stable poses.
+        pieces: the surface, its convex pieces, and their fit.
+        rest: the contact geometry, the volume, the centre of mass, and the stable poses.
         build: everything, `ObjectEntry.build`.
     """
 
@@ -64,7 +64,8 @@ class StageKeys:
 
 
 def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
-    """Keys of all stages; reads the mesh file's bytes, but builds nothing.
+    """Computes the keys of all stages from the source and the bytes of its mesh file, without
+    building.
 
     Args:
         source: what to build.
@@ -72,7 +73,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
 
     Raises:
         MeshError: the mesh file cannot be read.
-        InvalidInputError: a number of the source cannot be.
+        InvalidInputError: a number of the source is impossible.
     """
     # Raise it when only stable poses change. It is not in `build`, which seeds grasp sampling.
     poses_version = 2
@@ -83,7 +84,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     if pieces_given is not None:
         given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in pieces_given]
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
-    # Another version of a package may make something else of the same mesh.
+    # Other versions of a package may give other results for the same mesh.
     makers = (package_version("trimesh", ""), package_version("manifold3d", ""))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)
     visual = content_hash(BUILD_VERSION, "opaque visual", *surface, _as_floats(source.rgba))
@@ -125,20 +126,20 @@ def _as_floats(numbers: tuple[float | None, ...] | None) -> list[float | None] |
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectGeometry:
-    """What a build found out about an object's shape.
+    """Results of a build about an object's shape.
 
     Attributes:
-        repairs: made to the surface.
-        surface: file of the surface where it is not the visual one; else empty.
+        repairs: repairs of the surface.
+        surface: file of the surface if it differs from the visual mesh; else empty.
         closed: whether the surface is watertight.
-        wall: thickness of the wall that an open surface became [m]; None for others.
+        wall: thickness of the wall that an open surface became [m]; None for other surfaces.
         lower, upper: bounds [m].
         volume, p_OOcm, G_OOcm: see `Solid`; the matrix by rows.
         pieces: file names in the object's folder.
-        threshold: that the pieces were cut with; None for pieces that came with the object.
-        cut: what was done to get them beyond what was asked for; or empty.
-        fit: how well the pieces stand for the surface.
-        contact: what touches; file names are those in the object's folder.
+        threshold: threshold of the decomposition; None for pieces that came with the object.
+        cut: note on steps of the decomposition that were not asked for; or empty.
+        fit: fit of the pieces to the surface.
+        contact: contact geometry; file names are relative to the object's folder.
         stable_poses: most probable first.
         notes: remarks on the poses.
     """
@@ -162,7 +163,7 @@ class ObjectGeometry:
 
     @property
     def solid(self) -> Solid:
-        """What the mass properties follow from."""
+        """Solid from which the mass properties are computed."""
         return Solid(self.volume, np.array(self.p_OOcm), np.reshape(self.G_OOcm, (3, 3)))
 
 
@@ -171,8 +172,8 @@ class BuildRecord:
     """Contents of `build.json`.
 
     Attributes:
-        keys: of the last build.
-        geometry: what it found out.
+        keys: stage keys of the last build.
+        geometry: results of the last build.
         files: SHA-256 of each file in the object's folder, by name.
         entry: hash of the entry in `library.yaml`, see `entry_hash`.
     """
@@ -190,7 +191,7 @@ def write_record(home: Path, record: BuildRecord) -> None:
 
 
 def read_record(home: Path) -> BuildRecord | None:
-    """The record in an object's folder, or None where this release can read none."""
+    """Reads the record of an object's folder; None if there is none that this release can read."""
     try:
         return load_document(home / "build.json", BuildRecord)
     except DocumentError:
@@ -198,7 +199,7 @@ def read_record(home: Path) -> BuildRecord | None:
 
 
 def is_as_built(home: Path, keys: StageKeys, entry: ObjectEntry) -> bool:
-    """Whether a folder is what a build with these keys left, and the entry what it listed."""
+    """Whether a folder and the library entry are unchanged since a build with these keys."""
     data = _read_raw_record(home)
     if data is None or data.get("version") != BUILD_VERSION:
         return False
@@ -210,24 +211,24 @@ def is_as_built(home: Path, keys: StageKeys, entry: ObjectEntry) -> bool:
 
 
 def files_are_intact(home: Path, record: BuildRecord, names: Iterable[str]) -> bool:
-    """Whether files of an object's folder are those that were built."""
+    """Whether files of an object's folder are unchanged since the build."""
     found = file_hashes(home)
     return all(name in found and found[name] == record.files.get(name) for name in names)
 
 
 def entry_hash(entry: ObjectEntry) -> str:
-    """SHA-256 of an entry; the same before and after it was written to a document."""
+    """SHA-256 of an entry; the same before and after writing it to a document."""
     return hashlib.sha256(json.dumps(plain_data(entry)).encode()).hexdigest()
 
 
 def is_object_folder(home: Path) -> bool:
-    """Whether a folder was made by a build, of this release or of another one."""
+    """Whether a folder was made by a build of any release."""
     data = _read_raw_record(home)
     return data is not None and "keys" in data
 
 
 def touched_by_pieces(home: Path) -> bool:
-    """Whether pads touch the convex pieces of what a build, of any release, left in a folder."""
+    """Whether pads touch the convex pieces of the object in a folder, built by any release."""
     data = _read_raw_record(home) or {}
     geometry = data.get("geometry")
     if not isinstance(geometry, dict):
@@ -237,7 +238,7 @@ def touched_by_pieces(home: Path) -> bool:
 
 
 def file_hashes(home: Path) -> dict[str, str]:
-    """SHA-256 of all files of an object's folder but the record, by name."""
+    """SHA-256 by name of all files of an object's folder except the record."""
     files = sorted(p for p in home.rglob("*") if p.is_file() and p.name != "build.json")
     return {
         p.relative_to(home).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files

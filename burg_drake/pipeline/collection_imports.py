@@ -33,24 +33,24 @@ def burg_sources(
     friction: float | None = None,
     skip: Collection[str] = (),
 ) -> list[ObjectSource]:
-    """What to build from an object library of BURG-Toolkit.
+    """Makes object sources from an object library of BURG-Toolkit.
 
-    Mesh, scale, mass and friction are taken over. What has no mass stays fixed, as it is there.
-    Convex pieces, URDF, thumbnails and stable poses are made anew; `compare_poses` tells how the
-    listed poses agree with the new ones.
+    Mesh, scale, mass and friction are copied. Objects without mass stay fixed. Convex pieces, URDF,
+    thumbnails and stable poses are not copied; `compare_poses` compares the listed stable poses
+    with the new ones.
 
     Args:
         library: from `read_burg_library`.
-        masses: by identifier or object name [kg]; they go before the document's.
+        masses: by identifier or object name [kg]; they replace the document's.
         density: for objects that have no mass, which are fixed otherwise [kg/m^3].
-        friction: coefficient of objects that have none.
+        friction: coefficient for objects without one.
         skip: identifiers or object names to leave out.
 
     Returns:
         Sources in the document's order; an object's name is `object_name(identifier)`.
 
     Raises:
-        UnknownNameError: a mass or `skip` names no object.
+        UnknownNameError: a key of `masses` or a name in `skip` is not an object.
         InvalidInputError: two objects get the same name, or a number is impossible.
     """
     names = burg_names(library)
@@ -112,20 +112,20 @@ def ycb_sources(
     density: float | None = None,
     friction: float | None = None,
 ) -> list[ObjectSource]:
-    """What to build from meshes of the YCB set.
+    """Makes object sources from meshes of the YCB set.
 
     Args:
         objects: from `find_ycb`.
-        masses: by YCB name or object name [kg]; they go before the published ones.
-        density: for objects that have no mass [kg/m^3]; the pipeline's default if None.
-        friction: coefficient of all.
+        masses: by YCB name or object name [kg]; they replace the published ones.
+        density: for objects without a mass [kg/m^3]; the pipeline's default if None.
+        friction: coefficient of all objects.
 
     Returns:
         Sources in the given order; an object's name is `object_name(name)`, which is the YCB name
-        but for `065-a_cups` and its like.
+        except for names such as `065-a_cups`.
 
     Raises:
-        UnknownNameError: a mass names no object.
+        UnknownNameError: a key of `masses` is not an object.
         InvalidInputError: a number is impossible.
     """
     objects = list(objects)
@@ -148,13 +148,13 @@ def ycb_sources(
 
 @dataclass(frozen=True)
 class PoseComparison:
-    """How recorded stable poses agree with those of a library.
+    """Agreement of recorded stable poses with those of a library.
 
     Attributes:
         listed: number of recorded poses.
-        distinct: number of them without near-duplicates, up to the object's symmetry.
+        distinct: number of recorded poses without near-duplicates, up to the object's symmetry.
         here: number of the library's poses.
-        unknown: indices of recorded poses that are none of the library's.
+        unknown: indices of recorded poses that the library does not have.
     """
 
     listed: int
@@ -163,7 +163,7 @@ class PoseComparison:
     unknown: tuple[int, ...]
 
     def sentence(self, file: str) -> str:
-        """For people."""
+        """The comparison in words."""
         listed = f"{file} lists {count_with_noun(self.listed, 'stable pose')}"
         if self.distinct < self.listed:
             listed += f" ({self.distinct} different)"
@@ -175,15 +175,15 @@ class PoseComparison:
 
 
 def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -> PoseComparison:
-    """Compares stable poses from elsewhere with those of a built object.
+    """Compares recorded stable poses with those of a built object.
 
-    Only the direction down in the object matters: neither a turn about the vertical nor the place
-    or scale do.
+    Only the direction of gravity in the object counts, not rotation about the vertical, position or
+    scale.
 
     Args:
         recorded: `X_SO` of each pose, such as those of `BurgObject.stable_poses`.
-        library: has the object.
-        name: of the object in `library`.
+        library: library with the object.
+        name: name of the object in `library`.
     """
     entry = library.entry(name)
     test = _PoseMatcher(library.surface(name), np.array(entry.mass_properties.center_of_mass))
@@ -203,9 +203,9 @@ def _gravity_direction(X_SO: Pose) -> Array:
 
 
 class _PoseMatcher:
-    """Whether directions down are near each other, or one pose by the object's symmetry.
+    """Matches gravity directions in the object, up to its symmetry.
 
-    As for `objects.resting_poses`, the centre of mass has to be at one height then.
+    As in `objects.resting_poses`, symmetric poses must have the same height of the centre of mass.
     """
 
     def __init__(self, surface: trimesh.Trimesh, p_OOcm: Array) -> None:
@@ -222,7 +222,7 @@ class _PoseMatcher:
         if float(a @ b) > np.cos(max_angle):
             return True
         rise = abs(float((self.points @ a).max() - (self.points @ b).max()))
-        return rise <= self.tolerance and self.symmetries.same(a, b, max_angle)
+        return rise <= self.tolerance and self.symmetries.maps_close(a, b, max_angle)
 
 
 def _by_identifier(
@@ -252,7 +252,7 @@ class ImportedScene:
 
     Attributes:
         document: the scene.
-        notes: what became other than it was, one sentence each.
+        notes: differences from the original scene, one sentence each.
     """
 
     document: SceneDocument
@@ -262,20 +262,20 @@ class ImportedScene:
 def import_burg_scene(
     scene: BurgScene, library: ObjectLibrary, name: str = "", reference: str = ""
 ) -> ImportedScene:
-    """The scene document of a scene of BURG-Toolkit.
+    """Converts a scene of BURG-Toolkit to a scene document.
 
-    Objects are those that `burg_sources` makes of the scene's object
-    library, by `object_name(identifier)`. What has no mass there is background, whichever list it
-    is in. Instances have no names in BURG-Toolkit; they get those of their objects, the second one
-    of an object `NAME_2` and so on. One that would be called as something of every station, such as
-    `table`, begins with `NAME_1`. The board is the scene's printout with its markers; without one
-    it has the size of the ground area and the markers of this project.
+    Objects are those that `burg_sources` makes of the scene's object library, by
+    `object_name(identifier)`. Objects without mass in the library become background, in whichever
+    list the scene has them. Instances have no names in BURG-Toolkit; they get the names of their
+    objects, the second instance of an object `NAME_2` and so on. Names that every station uses,
+    such as `table`, begin with `NAME_1`. The board is the scene's printout with its markers;
+    without one it has the size of the ground area and the markers of this project.
 
     Args:
         scene: from `read_burg_scene`.
-        library: has the objects.
-        name: of the document; that of the scene's file if empty.
-        reference: how the document refers to the library; its folder if empty.
+        library: library with the objects.
+        name: name of the document; that of the scene's file if empty.
+        reference: reference to the library in the document; the library's folder if empty.
 
     Raises:
         UnknownNameError: the library lacks objects; the message names file and line of each.
@@ -331,8 +331,8 @@ def _import_board(scene: BurgScene) -> Board:
 
 
 def _make_instances(scene: BurgScene, library: ObjectLibrary) -> list[Instance]:
-    """Instances of the scene's objects, then of its fixed ones; objects that the library lacks are
-    an error."""
+    """Makes the instances of the scene's free and then of its fixed objects. Objects that the
+    library lacks are an error."""
     items = [(item, object_name(item.object_type)) for item in (*scene.objects, *scene.bg_objects)]
     lacking = [
         f"{scene.path}:{item.line}: object {name!r} ({item.object_type!r}) is not in library"

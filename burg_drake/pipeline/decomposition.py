@@ -23,7 +23,7 @@ from burg_drake.objects import (
 from burg_drake.pipeline.object_source import ObjectSource, piece_meshes
 
 FINER_THRESHOLDS = (0.02, 0.01)
-"""Decomposition thresholds tried where the pieces at the default one are coarse."""
+"""Decomposition thresholds to try if the pieces at the default one are coarse."""
 
 MAX_PIECES = 96
 """Finer decompositions with more pieces are not used: contact gets slow."""
@@ -34,10 +34,10 @@ class ObjectPieces:
     """The convex pieces of an object.
 
     Attributes:
-        pieces: rounded as they are written.
-        fit: how well they stand for the surface; None if it is not closed.
-        threshold: that they were cut with; None for pieces that came with the object.
-        note: on what was done beyond what was asked for; or empty.
+        pieces: convex pieces, rounded as in the files.
+        fit: fit of the pieces to the surface; None if the surface is not closed.
+        threshold: threshold of the decomposition; None for pieces that came with the object.
+        note: note on steps of the decomposition that were not asked for; or empty.
         seconds: CPU time spent in child processes [s].
     """
 
@@ -49,13 +49,13 @@ class ObjectPieces:
 
 
 def cut_into_pieces(source: ObjectSource, mesh: SurfaceMesh) -> ObjectPieces:
-    """The convex pieces of a mesh.
+    """Makes the convex pieces of a mesh.
 
-    Where they are coarse and no threshold was asked for, finer ones are tried, each within the
-    time that one cut may take, and the best is kept.
+    If the pieces are coarse and the source sets no threshold, finer thresholds are tried, each
+    within the time limit of one decomposition, and the best result is kept.
 
     Raises:
-        MeshError: it cannot be cut, or given pieces are not convex.
+        MeshError: the decomposition fails, or given pieces are not convex.
     """
     given = piece_meshes(source)
     if given is not None:
@@ -69,7 +69,7 @@ def cut_into_pieces(source: ObjectSource, mesh: SurfaceMesh) -> ObjectPieces:
         if relative_deviation(best.fit, mesh.surface) <= 1.0:
             break
         tried += 1
-        with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
+        with contextlib.suppress(MeshError):  # on timeout the previous result is kept
             finer = _cut_at_threshold(mesh, replace(parameters, threshold=threshold))
             seconds += finer.seconds
             deviations = [relative_deviation(made.fit, mesh.surface) for made in (finer, best)]
@@ -92,7 +92,7 @@ def _cut_at_threshold(mesh: SurfaceMesh, parameters: Decomposition) -> ObjectPie
 
 
 def _measure_fit(pieces: ConvexPieces, mesh: SurfaceMesh, threshold: float | None) -> ObjectPieces:
-    # To 0.1 um: files hold exactly the vertices of the computation.
+    # To 0.1 um, so that files hold exactly the vertices of the computation.
     rounded = tuple(
         trimesh.Trimesh(np.round(p.vertices, 7) + 0.0, p.faces, process=False)
         for p in pieces.meshes

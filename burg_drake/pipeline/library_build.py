@@ -39,7 +39,7 @@ from burg_drake.pipeline.object_source import OBJECT_NAME_PATTERN, ObjectSource,
 
 @contextmanager
 def open_for_build(out: str | Path) -> Iterator[Path]:
-    """Makes and locks the folder of a library; a new one that gets no library is removed again.
+    """Makes and locks the folder of a library; a new folder is removed again if it gets no library.
 
     Yields:
         The absolute path of the folder.
@@ -52,7 +52,7 @@ def open_for_build(out: str | Path) -> Iterator[Path]:
     try:
         ensure_writable_folder(root)
         with _lock_library(root):
-            for abandoned in root.glob(".building-[0-9]*"):  # by builds that were killed
+            for abandoned in root.glob(".building-[0-9]*"):  # left by killed builds
                 shutil.rmtree(abandoned, ignore_errors=True)
             yield root
     finally:
@@ -63,12 +63,12 @@ def open_for_build(out: str | Path) -> Iterator[Path]:
 
 
 def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection[str]) -> None:
-    """Checks that nothing is replaced but objects of this library.
+    """Checks that a build replaces only objects of this library.
 
     Args:
-        sources: what is to be built.
+        sources: objects to build.
         root: the library's folder.
-        known: names of the objects in it.
+        known: names of the library's objects.
 
     Raises:
         InvalidInputError: the folder of an object holds something else, or a source mesh.
@@ -94,7 +94,7 @@ def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection
 
 
 def _folder_identity(folder: Path) -> tuple[int, int]:
-    """The same for all paths to a folder, through links and on disks that ignore case."""
+    """Identity of a folder, equal for all paths to it, with links and on case-insensitive disks."""
     status = folder.stat()
     return status.st_dev, status.st_ino
 
@@ -113,7 +113,7 @@ def _lock_library(root: Path) -> Iterator[None]:
             current = False
         except OSError as error:
             raise missing_locks_error(root, error) from error
-        if not current:  # held, or its holder removed it just now
+        if not current:  # locked by another build, or just removed by one
             raise InvalidInputError(
                 f"{root} is being written by another build; wait for it, or choose another"
                 " output folder"
@@ -121,7 +121,9 @@ def _lock_library(root: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            path.unlink(missing_ok=True)  # while it is locked: who opens it later makes a new one
+            path.unlink(
+                missing_ok=True
+            )  # while it is locked, so that the next build makes a new one
     finally:
         os.close(file)
 
@@ -134,7 +136,7 @@ class BuildTask:
         source: what to build.
         keys: its stage keys.
         root: the library's folder.
-        folder: where to build; made when the work begins.
+        folder: folder to build in; made when the work begins.
         confirm: simulate the stable poses.
     """
 
@@ -159,7 +161,7 @@ def run_build_task(item: BuildTask) -> BuiltObject:
 
     Raises:
         SimulationError: Drake ended by a failed condition.
-        Exception: a broken mesh is one failure, whatever it breaks.
+        Exception: any other error that a broken mesh causes.
     """
     item.folder.mkdir()
     try:
@@ -181,13 +183,13 @@ class BuildReport:
     """What a build did.
 
     Attributes:
-        library: the library as it is now, with the objects of earlier builds.
+        library: the updated library, with the objects of earlier builds.
         built: names of the objects that were built or updated.
         cached: names of the objects that were up to date.
-        failed: one line for each object that could not be built; of an unexpected error its kind
-            and its whole text.
-        notes: remarks by object, such as a mass that came from a default density.
-        seconds: CPU time by object and stage, of what was really built [s].
+        failed: one line for each object that could not be built; for an unexpected error, its type
+            and full text.
+        notes: remarks by object, such as a mass computed from the default density.
+        seconds: CPU time by object and stage, without cached stages [s].
     """
 
     library: ObjectLibrary
@@ -219,21 +221,21 @@ def build_library(
     Args:
         sources: objects; a path stands for `ObjectSource.from_file(path)`.
         out: the library's folder; objects in it that are not among the sources stay.
-        name: the library's name; by default what it has, or else the folder's name.
-        confirm: simulate the stable poses, and keep those that stand the test; otherwise, and for
-            what is fixed, the quasi-static ones are taken as they are.
-        workers: number of objects to work on at a time, each in a process of its own.
+        name: the library's name; by default its present name, or else the folder's name.
+        confirm: simulate the stable poses and keep those that pass the test; otherwise, and for
+            fixed objects, all quasi-static poses are kept.
+        workers: number of objects to build at a time, each in its own process.
         progress: called after each object.
         on_failure: called at once for each object that cannot be built.
 
     Returns:
-        The library and what was done; an object that cannot be built is in `failed`, and its
-        earlier version, if there was one, stays. If none of a new library can, no files are left.
+        The library and the report. An object that cannot be built is in `failed`, and its earlier
+        version, if any, stays. If no object of a new library can be built, no files remain.
 
     Raises:
         InvalidInputError: `out` cannot be written to, another build is writing it, two sources have
-            the same name, or an object's folder exists that is no object of this library or holds
-            a source mesh. Nothing is changed then.
+            the same name, or the folder of an object exists already, but belongs to no object of
+            this library or holds a source mesh. Nothing is changed then.
         DocumentError: `out` holds a `library.yaml` that cannot be read.
     """
     named = [s if isinstance(s, ObjectSource) else ObjectSource.from_file(s) for s in sources]
@@ -258,12 +260,12 @@ def _build_objects(
     root = tally.library.root
     todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
-        checked = confirm and not source.fixed  # what is fixed need not be simulated
+        checked = confirm and not source.fixed  # fixed objects need no simulation
         entry = tally.entries.get(source.name)
         try:
             keys = stage_keys(source, checked)
             current = entry is not None and is_current(entry, keys, source, root, checked)
-        except Exception as error:  # a broken mesh is one failure, whatever it breaks
+        except Exception as error:  # a broken mesh may cause any error
             tally.fail(source.name, error)
             continue
         if current:
@@ -277,7 +279,7 @@ def _build_objects(
             for s, keys in _longest_first(todo)
         ]
         try:
-            # Sizes are checked first: a wrong unit is told before anything takes long.
+            # Sizes are checked first, to report a wrong unit before anything takes long.
             for item, outcome in map_unordered(run_build_task, work, workers, check_task_size):
                 if isinstance(outcome, BuiltObject):
                     tally.publish(item.source, outcome, Path(scratch))
@@ -290,7 +292,7 @@ def _build_objects(
 def _longest_first(
     todo: list[tuple[ObjectSource, StageKeys]],
 ) -> list[tuple[ObjectSource, StageKeys]]:
-    """Objects whose pieces are not given first, larger files before smaller ones, so that workers
+    """Sorts objects without given pieces first, larger files before smaller ones, so that workers
     finish together."""
 
     def cost(item: tuple[ObjectSource, StageKeys]) -> tuple[bool, int]:
@@ -302,7 +304,7 @@ def _longest_first(
 
 
 class _BuildProgress:
-    """The library while it grows, and the report."""
+    """Progress of a build: the growing library, and the report."""
 
     def __init__(
         self,

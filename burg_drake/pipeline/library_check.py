@@ -35,7 +35,7 @@ FoundIssues = Iterator[tuple[LibraryIssueKind, str]]
 
 @dataclass(frozen=True, kw_only=True)
 class LibraryIssue:
-    """Something about a library that its user should know.
+    """An error or warning about a library.
 
     Attributes:
         object: name of the object; empty where it is about the library's folder.
@@ -50,18 +50,18 @@ class LibraryIssue:
 
     @property
     def is_error(self) -> bool:
-        """The object cannot be trusted as it is."""
+        """Whether the object cannot be used as it is."""
         return self.kind in ("missing", "changed", "stale", "broken")
 
 
 def check_library(library: ObjectLibrary) -> tuple[LibraryIssue, ...]:
-    """Checks all objects of a library; nothing is changed.
+    """Checks all objects of a library without changing anything.
 
     Args:
         library: the library.
 
     Returns:
-        What was found, object by object, errors first; nothing if all is well.
+        Issues by object, errors first; empty if there are none.
     """
     issues: list[LibraryIssue] = []
     for name, entry in library.objects.items():
@@ -101,7 +101,7 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Found
 
 
 def _mesh_hash_or_empty(source: Path) -> str:
-    """Of a mesh; empty where it can no longer be read."""
+    """Hash of a mesh; empty if it can no longer be read."""
     try:
         return mesh_hash(source)
     except MeshError:
@@ -159,7 +159,7 @@ def _value_issues(entry: ObjectEntry) -> FoundIssues:
 
 
 def drake_error(sdf: Path) -> str:
-    """What Drake's parser says against a model: its error or first warning; empty if nothing."""
+    """Error or first warning of Drake's parser about a model; empty if there is none."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant

@@ -58,7 +58,7 @@ class Cutting:
         self.parameters()  # checks the ranges
 
     def parameters(self) -> Decomposition:
-        """With the pipeline's values where there are none."""
+        """The parameters, with defaults for those left out."""
         return Decomposition(**_set_fields(self))
 
 
@@ -169,7 +169,7 @@ class Recipe:
         return self.document.name
 
     def sources(self) -> list[ObjectSource]:
-        """What to build, in the document's order."""
+        """Object sources in the document's order."""
         defaults = self.document.defaults
         return [
             _make_source(name, _with_defaults(item, defaults), self.root)
@@ -193,7 +193,7 @@ def load_recipe(path: str | Path) -> Recipe:
 
 
 class _RecipeReader(Reader):
-    """Also checks the names of the objects."""
+    """Document reader that also checks the names of the objects."""
 
     def read_dict(self, node: yaml.Node, kind: Any, where: str) -> dict[str, Any]:
         for name, (key, _) in self.entries(node, where).items():
@@ -217,7 +217,7 @@ def _set_fields(values: Any) -> dict[str, Any]:
 
 
 def _with_defaults(item: RecipeObject, defaults: Defaults) -> RecipeObject:
-    """The object with the defaults where it says nothing."""
+    """The object, with defaults for the fields that it leaves out."""
     own = _set_fields(item)
     missing = {name: value for name, value in _set_fields(defaults).items() if name not in own}
     if "mass" in own:

@@ -80,10 +80,10 @@ def build_geometry(
     Args:
         source: what to build.
         keys: its stage keys.
-        home: the object's folder in the library; pieces in it are used again where they can.
-        folder: where to write; has the object's name.
+        home: the object's folder in the library; unchanged pieces in it are reused.
+        folder: folder to write to, with the object's name.
         confirm: simulate the stable poses.
-        seconds: gets the CPU time by stage.
+        seconds: filled with the CPU time by stage.
 
     Raises:
         BurgError: the object cannot be built.
@@ -141,7 +141,7 @@ def build_geometry(
 def _reuse_or_cut_pieces(
     source: ObjectSource, keys: StageKeys, home: Path, mesh: SurfaceMesh
 ) -> ObjectPieces:
-    """The pieces; those of an earlier build where nothing of them has changed."""
+    """The convex pieces, from an earlier build if their inputs have not changed."""
     before = read_record(home)
     if before is not None and before.keys.pieces == keys.pieces:
         known = before.geometry
@@ -155,7 +155,7 @@ def _reuse_or_cut_pieces(
 def _make_solid(
     source: ObjectSource, mesh: SurfaceMesh, pieces: Sequence[trimesh.Trimesh]
 ) -> tuple[Solid, float | None]:
-    """The material, and the thickness of its wall if it is hollow [m]."""
+    """The solid of the object's material, and the thickness of its wall if it is hollow [m]."""
     if not mesh.closed:
         return solid_of_pieces(pieces), None
     if mesh.wall is not None or source.wall_thickness is None:
@@ -173,9 +173,9 @@ def _support_points(contact: ContactGeometry, pieces: PieceMeshes) -> Array:
 def _confirm_poses(
     source: ObjectSource, geometry: ObjectGeometry, folder: Path, search: SymmetrySearch
 ) -> tuple[tuple[StablePose, ...], tuple[str, ...]]:
-    """The poses that stand the test of simulation, and remarks on the others.
+    """The stable poses that pass the test in simulation, and remarks on the others.
 
-    The object's own mass and friction do not enter: the test sets its own.
+    The test has its own mass and friction, independent of the object's.
     """
     from burg_drake.simulation import confirm_poses  # imports Drake
 
@@ -226,8 +226,8 @@ class BuiltObject:
     """A built or updated object.
 
     Attributes:
-        folder: where its files are, to be moved into the library; None if they are in place.
-        entry: for the library.
+        folder: folder with its files, to be moved into the library; None if they are in place.
+        entry: entry for the library.
         notes: remarks for the user.
         seconds: CPU time by stage.
     """
@@ -241,7 +241,7 @@ class BuiltObject:
 def is_current(
     entry: ObjectEntry, keys: StageKeys, source: ObjectSource, root: Path, confirm: bool
 ) -> bool:
-    """Whether the library holds just what these keys and the source ask for."""
+    """Whether the object in the library is up to date with these keys and the source."""
     return (
         entry.build == keys.build
         and entry.description == source.description
@@ -252,19 +252,19 @@ def is_current(
 
 
 def _lacks_confirmation(poses: Sequence[StablePose]) -> bool:
-    """Whether the simulation of poses failed, so that it is worth another try."""
+    """Whether the simulation of poses failed, so that it should be repeated."""
     return any(pose.residual is None for pose in poses)
 
 
 def build_object(
     source: ObjectSource, keys: StageKeys, root: Path, scratch: Path, confirm: bool = True
 ) -> BuiltObject:
-    """Builds an object, or what of it has changed.
+    """Builds an object, or the stages of it that have changed.
 
     Args:
         source: what to build.
         keys: its stage keys.
-        root: the library's folder; files in the object's folder are used again where they can.
+        root: the library's folder; unchanged files in the object's folder are reused.
         scratch: empty folder to build in, with the object's name.
         confirm: simulate the stable poses.
 
@@ -305,8 +305,8 @@ def build_object(
     target = home if folder is None else folder
     files = file_hashes(target) | {f"{source.name}.sdf": hashlib.sha256(sdf.encode()).hexdigest()}
     record = BuildRecord(keys=keys, geometry=geometry, files=files, entry=entry_hash(entry))
-    # The record goes first: after a kill in between, it matches no SDF, and the object is built
-    # again.
+    # The record is written first: after a kill in between, it matches no SDF, and the object is
+    # built again.
     write_record(target, record)
     atomic_write(target / f"{source.name}.sdf", sdf)
     notes = _build_notes(source, geometry, properties)
@@ -318,7 +318,7 @@ def build_object(
 def _build_notes(
     source: ObjectSource, geometry: ObjectGeometry, properties: MassProperties
 ) -> list[str]:
-    """What the user should know of a built object."""
+    """Remarks for the user about a built object."""
     notes = []
     if source.mass is None and not source.fixed:
         used = DEFAULT_DENSITY if source.density is None else source.density
@@ -337,7 +337,7 @@ def _build_notes(
 
 
 def _mesh_origin(source: ObjectSource, root: Path) -> tuple[str, str]:
-    """Name of the mesh file, and where it is seen from the library; empty for a mesh in memory."""
+    """Name of the mesh file, and its path relative to the library; empty for a mesh in memory."""
     if isinstance(source.mesh, trimesh.Trimesh):
         return "", ""
     mesh = Path(source.mesh)

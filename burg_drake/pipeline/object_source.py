@@ -37,19 +37,19 @@ class ObjectSource:
         mesh: mesh file, or a mesh in memory.
         mass: [kg]; computed from the density if None.
         density: of the material [kg/m^3]; `DEFAULT_DENSITY` if None.
-        fixed: it has no mass, as it can only be background of a scene: furniture.
+        fixed: the object has no mass and can only be background of a scene, such as furniture.
         center_of_mass: `p_OOcm` [m], in place of the centroid.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
-            place of that of uniform density.
-        wall_thickness: [m]. A closed surface becomes a hollow body whose mass is in its wall; an
+            place of the inertia of uniform density.
+        wall_thickness: [m]. A closed surface becomes a hollow body with all mass in its wall; an
             open surface becomes a wall of this thickness (`Preparation` has the default).
-        openings: what becomes of an open surface: a `wall`, or a solid with flat caps (`close`).
+        openings: how to close an open surface: as a `wall`, or with flat caps (`close`).
         friction: coefficient; `DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
         pieces: convex pieces, meshes in O [m] or mesh files in the mesh's own frame and unit; made
             by decomposition if None.
-        contact: what touches others in simulation; chosen by the object's shape if None.
-        rgba: colour, 0 to 1 each; by default what the mesh file says.
+        contact: kind of contact geometry in simulation; chosen by the object's shape if None.
+        rgba: colour, 0 to 1 each; by default that of the mesh file.
         description: for people.
         decomposition: parameters of the convex decomposition.
     """
@@ -73,12 +73,12 @@ class ObjectSource:
 
     @classmethod
     def from_file(cls, mesh: str | Path, **fields: Any) -> ObjectSource:
-        """A mesh file under the name of its stem, such as `003_cracker_box.obj`; where that has no
-        letters a-z or digits, under a name made from its hash.
+        """Makes a source from a mesh file such as `003_cracker_box.obj`. The object is named after
+        the file, or by its hash if the file name has no letters a-z or digits.
 
         Args:
-            mesh: the file.
-            fields: any other attribute.
+            mesh: mesh file.
+            fields: other attributes.
         """
         stem = Path(mesh).stem
         try:
@@ -94,10 +94,10 @@ class ObjectSource:
 
 
 def object_name(text: str) -> str:
-    """A valid object name: `Bleach Cleanser (2)` becomes `bleach_cleanser_2`.
+    """Makes a valid object name: `Bleach Cleanser (2)` becomes `bleach_cleanser_2`.
 
     Raises:
-        InvalidInputError: no letter or digit is left.
+        InvalidInputError: the text has no letters or digits.
     """
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     if not name:
@@ -125,7 +125,7 @@ def check_source(source: ObjectSource) -> None:
     """Checks the numbers that come with a mesh.
 
     Raises:
-        InvalidInputError: a name, mass, density, friction or colour that no object can have.
+        InvalidInputError: a name, mass, density, friction or colour is invalid.
     """
     if not OBJECT_NAME_PATTERN.fullmatch(source.name):
         raise InvalidInputError(
@@ -142,11 +142,10 @@ def check_numbers(given: Any) -> None:
     """Checks the numbers of an object, or the defaults of several.
 
     Args:
-        given: has attributes named as those of `ObjectSource`, or some of them.
+        given: object with some or all attributes of `ObjectSource`.
 
     Raises:
-        InvalidInputError: a mass, density, wall thickness, scale, friction or colour that no object
-            can have.
+        InvalidInputError: a mass, density, wall thickness, scale, friction or colour is invalid.
     """
     for label, unit in (
         ("mass", " kg"),

@@ -67,13 +67,13 @@ LEGEND_WIDTH = 0.030  # Metres.
 
 @dataclass(frozen=True, kw_only=True)
 class Caption:
-    """Words at the foot of every page.
+    """Text at the foot of every page.
 
     Attributes:
         title: the scene's name.
         board: its size and content.
-        facts: which markers there are and where, for those who look into it; small.
-        how: how to print, for everybody.
+        facts: dictionary and positions of the markers, in small print.
+        how: printing instructions.
     """
 
     title: str
@@ -83,14 +83,14 @@ class Caption:
 
 
 def draw_page_frame(pen: Pen, tile: Tile, tiling: Tiling, sheet: Sheet, caption: Caption) -> None:
-    """Draws what stands around the board on a page, with the page's origin lower left.
+    """Draws rulers, cuts, map and caption around the board on a page, with the origin lower left.
 
     Args:
         pen: draws in metres of the page.
         tile: the page.
         tiling: all pages.
-        sheet: the board, whose alignment marks words keep clear of.
-        caption: words at the foot.
+        sheet: the board; text keeps clear of its alignment marks.
+        caption: text at the foot.
     """
     paper, tints = tiling.paper, bool(sheet.drawings)
     draw_rulers(pen, paper)
@@ -113,7 +113,7 @@ def draw_page_frame(pen: Pen, tile: Tile, tiling: Tiling, sheet: Sheet, caption:
 
 
 def draw_rulers(pen: Pen, paper: Paper) -> None:
-    """One along x and one along y: printers scale both differently."""
+    """Draws a ruler along x and one along y, as printers may scale the two differently."""
     x, y = paper.lower[0], paper.margin + BOTTOM_STRIP - 3e-3
     _draw_ruler(pen, np.array([x, y]), turned=False)
     _draw_ruler(pen, np.array([x - 3e-3, paper.lower[1]]), turned=True)
@@ -149,7 +149,7 @@ def _draw_caption(
     room = right - left - text_width(page, 10) - 3e-3
     title_size = _fitting_text_size(caption.title, room, 10, BOLD_FONT)
     pen.text(left, base + 10.0e-3, caption.title, title_size, font=BOLD_FONT)
-    start = left - RULER_LENGTH - 8e-3  # below the ruler, too
+    start = left - RULER_LENGTH - 8e-3  # also below the ruler
     for x, y, text, size in (
         (left, 6.8e-3, caption.board, 6.5),
         (start, 4.2e-3, caption.facts, 6.5),
@@ -159,17 +159,18 @@ def _draw_caption(
 
 
 def _fitting_text_size(text: str, room: float, size: float, font: str = "Helvetica") -> float:
-    """The size [points], at most `size`, at which a line fits into the room [m]."""
+    """Largest text size [points], at most `size`, at which a line fits into the width `room`
+    [m]."""
     return size * min(1.0, room / max(text_width(text, size, font), 1e-9))
 
 
 def _draw_map(
     pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], corner: tuple[float, float]
 ) -> None:
-    """The board with its cuts, and this page filled."""
+    """Draws a map of the board with its cuts, and this page filled."""
     scale = min(MAP_SIZE[0] / size[0], MAP_SIZE[1] / size[1])
     start = np.array([corner[0] + MAP_SIZE[0] - scale * size[0], corner[1] + 0.5e-3])
-    for other, area in zip(tiling.tiles, tiling.areas(size), strict=True):
+    for other, area in zip(tiling.tiles, tiling.visible_areas(size), strict=True):
         lower, upper = (start + scale * p for p in area)
         here = other.number == tile.number
         if here:
@@ -182,7 +183,8 @@ def _draw_map(
 
 
 def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
-    """What the tints tell, in grey: from `start` [m] to the right, or turned upwards."""
+    """Draws the height legend of the tints in grey, from `start` [m] to the right, or turned
+    upwards."""
     along = np.array([0.0, 1.0] if turned else [1.0, 0.0])
     up = np.array([-1.0, 0.0] if turned else [0.0, 1.0])
 
@@ -195,7 +197,9 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
     for k in range(steps):
         luma = luma_at(MAX_TINT_HEIGHT * (k + 0.5) / steps)
         r, g, b = tint_colors(FIXED_TINT_COLOR, luma).tolist()
-        end = min(edges[k + 1] + 0.1e-3, edges[-1])  # over the next one, against hairs of white
+        end = min(
+            edges[k + 1] + 0.1e-3, edges[-1]
+        )  # overlaps the next band, against white hairlines
         corners = at(edges[k], 0.0), at(end, 0.0), at(end, 2.0e-3), at(edges[k], 2.0e-3)
         pen.area([np.array(corners)], (r, g, b))
     pen.text(*at(0.0, 2.8e-3), "height above the sheet", 6, turned=turned)
@@ -207,8 +211,8 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
 def _draw_cuts(
     pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], marks: Array
 ) -> None:
-    """Dashed lines: to cut along on the left and above, to glue the next page up to on the right
-    and below."""
+    """Draws dashed lines: cut lines on the left and above, glue lines for the next page on the
+    right and below."""
     (x0, y0), (x1, y1) = tiling.paper.lower, tiling.paper.upper
     columns = len(tiling.x_cuts) + 1
     for axis, cut, trimmed in (
@@ -231,14 +235,14 @@ def _draw_cuts(
 def _label_cut(
     pen: Pen, end: tuple[float, float], words: str, trimmed: bool, crossed: Array, *, turned: bool
 ) -> None:
-    """Says at the end of a cut line what to do there.
+    """Writes at the end of a cut line what to do there.
 
     Args:
         pen: draws in metres of the page.
         end: the line runs towards it [m].
-        words: to write.
-        trimmed: words stand on the side that is cut off, or else on the strip that stays.
-        crossed: (N,) where along the line something is that words keep clear of [m].
+        words: text to write.
+        trimmed: write on the side that is cut off, or else on the strip that stays.
+        crossed: (N,) positions along the line that text keeps clear of [m].
         turned: the line runs upwards.
     """
     text_size = 7.5  # Points.
@@ -254,8 +258,7 @@ def _label_cut(
 
 
 def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
-    """What of the objects no page shows, by page; of those beyond the board something else was
-    said."""
+    """Parts of the objects that no page shows, by page, except for objects beyond the board."""
     min_loss = 0.5e-3  # Metres; smaller losses are not reported.
     beyond = {arrow.name for arrow in sheet.arrows}
     lost = []
@@ -279,7 +282,7 @@ def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
 
 
 def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
-    """What usual printers would cut off, by page, of pages whose margin is less than theirs."""
+    """Parts that usual printers would cut off, by page, if the margin is less than theirs."""
     usual_margin = 4.23e-3  # Metres; most laser printers leave 1/6 inch white (estimate).
     paper = tiling.paper
     if paper.margin >= usual_margin:
@@ -307,7 +310,7 @@ def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
 
 
 def markers_without_quiet_zone(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
-    """Markers at the sheet's edge: detectors need white around them, about a cell wide."""
+    """Warning about markers at the sheet's edge; detectors need a white zone about a cell wide."""
     corners = layout.p_SQ[..., :2].reshape(-1, 2)
     white = min(corners.min(), (np.array(size) - corners).min())
     least = min(layout.side / layout.cells, MARKER_EDGE_MARGIN)
@@ -320,7 +323,7 @@ def markers_without_quiet_zone(size: tuple[float, float], layout: MarkerLayout) 
 
 
 def _between_cuts(points: Array, tile: Tile) -> Array:
-    """Those of points (N, 2) of the board that belong on a page [m]."""
+    """Selects the points (N, 2) of the board that belong on a page [m]."""
     low = [-np.inf if c is None else c for c in (tile.cut_left, tile.cut_bottom)]
     high = [np.inf if c is None else c for c in (tile.cut_right, tile.cut_top)]
     return points[((points >= low) & (points <= high)).all(axis=1)]
@@ -332,10 +335,10 @@ class Printout:
 
     Attributes:
         pdf: the document; the same bytes for the same scene and settings.
-        tiling: what of the board is where on which page.
-        settings: how it was printed.
-        warnings: what is not as the scene has it, a sentence each.
-        first: number of pages of instructions in the document, before those of the board.
+        tiling: pages, and the part of the board on each.
+        settings: print settings.
+        warnings: differences from the scene, a sentence each.
+        first: number of pages of instructions before the pages of the board.
     """
 
     pdf: bytes
@@ -349,15 +352,15 @@ class Printout:
         return f"Printout({pages} pages of {self.settings.page}, {kib:.0f} KiB)"
 
     def p_PQ(self, page: int, p_SQ: Array) -> Array:
-        """Points of the board on a page of it.
+        """Transforms points of the board to a page.
 
         Args:
-            page: the number that is printed on it, from 1; instructions do not count.
+            page: the page number printed on it, from 1; instructions do not count.
             p_SQ: (..., 2 or 3) points in the scene frame [m].
 
         Returns:
-            (..., 2) from the page's lower left corner [m], as the document has them: what a printer
-            that scales as `measured` says puts in its true place.
+            (..., 2) from the page's lower left corner [m], in the document; a printer that scales
+            as `measured` says prints them at their true place.
         """
         tile = self.tiling.tiles[page - 1]
         return (np.asarray(p_SQ)[..., :2] + tile.p_PS) * _scale_correction(self.settings)
@@ -379,7 +382,7 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
         burg.print_board("tabletop_six").save("board.pdf")
 
     Args:
-        scene: what reaches beyond the board is cut off, and an arrow points to it.
+        scene: objects that reach beyond the board are cut off, and an arrow points to them.
         settings: page and printer; A4 by default.
 
     Raises:
@@ -430,21 +433,23 @@ def _multiple_pages_warning(
     settings: PrintSettings,
     tiling: Tiling,
 ) -> list[str]:
-    """What would print on one page a board that is no larger than the page."""
+    """Advice on printing a board that is no larger than a page on one page."""
     smaller_margins = (4e-3, 3e-3, 2e-3, 1e-3, 0.0)  # Metres that are tried in turn.
     paper, pages = tiling.paper, len(tiling.tiles)
     sides = np.sort(size), np.sort([paper.width, paper.height])
     if pages == 1 or (sides[0] > sides[1] + 1e-6).any():
         return []
 
-    def on_one(**changes: Any) -> bool:
+    def fits_on_one_page(**changes: Any) -> bool:
         with contextlib.suppress(InvalidInputError):
             changed = dataclasses.replace(settings, **changes)
             return len(_choose_tiling(size, layout, drawings, changed).tiles) == 1
         return False
 
-    margin = next((m for m in smaller_margins if m < settings.margin and on_one(margin=m)), None)
-    page = next((name for name in PAPER_SIZES if on_one(page=name)), None)
+    margin = next(
+        (m for m in smaller_margins if m < settings.margin and fits_on_one_page(margin=m)), None
+    )
+    page = next((name for name in PAPER_SIZES if fits_on_one_page(page=name)), None)
     changes = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
     changes += [f"page {page}"] if page else []
     remedy = f"; {' or '.join(changes)} would fit on one" if changes else ""
@@ -457,8 +462,8 @@ def _multiple_pages_warning(
 def _required_points(
     size: tuple[float, float], layout: MarkerLayout, drawings: list[ObjectDrawing], paper: Paper
 ) -> tuple[Array, Array]:
-    """Corners of what has to be on paper: markers, and objects but for the rim that a page of the
-    board's own size has no room for."""
+    """Corners of the area that has to be on paper: markers, and objects except in the rim that a
+    page of the board's own size cannot show."""
     points = layout.p_SQ[:, :, :2].reshape(-1, 2)
     lower, upper = points.min(axis=0), points.max(axis=0)
     inner = np.array(paper.lower), np.array(size) - paper.margin
@@ -470,14 +475,14 @@ def _required_points(
 
 
 def _scale_correction(settings: PrintSettings) -> Array:
-    """How much larger all is drawn along x and y."""
+    """Factors by which everything is drawn larger along x and y."""
     return 0.1 / np.array(settings.measured)
 
 
 def _make_pdf(
     scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
 ) -> tuple[bytes, int]:
-    """The PDF, and how many pages of instructions it begins with."""
+    """The PDF, and the number of pages of instructions at its beginning."""
     print_scale, paper = _scale_correction(settings), tiling.paper
     stream = io.BytesIO()
     page_size = tuple((print_scale * [paper.width, paper.height] / METRES_PER_POINT).tolist())
@@ -520,13 +525,13 @@ def _make_guide(
 
 
 def _draw_tile(pen: Pen, sheet: Sheet, tile: Tile) -> None:
-    """The tile's part of the board, and the board's edge where it is on the page."""
+    """Draws the tile's part of the board, and the board's edge as far as it is on the page."""
     cover_width = 2e-3  # Metres of white around the part that a page shows.
     canvas = pen.canvas
     canvas.saveState()
     canvas.translate(tile.p_PS[0] / METRES_PER_POINT, tile.p_PS[1] / METRES_PER_POINT)
-    # Covered, not clipped, where the page's part ends: along a clip, viewers blend what is below
-    # the white frames of markers into hairs.
+    # Covered, not clipped, beyond the page's part: along a clip, viewers show hairlines of the
+    # drawing below the white frames of markers.
     lower, upper = np.array(tile.lower), np.array(tile.upper)
     canvas.saveState()
     pen.clip([rectangle(lower - cover_width / 2, upper + cover_width / 2)])

@@ -45,7 +45,7 @@ Spot = tuple[float, float]
 
 
 def draw_scale(pen: Pen) -> None:
-    """The board at its true size, and one that was fitted to the page."""
+    """Draws the board at its true size, and one fitted to the page."""
     for x, share, words, good in ((4e-3, 1.0, "100 %", True), (44e-3, 0.7, "fit to page", False)):
         _draw_box(pen, (x, 3e-3), (x + 16e-3, 25e-3))
         middle = np.array([x + 8e-3, 14e-3])
@@ -60,7 +60,7 @@ def draw_scale(pen: Pen) -> None:
 
 
 def draw_measuring(pen: Pen) -> None:
-    """A ruler of steel held to the printed one."""
+    """Draws a steel ruler held to the printed one."""
     left, right, line = 5e-3, 65e-3, 8e-3
     steel = (left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3)
     _draw_box(pen, *steel, SHADE_COLOR, 0.2e-3)
@@ -78,7 +78,7 @@ def draw_measuring(pen: Pen) -> None:
 
 
 def draw_cutting(pen: Pen) -> None:
-    """A page whose left and upper rims are cut off."""
+    """Draws a page whose left and upper margins are cut off."""
     low, high = np.array([22e-3, 2e-3]), np.array([60e-3, 25e-3])
     cut = np.array([low[0] + 6e-3, high[1] - 6e-3])
     pen.area([rectangle(low, high), rectangle((cut[0], low[1]), (high[0], cut[1]))], SHADE_COLOR)
@@ -95,7 +95,7 @@ def draw_cutting(pen: Pen) -> None:
 
 
 def draw_gluing(pen: Pen, flap: float) -> None:
-    """A page that is laid onto the strip of the one before it.
+    """Draws a page that is laid onto the strip of the previous page.
 
     Args:
         pen: draws in the box.
@@ -121,10 +121,10 @@ def draw_gluing(pen: Pen, flap: float) -> None:
 def draw_plan(
     pen: Pen, tiling: Tiling, size: tuple[float, float], objects: list[ObjectDrawing]
 ) -> None:
-    """The whole board: its pages with their numbers, cuts, and the outlines of its objects."""
+    """Draws the whole board: its numbered pages, cuts, and the outlines of its objects."""
     scale = min(SKETCH_SIZE[0] / size[0], PLAN_HEIGHT / size[1])
     shift = np.array([(SKETCH_SIZE[0] - scale * size[0]) / 2, 0.0])
-    areas = list(zip(tiling.tiles, tiling.areas(size), strict=True))
+    areas = list(zip(tiling.tiles, tiling.visible_areas(size), strict=True))
     for tile, (lower, upper) in areas:
         color = PAPER_COLOR if (tile.row + tile.column) % 2 else WHITE_RGB
         _draw_box(pen, shift + scale * lower, shift + scale * upper, color)
@@ -138,7 +138,7 @@ def draw_plan(
 
 
 def draw_flatness(pen: Pen) -> None:
-    """A sheet on a stiff plate, and one that waves."""
+    """Draws a sheet on a stiff plate, and a wavy one."""
     _draw_box(pen, (2e-3, 8e-3), (36e-3, 12e-3), SHADE_COLOR, 0.2e-3)
     pen.line((2e-3, 12.5e-3), (36e-3, 12.5e-3), width=0.8e-3)
     _draw_label(pen, 19e-3, 2.5e-3, "glued to a plate", align=0.5)
@@ -152,7 +152,7 @@ def draw_flatness(pen: Pen) -> None:
 
 
 def draw_lighting(pen: Pen) -> None:
-    """Soft light from a wide source, and a lamp with its shadow and its glare."""
+    """Draws soft light from a wide source, and a lamp with its shadow and glare."""
     lamp_color = (0.98, 0.80, 0.30)  # Colour of lamps.
     for left in (2e-3, 44e-3):
         pen.line((left, 6e-3), (left + 34e-3, 6e-3), width=0.6e-3)
@@ -171,12 +171,12 @@ def draw_lighting(pen: Pen) -> None:
 
 
 def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> None:
-    """A camera over the board, and where it may be.
+    """Draws a camera over the board, and the range of its positions.
 
     Args:
         pen: draws in the box.
-        distances: of the camera from the middle of the board, least and greatest [m].
-        tilt_deg: greatest angle off the vertical [deg].
+        distances: smallest and largest distance of the camera from the middle of the board [m].
+        tilt_deg: largest angle from the vertical [deg].
     """
     range_color = (0.86, 0.94, 0.89)  # Colour of the range of camera positions.
     foot, reach = np.array([40e-3, 3e-3]), 21e-3
@@ -199,7 +199,7 @@ def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> No
 
 
 def draw_placing(pen: Pen) -> None:
-    """An object that is set down on its silhouette."""
+    """Draws an object that is set down on its silhouette."""
     sheet = np.array([[8e-3, 3e-3], [62e-3, 3e-3], [72e-3, 14e-3], [18e-3, 14e-3]])
     pen.area([sheet], PAPER_COLOR)
     pen.outline([sheet], 0.25e-3, TEXT_RGB)
@@ -243,7 +243,7 @@ def _draw_label(
 
 
 def _draw_tick_or_cross(pen: Pen, at: Spot, *, good: bool) -> None:
-    """A tick or a cross, 5 mm wide, with its lower left corner at a point."""
+    """Draws a tick or a cross, 5 mm wide, with its lower left corner at a point."""
     x, y = at
     if good:
         pen.line((x, y + 2e-3), (x + 1.6e-3, y), (x + 5e-3, y + 5e-3), width=1e-3, color=GOOD_COLOR)
@@ -257,7 +257,7 @@ def _draw_sketch_arrow(pen: Pen, start: Spot, tip: Spot, color: Rgb) -> None:
 
 
 def _draw_scissors(pen: Pen, at: Spot) -> None:
-    """Open scissors whose blades meet left of a point."""
+    """Draws open scissors whose blades meet left of a point."""
     x, y = at
     for side in (1.0, -1.0):
         pen.line((x - 4e-3, y + side * 1.2e-3), (x + 5e-3, y - side * 1.6e-3), width=THICK_LINE)
@@ -265,20 +265,20 @@ def _draw_scissors(pen: Pen, at: Spot) -> None:
 
 
 def _ellipse_outline(middle: Spot, radius: float, flat: float = 1.0) -> Array:
-    """(40, 2) a circle's outline, or an ellipse's whose height is a share of its width."""
+    """Outline (40, 2) of a circle, or of an ellipse with height `flat` times width."""
     around = np.linspace(0.0, 2 * math.pi, 40, endpoint=False)
     return np.array(middle) + radius * np.column_stack([np.cos(around), flat * np.sin(around)])
 
 
 @dataclass(frozen=True)
 class GuideStep:
-    """One thing to do.
+    """A step of the instructions.
 
     Attributes:
-        heading: what, in a word or two.
-        words: paragraphs, one a line.
-        draw: its sketch, in a box of `SKETCH_SIZE`.
-        height: of the sketch [m].
+        heading: a word or two.
+        words: paragraphs, one per line.
+        draw: draws its sketch, in a box of `SKETCH_SIZE`.
+        height: height of the sketch [m].
     """
 
     heading: str
@@ -311,13 +311,13 @@ PLACING_STEP = GuideStep(
 def guide_steps(
     sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: Sequence[str]
 ) -> list[GuideStep]:
-    """The steps for a board, in their order.
+    """The steps of the instructions for a board, in order.
 
     Args:
         sheet: the board.
         tiling: its pages.
-        settings: how it is printed.
-        losses: what the margins of printers cut off, a sentence each.
+        settings: print settings.
+        losses: parts that the margins of printers cut off, a sentence each.
     """
     steps = [_print_step(settings.margin, losses), _measure_step(settings.measured)]
     if len(tiling.tiles) > 1:
@@ -395,12 +395,12 @@ EDGE_GAP = 5e-3  # Metres between the text and the page's margin.
 
 @dataclass(frozen=True)
 class Guide:
-    """What is told on the first page.
+    """The instructions.
 
     Attributes:
         title: of the page.
         subtitle: one line.
-        steps: in their order.
+        steps: steps in order.
     """
 
     title: str
@@ -410,14 +410,14 @@ class Guide:
 
 @dataclass(frozen=True)
 class StepPlace:
-    """Where a step stands.
+    """Position of a step.
 
     Attributes:
-        number: of the step, from 1.
-        step: what it says.
+        number: number of the step, from 1.
+        step: the step.
         page: number of the page, from 0.
-        left, top: its upper left corner, from the lower left one of the page's area of text [m].
-        width: of its column [m].
+        left, top: its upper left corner, from the lower left corner of the page's text area [m].
+        width: width of its column [m].
     """
 
     number: int
@@ -433,12 +433,12 @@ def draw_guide(pen: Pen, paper: Paper, guide: Guide, *, scale_page: tuple[float,
 
     Args:
         pen: draws in metres.
-        paper: of the pages.
-        guide: what they say.
-        scale_page: how much larger all is drawn along x and y.
+        paper: paper of the pages.
+        guide: the instructions.
+        scale_page: factors by which everything is drawn larger along x and y.
 
     Returns:
-        How many pages there are.
+        Number of pages.
     """
     # Sizes over that on A4; the first that fits on one page is used.
     scales = (2.0, 1.8, 1.6, 1.4, 1.3, 1.2, 1.1, 1.0)
@@ -464,12 +464,12 @@ def draw_guide(pen: Pen, paper: Paper, guide: Guide, *, scale_page: tuple[float,
 
 
 def lay_out_steps(guide: Guide, paper: Paper, scale: float) -> list[StepPlace]:
-    """Places the steps column by column, and goes on on another page where there is no room.
+    """Places the steps column by column, on further pages if there is no room.
 
     Args:
-        guide: what is to be placed.
-        paper: of the pages.
-        scale: of all; lengths of the places are before it is applied.
+        guide: the instructions.
+        paper: paper of the pages.
+        scale: scale of everything; the lengths of the places are unscaled.
 
     Returns:
         The places in the order of the steps; empty if no column fits on the page.
@@ -498,14 +498,14 @@ def lay_out_steps(guide: Guide, paper: Paper, scale: float) -> list[StepPlace]:
 
 
 def step_height(step: GuideStep, width: float) -> float:
-    """What a step takes of a column [m]."""
+    """Height of a step in a column [m]."""
     lines = sum(len(wrap_text(words, width)) for words in step.words.splitlines())
     text = LINE_SPACING * METRES_PER_POINT * (HEADING_SIZE + 2.0 + lines * BODY_SIZE)
     return text + (step.height + 2e-3)
 
 
 def wrap_text(words: str, width: float) -> list[str]:
-    """Lines of text that are no longer than a width [m], where its words allow that."""
+    """Wraps text to a width [m], except for longer words."""
     lines, line = [], ""
     for word in words.split():
         longer = f"{line} {word}" if line else word

@@ -19,7 +19,7 @@ MIN_LUMA = 0.70
 MAX_LUMA = 0.94
 """Luma at the greatest height; paper has 1."""
 MAX_TINT_HEIGHT = 0.10
-"""Metres above which tints no longer change."""
+"""Metres; above this height tints no longer change."""
 
 TINT_COLORS = (
     (0.14, 0.49, 0.70),
@@ -37,22 +37,22 @@ FIXED_TINT_COLOR = (0.35, 0.35, 0.35)
 
 
 def luma_at(height: ArrayLike) -> Array:
-    """Luma at heights [m] above the sheet: dark on it, and steepest there, as a person sees best
-    what is near to the paper."""
+    """Luma at heights [m] above the sheet. It is darkest and changes most at the sheet, so that
+    small heights are easy to see."""
     share = np.clip(np.asarray(height, dtype=float) / MAX_TINT_HEIGHT, 0.0, 1.0)
     return MIN_LUMA + (MAX_LUMA - MIN_LUMA) * np.sqrt(share)
 
 
 def height_at(luma: ArrayLike) -> Array:
-    """Height [m] that has a luma; the inverse of `luma_at`."""
+    """Height [m] of a luma; the inverse of `luma_at`."""
     share = (np.asarray(luma, dtype=float) - MIN_LUMA) / (MAX_LUMA - MIN_LUMA)
     return MAX_TINT_HEIGHT * share**2
 
 
 def tint_colors(hue: Rgb, luma: ArrayLike) -> Array:
-    """(..., 3) colours of a hue, red, green, blue in [0, 1], that have exactly these lumas (...).
+    """(..., 3) colours of a hue, red, green, blue in [0, 1], with exactly these lumas (...).
 
-    A hue is mixed with white where it has to be brighter, and with black where darker.
+    The hue is mixed with white to be brighter, and with black to be darker.
     """
     color, goal = np.asarray(hue), np.asarray(luma, dtype=float)[..., None]
     own = color @ BT601_LUMA_WEIGHTS
@@ -75,13 +75,13 @@ class SheetGrid:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns; the last ones may reach over the edge."""
+        """Number of rows and columns; the last ones may reach beyond the edge."""
         x, y = (int(np.ceil(s / self.resolution - 1e-6)) for s in self.size)
         return y, x
 
     def pixels(self, p_SQ: Array) -> Array:
-        """(..., 2) column and row of points (..., 2 or 3) of the scene frame; centres of pixels
-        are at whole numbers."""
+        """(..., 2) column and row of points (..., 2 or 3) in the scene frame; pixel centres are at
+        integers."""
         u = p_SQ[..., 0] / self.resolution - 0.5
         v = (self.size[1] - p_SQ[..., 1]) / self.resolution - 0.5
         return np.stack([u, v], axis=-1)
@@ -95,13 +95,13 @@ class SheetGrid:
 
 @dataclass(frozen=True, eq=False)
 class SheetLayer:
-    """What one instance shows of itself on a part of the grid.
+    """Height map of one instance on a part of the grid.
 
     Attributes:
         grid: pixels of the whole sheet.
-        row, column: of the part's upper left pixel.
-        height: (H, W) lowest point over each pixel's centre [m]; infinite where there is nothing.
-        lowest: its lowest point anywhere [m].
+        row, column: position of the part's upper left pixel.
+        height: (H, W) lowest point over each pixel's centre [m]; infinite beside the instance.
+        lowest: lowest point of the instance [m].
     """
 
     grid: SheetGrid
@@ -112,28 +112,28 @@ class SheetLayer:
 
     @property
     def covered(self) -> NDArray[np.bool_]:
-        """(H, W) where the instance is."""
+        """(H, W) mask of the pixels that the instance covers."""
         return np.isfinite(self.height)
 
     def points(self) -> Array:
-        """(N, 2) centres of the pixels that it covers, in the scene frame [m]."""
+        """(N, 2) centres of the covered pixels, in the scene frame [m]."""
         rows, columns = np.nonzero(self.covered)
         return self.grid.points(np.stack([columns + self.column, rows + self.row], axis=-1))
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Its place in the whole grid."""
+        """Slices of the part in the whole grid."""
         rows, columns = self.height.shape
         return slice(self.row, self.row + rows), slice(self.column, self.column + columns)
 
 
 def lowest_surface(grid: SheetGrid, p_SV: Array, faces: NDArray[np.int64]) -> SheetLayer:
-    """Projects a surface.
+    """Projects the lowest parts of a surface onto the grid.
 
     Args:
-        grid: of the sheet; what lies beside it is left out.
+        grid: grid of the sheet; parts beside it are left out.
         p_SV: (V, 3) vertices [m].
-        faces: (F, 3) triangles; which way round does not matter.
+        faces: (F, 3) triangles of any winding.
     """
     uv = grid.pixels(p_SV)
     lower = np.clip(np.floor(uv.min(axis=0)), 0, None).astype(int)
@@ -148,7 +148,7 @@ def lowest_surface(grid: SheetGrid, p_SV: Array, faces: NDArray[np.int64]) -> Sh
 
 
 def visible_layers(layers: list[SheetLayer]) -> list[SheetLayer]:
-    """The layers, each without what lies above another one."""
+    """The layers, each without its parts above other layers."""
     shown = []
     for layer in layers:
         height = layer.height.copy()
@@ -163,7 +163,7 @@ def visible_layers(layers: list[SheetLayer]) -> list[SheetLayer]:
 def _shared_windows(
     layer: SheetLayer, other: SheetLayer
 ) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """The part of the grid that two layers share, in the pixels of the one and of the other."""
+    """The common part of two layers on the grid, as slices of the one and of the other."""
     top, left = max(layer.row, other.row), max(layer.column, other.column)
     bottom = max(top, min(layer.window[0].stop, other.window[0].stop))
     right = max(left, min(layer.window[1].stop, other.window[1].stop))
@@ -178,7 +178,7 @@ def _shared_windows(
 
 
 def _paint_triangles(height: NDArray[np.float32], corners: Array, shape: tuple[int, int]) -> None:
-    """Lowers `height` (flat) to the triangles, row by row.
+    """Lowers a flattened `height` to the triangles, row by row.
 
     Args:
         height: (rows * columns,) changed in place.
@@ -208,7 +208,7 @@ def _paint_triangles(height: NDArray[np.float32], corners: Array, shape: tuple[i
 def _row_spans(
     corners: Array, shape: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
-    """Triangle, row, left and right end [px] of each row of pixels of each triangle."""
+    """Triangle, row, left and right end [px] of each pixel row of each triangle."""
     v = corners[:, :, 1]
     top = np.clip(np.ceil(v.min(axis=1)), 0, None).astype(np.int64)
     bottom = np.minimum(np.floor(v.max(axis=1)), shape[0] - 1).astype(np.int64)
@@ -223,7 +223,7 @@ def _row_spans(
             share = (row - a[:, 1]) / rise
         crossed = (share >= 0.0) & (
             share <= 1.0
-        )  # never of a level edge: its ends are others', too
+        )  # never at a level edge, whose ends belong to other edges, too
         u = a[:, 0] + np.where(crossed, share, 0.0) * (b[:, 0] - a[:, 0])
         left = np.where(crossed, np.minimum(left, u), left)
         right = np.where(crossed, np.maximum(right, u), right)
@@ -232,7 +232,7 @@ def _row_spans(
 
 
 def _triangle_slopes(corners: Array) -> Array:
-    """(F, 2) rise of each triangle's plane a column and a row [m]; 0 of one that stands upright."""
+    """(F, 2) rise of each triangle's plane per column and row [m]; 0 for vertical triangles."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(a, b)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -245,12 +245,10 @@ class HeightMap:
     """Pixels of a board; row 0 lies along its upper edge, column 0 along its left one.
 
     Attributes:
-        image: (H, W, 3) colours as they are printed, red, green, blue; white where nothing is.
-        height: (H, W) lowest point of any object over each pixel's centre [m]; NaN where there is
-            none.
-        instance: (H, W) index into `names` of the instance that it belongs to; -1 where there is
-            none.
-        names: of the instances, free ones first.
+        image: (H, W, 3) printed colours, red, green, blue; white beside the objects.
+        height: (H, W) lowest point of any object over each pixel's centre [m]; NaN without one.
+        instance: (H, W) index into `names` of the instance with that point; -1 without one.
+        names: names of the instances, free ones first.
         resolution: side of a pixel [m]; pixel (r, c) has its centre at x = (c + 0.5) resolution,
             y = size_y - (r + 0.5) resolution in the scene frame.
     """
@@ -266,11 +264,11 @@ def height_map(scene: SceneLike, resolution: float = 0.5e-3) -> HeightMap:
     """The height map of a scene, without markers.
 
     Args:
-        scene: free and fixed objects; of those that reach beyond the board, what is over it.
+        scene: scene; its free and fixed objects are shown as far as they are over the board.
         resolution: side of a pixel [m].
 
     Raises:
-        InvalidInputError: the resolution makes no image, or too large a one.
+        InvalidInputError: the resolution gives no image, or too large an image.
         UnknownNameError: a mesh file is missing.
     """
     max_pixels = 400_000_000  # 4 GB of memory.
@@ -307,7 +305,7 @@ def projected_layers(scene: Scene, grid: SheetGrid) -> dict[str, SheetLayer]:
 
 
 def instance_hue(scene: Scene, name: str) -> Rgb:
-    """Hue of an instance; all fixed ones share one."""
+    """Hue of an instance; all fixed instances share one hue."""
     free = list(scene.instances)
     return (
         TINT_COLORS[free.index(name) % len(TINT_COLORS)]
@@ -322,12 +320,12 @@ def mask_outlines(
     """Outlines of a mask.
 
     Args:
-        layer: tells where on the grid the mask lies.
-        mask: (H, W) as the layer's heights.
-        smoothing: how far an outline may pass beside the pixels it is drawn along [px].
+        layer: layer with the mask's position on the grid.
+        mask: (H, W) mask of the layer's pixels.
+        smoothing: largest distance of an outline from the pixels along which it runs [px].
 
     Returns:
-        Closed polygons (N, 2) [m]: outer ones and, the other way round, those of holes. They run
+        Closed polygons (N, 2) [m], outer ones and, in the opposite direction, holes. They run
         through the centres of the mask's outermost pixels.
     """
     min_area = 0.5e-6  # Square metres; smaller areas of a mask are left out.
@@ -341,8 +339,8 @@ def mask_outlines(
 
 
 def cell_outlines(black: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Outlines of the black cells of a marker, so that neighbours become one shape: cells that are
-    filled one by one would show hairs of white between them.
+    """Outlines of the black cells of a marker, with neighbouring cells joined: cells filled one by
+    one would show white hairlines between them.
 
     Args:
         black: (K, K) cells, rows from the top.
@@ -378,7 +376,7 @@ def cell_outlines(black: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
 
 
 def _polygon_corners(loop: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Only the corners of a closed polygon of unit steps."""
+    """Corners of a closed polygon of unit steps."""
     turned = (np.roll(loop, 1, axis=0) - 2 * loop + np.roll(loop, -1, axis=0)).any(axis=1)
     return loop[turned]
 
@@ -395,15 +393,15 @@ class ObjectDrawing:
 
     Attributes:
         name: of the instance.
-        words: what is written beside it.
-        layer: what it covers.
-        bands: colours and the areas that they fill, each over those before: from high to low.
-        outline: around all of it, in `outline_color`.
-        footprint: around where it touches the sheet, in `footprint_color`.
+        words: text beside it.
+        layer: its height map.
+        bands: colours and the areas that they fill, from high to low, each over the previous ones.
+        outline: outlines of the object, drawn in `outline_color`.
+        footprint: outlines of the area that touches the sheet, drawn in `footprint_color`.
         on_black: colour of both lines on black cells.
         fixed: whether it belongs to the background.
         dash: length of the dashes of the outline [m]; 0 for a solid line.
-        raised: around the part that lies above other objects, which covers none of the sheet.
+        raised: outlines of the part above other objects, which covers none of the sheet.
     """
 
     name: str
@@ -422,12 +420,12 @@ class ObjectDrawing:
 
 @dataclass(frozen=True)
 class OutOfBoundsArrow:
-    """Points to an object that reaches beyond the board.
+    """An arrow to an object that reaches beyond the board.
 
     Attributes:
         name: of the instance.
-        words: what is written beside it.
-        start, tip: [m], on the board.
+        words: text beside it.
+        start, tip: ends of the arrow on the board [m].
     """
 
     name: str
@@ -437,8 +435,8 @@ class OutOfBoundsArrow:
 
 
 def draw_objects(scene: Scene) -> list[ObjectDrawing]:
-    """The objects of a scene as they are drawn, free ones first; without those wholly beyond the
-    board. Of what lies above other objects there is an outline alone."""
+    """Drawings of a scene's objects, free ones first, without those wholly beyond the board. Parts
+    above other objects have only an outline."""
     layers = projected_layers(scene, SheetGrid(scene.board.size, OUTLINE_RESOLUTION))
     lowest = dict(zip(layers, visible_layers([*layers.values()]), strict=True))
     return [
@@ -490,7 +488,7 @@ def _draw_object(
 
 
 def _supporting_object(name: str, layers: dict[str, SheetLayer]) -> str:
-    """The object above which most of another lies."""
+    """Name of the object above which most of an object lies."""
 
     def pixels_below(other: str) -> int:
         mine, its = _shared_windows(layers[name], layers[other])
@@ -505,7 +503,7 @@ def _tint_rgb(hue: Rgb, luma: float) -> Rgb:
 
 
 def draw_arrows(scene: Scene) -> list[OutOfBoundsArrow]:
-    """Arrows to the free objects that reach beyond the board; fixed ones may stand anywhere."""
+    """Arrows to the free objects that reach beyond the board; fixed objects may stand anywhere."""
     arrow_inset = 0.022  # Metres from the board's edge, clear of margins and rulers.
     size, arrows = np.array(scene.board.size), []
     for name in scene.instances:

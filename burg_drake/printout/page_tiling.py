@@ -34,9 +34,9 @@ class Paper:
     """A page, x to the right and y up from its lower left corner.
 
     Attributes:
-        name: for people; of a size of one's own width and height, as it lies.
-        width, height: [m], as long as they are printed; a printer that scales makes them longer.
-        margin: that the printer leaves white on all sides [m].
+        name: display name; for a custom size, width and height as oriented.
+        width, height: printed lengths [m]; a printer that scales makes them longer.
+        margin: white margin of the printer on all sides [m].
     """
 
     name: str
@@ -46,30 +46,30 @@ class Paper:
 
     @property
     def lower(self) -> tuple[float, float]:
-        """Lower left corner of what the board may be drawn on [m]."""
+        """Lower left corner of the drawing area for the board [m]."""
         left_strip = 0.007  # Metres, for the vertical ruler.
         return self.margin + left_strip, self.margin + BOTTOM_STRIP
 
     @property
     def upper(self) -> tuple[float, float]:
-        """Its upper right corner [m]."""
+        """Upper right corner of the drawing area [m]."""
         return self.width - self.margin, self.height - self.margin
 
     @property
     def room(self) -> tuple[float, float]:
-        """Its extents [m]."""
+        """Extents of the drawing area [m]."""
         (x0, y0), (x1, y1) = self.lower, self.upper
         return x1 - x0, y1 - y0
 
 
 def paper_size(name: str) -> tuple[str, float, float]:
-    """Looks a paper up.
+    """Looks up a paper size.
 
     Args:
-        name: of `PAPER_SIZES` in any case, or `WxH` in millimetres, such as `700x500`.
+        name: name in `PAPER_SIZES` in any case, or `WxH` in millimetres, such as `700x500`.
 
     Returns:
-        Its name as it is written, short and long side [m].
+        Its display name, short and long side [m].
 
     Raises:
         UnknownNameError: there is no such paper.
@@ -99,12 +99,12 @@ def paper_size(name: str) -> tuple[str, float, float]:
 def page_orientations(
     name: str, margin: float, measured: tuple[float, float] = (0.1, 0.1)
 ) -> tuple[Paper, ...]:
-    """A paper upright and across, as far as rulers and text fit.
+    """The orientations of a paper, portrait and landscape, in which rulers and text fit.
 
     Args:
         name: see `paper_size`.
-        margin: that the printer leaves white [m].
-        measured: what 100 mm along x and y of the page measure in print [m].
+        margin: white margin of the printer [m].
+        measured: printed lengths of 100 mm along x and y of the page [m].
 
     Raises:
         UnknownNameError: there is no such paper.
@@ -121,7 +121,7 @@ def page_orientations(
         )
         for w, h in ((short, long), (long, short))
     ]
-    white = 2 * margin - 0.01  # the least sizes are those with margins of 5 mm
+    white = 2 * margin - 0.01  # the minimum sizes assume margins of 5 mm
     fits = [
         p
         for p in pages
@@ -150,12 +150,13 @@ class Tile:
     """A page's part of the board.
 
     Attributes:
-        number: of the page, from 1, row by row from the upper left.
-        row, column: where it belongs.
-        cut_left, cut_top: where the page is trimmed, to be glued onto the one beside it [m]; None
-            where it is the first one.
-        cut_right, cut_bottom: where the next page begins; the strip beyond comes under it.
-        lower, upper: corners of what the page shows, in the scene frame [m].
+        number: page number from 1, row by row from the upper left.
+        row, column: position of the page.
+        cut_left, cut_top: positions at which the page is trimmed, to be glued onto its neighbour
+            [m]; None for the first page.
+        cut_right, cut_bottom: positions at which the next page begins, on top of the strip beyond
+            [m].
+        lower, upper: corners of the part that the page shows, in the scene frame [m].
         p_PS: origin of the scene frame on the page, from its lower left corner [m].
     """
 
@@ -171,9 +172,9 @@ class Tile:
     p_PS: tuple[float, float]
 
     @property
-    def core(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Corners of the part that is seen once all is glued, lower left and upper right [m]; on
-        sides without a cut that is where the page ends."""
+    def visible_corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lower left and upper right corner of the part that is visible after gluing [m]; on sides
+        without a cut it ends with the page."""
         left, bottom = (
             edge if cut is None else cut
             for cut, edge in zip((self.cut_left, self.cut_bottom), self.lower, strict=True)
@@ -187,14 +188,14 @@ class Tile:
 
 @dataclass(frozen=True)
 class Tiling:
-    """A board on pages of one kind.
+    """A board on pages of one size.
 
     Attributes:
         paper: the page.
-        x_cuts: from left to right [m].
-        y_cuts: from the top down [m].
+        x_cuts: cuts from left to right [m].
+        y_cuts: cuts from the top down [m].
         tiles: the pages.
-        flap: width of the strips under the next page [m]; 0 if the gaps are too narrow for any.
+        flap: width of the strips under the next page [m]; 0 if the gaps are too narrow.
     """
 
     paper: Paper
@@ -203,8 +204,9 @@ class Tiling:
     tiles: tuple[Tile, ...]
     flap: float
 
-    def areas(self, size: tuple[float, float]) -> list[tuple[Array, Array]]:
-        """Lower and upper corner (2,) of what of the board each page shows once all is glued [m].
+    def visible_areas(self, size: tuple[float, float]) -> list[tuple[Array, Array]]:
+        """Lower and upper corner (2,) of the part of the board that each page shows after gluing
+        [m].
 
         Args:
             size: extents of the board [m].
@@ -222,17 +224,17 @@ def tile_board(
     needed: tuple[Array, Array],
     papers: tuple[Paper, ...],
 ) -> Tiling:
-    """The tiling with the fewest pages; of two, the one that lies as the board does.
+    """The tiling with the fewest pages; in a tie, the one with the board's orientation.
 
     Args:
         size: extents of the board [m].
-        layout: its markers, none of which is cut.
-        needed: lower and upper corner of what has to be on paper, markers included [m].
-        papers: orientations to choose from.
+        layout: its markers, which are never cut.
+        needed: lower and upper corner of the area that has to be on paper, with the markers [m].
+        papers: paper orientations to choose from.
 
     Raises:
-        InvalidInputError: no page is large enough for a marker, or there would be too many; the
-            message says what would do.
+        InvalidInputError: no page is large enough for a marker, or there would be too many pages;
+            the message says which paper works.
     """
     found = [
         t for paper in papers if (t := _tile_on_paper(size, layout, needed, paper)) is not None
@@ -265,7 +267,8 @@ def _page_advice(
 def _tile_on_paper(
     size: tuple[float, float], layout: MarkerLayout, needed: tuple[Array, Array], paper: Paper
 ) -> Tiling | None:
-    """All in y from the top down until the tiles are made; None if a marker does not fit."""
+    """Tiles a board on a paper; None if a marker does not fit. Until the tiles are made, y points
+    down from the top."""
     left, right = layout.p_SQ[:, 0, 0], layout.p_SQ[:, 1, 0]
     top, bottom = size[1] - layout.p_SQ[:, 0, 1], size[1] - layout.p_SQ[:, 3, 1]
     bars = _marker_spans(left, right), _marker_spans(top, bottom)
@@ -285,12 +288,12 @@ def _tile_on_paper(
 
 
 def _marker_spans(starts: Array, ends: Array) -> list[Span]:
-    """Columns (or rows) of markers: where they begin and end, in order."""
+    """Intervals of the columns (or rows) of markers, in order."""
     return sorted(set(zip(np.round(starts, 9).tolist(), np.round(ends, 9).tolist(), strict=True)))
 
 
 def _flap_width(*axes: list[Span]) -> float:
-    """What half of the narrowest gap leaves, but for half a millimetre; none below 3 mm."""
+    """Half of the narrowest gap, less half a millimetre; 0 if that is below 3 mm."""
     gaps = [b[0] - a[1] for bars in axes for a, b in itertools.pairwise(bars)]
     flap = min([MAX_FLAP_WIDTH, *(gap / 2 - 5e-4 for gap in gaps)])
     return flap if flap >= 3e-3 else 0.0
@@ -299,17 +302,17 @@ def _flap_width(*axes: list[Span]) -> float:
 def cut_axis(
     span: Span, bars: list[Span], room: float, flap: float = MAX_FLAP_WIDTH
 ) -> list[float] | None:
-    """Where to cut along one axis.
+    """Chooses the cuts along one axis.
 
     Args:
-        span: first and last coordinate that have to be on paper [m].
+        span: first and last coordinate of the area that has to be on paper [m].
         bars: columns of markers, in order; cuts stay 10 mm clear of them, or midway in narrow gaps.
-        room: what a page holds [m].
-        flap: what a page shows beyond a cut that follows [m].
+        room: length that a page holds [m].
+        flap: length that a page shows beyond the next cut [m].
 
     Returns:
-        The fewest cuts, placed so that the longest part is as short as can be; None if there are
-        none that do.
+        The fewest cuts, placed so that the longest part is as short as possible; None if no cuts
+        work.
     """
     clearance = 10e-3  # Metres between a cut and markers, where the gap is wide enough.
     gaps = [(a[1], b[0]) for a, b in itertools.pairwise(bars)]
@@ -331,7 +334,7 @@ def cut_axis(
 
 
 def _fewest_cuts(span: Span, allowed: list[Span], room: float, flap: float) -> list[float] | None:
-    """Each page takes as much as it holds, which makes the fewest."""
+    """The fewest cuts: each page takes as much as it holds."""
     cuts: list[float] = []
     start = span[0]
     while span[1] - start > room + 1e-9:
@@ -361,7 +364,7 @@ def _make_tile(
     lower, upper = np.array(paper.lower), np.array(paper.upper)
     p_PS = (lower + upper - needed.sum(axis=0)) / 2
     for axis, page in enumerate((paper.width, paper.height)):
-        if not cuts[axis]:  # the board's edges then are the page's where these are of one size
+        if not cuts[axis]:  # without cuts, a page of the board's size has the board's edges
             p_PS[axis] = (page - size[axis]) / 2
     p_PS = np.clip(p_PS, lower - needed[0], upper - needed[1])
     left, right = _adjacent_cuts(cuts[0], column)
@@ -389,7 +392,7 @@ def _adjacent_cuts(cuts: list[float], k: int) -> tuple[float | None, float | Non
 
 
 def _page_span(span: Span, cuts: list[float], k: int, flap: float) -> Span:
-    """What part k has to show, bleed and flap included."""
+    """Interval that the page of part k has to show, with bleed and flap."""
     before, after = _adjacent_cuts(cuts, k)
     start = span[0] if before is None else before - BLEED
     return start, span[1] if after is None else after + flap

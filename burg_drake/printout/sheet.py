@@ -36,7 +36,7 @@ REGULAR_FONT, BOLD_FONT = "Helvetica", "Helvetica-Bold"
 
 
 def to_printable(text: str) -> str:
-    """A text in the characters that a PDF's built-in fonts have; `?` for others."""
+    """A text with `?` for characters that a PDF's built-in fonts lack."""
     return text.encode("cp1252", "replace").decode("cp1252")
 
 
@@ -46,7 +46,7 @@ def text_width(text: str, size: float, font: str = REGULAR_FONT) -> float:
 
 
 class Pen:
-    """Draws on a canvas in metres; widths of lines too, sizes of text in points."""
+    """Draws on a canvas with lengths and line widths in metres, text sizes in points."""
 
     def __init__(self, canvas: Canvas) -> None:
         self.canvas = canvas
@@ -65,7 +65,7 @@ class Pen:
     def outline(
         self, polygons: Sequence[Array], width: float, color: Rgb, dash: float = 0.0
     ) -> None:
-        """Draws around areas."""
+        """Draws the outlines of areas."""
         if polygons:
             self._stroke(width, color, dash)
             self.canvas.drawPath(self._path(polygons), stroke=1, fill=0)
@@ -75,8 +75,9 @@ class Pen:
 
         Args:
             polygons: (N, 2) each [m].
-            color: of the area.
-            holes: polygons inside others are holes; else it is those that run the other way round.
+            color: colour of the area.
+            holes: polygons inside others are holes; otherwise polygons in the opposite direction
+                are.
         """
         if polygons:
             self.canvas.setFillColorRGB(*color)
@@ -84,7 +85,7 @@ class Pen:
             self.canvas.drawPath(self._path(polygons), stroke=0, fill=1, fillMode=rule)
 
     def clip(self, polygons: Sequence[Array]) -> None:
-        """Draws only inside of areas until the canvas' state is restored."""
+        """Clips drawing to areas until the canvas' state is restored."""
         path = self._path(polygons)
         self.canvas.clipPath(path, stroke=0, fill=0, fillMode=FILL_EVEN_ODD)
 
@@ -107,16 +108,16 @@ class Pen:
         align: float = 0.0,
         turned: bool = False,
     ) -> None:
-        """Writes a line.
+        """Writes a line of text.
 
         Args:
-            x, y: where its baseline begins [m]; with `align` 0.5 its middle, with 1 its end.
+            x, y: start of its baseline [m]; its middle with `align` 0.5, its end with 1.
             text: the line.
             size: [points].
-            font: of a PDF's built-in ones.
-            color: of the text.
+            font: one of a PDF's built-in fonts.
+            color: colour of the text.
             align: share of its length before x.
-            turned: reads upwards.
+            turned: the text reads upwards.
         """
         canvas = self.canvas
         canvas.saveState()
@@ -148,7 +149,7 @@ class Pen:
 
 
 def rectangle(lower: Sequence[float] | Array, upper: Sequence[float] | Array) -> Array:
-    """(4, 2) corners, counter-clockwise from the lower left."""
+    """(4, 2) corners of a rectangle, counter-clockwise from the lower left."""
     (x0, y0), (x1, y1) = lower, upper
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
@@ -162,7 +163,7 @@ def draw_arrow(
     head: float,
     width: float,
 ) -> None:
-    """Draws a straight arrow whose head is `head` long and wide [m]."""
+    """Draws a straight arrow with a head of length and width `head` [m]."""
     begin, end = np.array(start), np.array(tip)
     along = (end - begin) / np.linalg.norm(end - begin)
     across = np.array([-along[1], along[0]])
@@ -181,7 +182,7 @@ ORIGIN_CORNER_SIZE = 14e-3
 
 
 def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
-    """Draws the board's edge as far as it is on a page, and says what it is.
+    """Draws the board's edge, with a label, as far as it is on a page.
 
     Args:
         pen: draws in the scene frame.
@@ -192,7 +193,7 @@ def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
     # Metres needed outside the edge; otherwise the label is inside.
     label_room = EDGE_LABEL_OFFSET + EDGE_LABEL_HEIGHT + 1.0e-3
     pen.outline([rectangle((0.0, 0.0), size)], 0.2e-3, FAINT_LINE_RGB)
-    for axis in (0, 1):  # that runs across the edge
+    for axis in (0, 1):  # perpendicular to the edge
         along = 1 - axis
         start = max(tile.lower[along], 0.0) + ORIGIN_CORNER_SIZE + 4e-3
         end = min(tile.upper[along], size[along])
@@ -205,7 +206,7 @@ def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
             if not tile.lower[axis] + 1e-3 < edge < tile.upper[axis] - 1e-3:
                 continue
             side = outward if room >= label_room else -outward
-            # a baseline is below its letters; of words that read upwards it is on their right
+            # the baseline is below the letters, or right of them if the text reads upwards
             above = 1.0 if axis == 1 else -1.0
             base = edge + side * (
                 EDGE_LABEL_OFFSET if side == above else EDGE_LABEL_OFFSET + EDGE_LABEL_HEIGHT
@@ -215,12 +216,12 @@ def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
 
 
 def draw_origin(pen: Pen, tile: Tile, clear: float) -> bool:
-    """Draws the scene frame's axes in the board's corner if that is on a page.
+    """Draws the scene frame's axes in the board's corner if the corner is on a page.
 
     Args:
         pen: draws in the scene frame.
         tile: of the page.
-        clear: distance of the markers from the corner, along x or y, whichever is more [m].
+        clear: larger of the distances of the markers from the corner along x and y [m].
 
     Returns:
         Whether it was drawn: the corner may be in the margin, or too close to a marker.
@@ -245,61 +246,61 @@ LABEL_CELL_SIZE = 0.5e-3
 
 
 class FreeSpace:
-    """The sheet, and what of it is taken.
+    """Map of the sheet's occupied cells.
 
     Attributes:
         grid: cells of the sheet.
-        taken: (H, W) cells with something on them.
+        occupied: (H, W) occupied cells.
     """
 
     def __init__(self, size: tuple[float, float]) -> None:
-        """A bare sheet.
+        """An empty sheet.
 
         Args:
-            size: its extents [m].
+            size: extents of the sheet [m].
         """
         self.grid = SheetGrid(size, LABEL_CELL_SIZE)
-        self.taken: NDArray[np.bool_] = np.zeros(self.grid.shape, dtype=bool)
+        self.occupied: NDArray[np.bool_] = np.zeros(self.grid.shape, dtype=bool)
 
-    def take(self, lower: Iterable[float], upper: Iterable[float], clear: float = 0.0) -> None:
-        """Takes a rectangle, given by its corners, and `clear` around it [m]."""
+    def occupy(self, lower: Iterable[float], upper: Iterable[float], clear: float = 0.0) -> None:
+        """Occupies a rectangle, given by its corners, and a margin `clear` around it [m]."""
         rows, columns = self._cells(np.array([*lower]) - clear, np.array([*upper]) + clear)
-        self.taken[rows, columns] = True
+        self.occupied[rows, columns] = True
 
-    def take_beyond(self, lower: Iterable[float], upper: Iterable[float]) -> None:
-        """Takes all but a rectangle."""
-        self.taken |= ~self.within(lower, upper)
+    def occupy_outside(self, lower: Iterable[float], upper: Iterable[float]) -> None:
+        """Occupies everything outside a rectangle."""
+        self.occupied |= ~self.rectangle_mask(lower, upper)
 
-    def take_layer(self, layer: SheetLayer, clear: float) -> NDArray[np.bool_]:
-        """Takes what an instance covers and `clear` around it [m].
+    def occupy_layer(self, layer: SheetLayer, clear: float) -> NDArray[np.bool_]:
+        """Occupies the area of an instance and a margin `clear` around it [m].
 
         Returns:
-            (H, W) the cells that it covers.
+            (H, W) mask of the cells that the instance covers.
         """
         points = layer.points()
-        covered = np.zeros_like(self.taken)
+        covered = np.zeros_like(self.occupied)
         cells = np.rint(self.grid.pixels(points)).astype(int)
         columns, rows = np.clip(cells, 0, np.array(covered.shape[::-1]) - 1).T
         covered[rows, columns] = True
         reach = 2 * round(clear / LABEL_CELL_SIZE) + 1
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-        self.taken |= cv2.dilate(covered.astype(np.uint8), disc) > 0
+        self.occupied |= cv2.dilate(covered.astype(np.uint8), disc) > 0
         return covered
 
-    def cell_of(self, point: Array) -> tuple[int, int]:
+    def cell_index(self, point: Array) -> tuple[int, int]:
         """Row and column of the cell at a point (2,) [m]."""
         column, row = np.rint(self.grid.pixels(point)).astype(int)
         return int(row), int(column)
 
-    def cell(self, point: Iterable[float]) -> NDArray[np.bool_]:
-        """(H, W) only the cell at a point."""
-        at = np.zeros_like(self.taken)
-        at[self.cell_of(np.array([*point]))] = True
+    def cell_mask(self, point: Iterable[float]) -> NDArray[np.bool_]:
+        """(H, W) mask of only the cell at a point."""
+        at = np.zeros_like(self.occupied)
+        at[self.cell_index(np.array([*point]))] = True
         return at
 
-    def within(self, lower: Iterable[float], upper: Iterable[float]) -> NDArray[np.bool_]:
-        """(H, W) the cells that a rectangle touches."""
-        inside = np.zeros_like(self.taken)
+    def rectangle_mask(self, lower: Iterable[float], upper: Iterable[float]) -> NDArray[np.bool_]:
+        """(H, W) mask of the cells that a rectangle touches."""
+        inside = np.zeros_like(self.occupied)
         rows, columns = self._cells(np.array([*lower]), np.array([*upper]))
         inside[rows, columns] = True
         return inside
@@ -310,27 +311,27 @@ class FreeSpace:
         beside: NDArray[np.bool_],
         within: NDArray[np.bool_] | None = None,
     ) -> Array | None:
-        """Places a box on free cells as close to something as possible, and takes its place.
+        """Places a box on free cells as close as possible to other cells, and occupies its place.
 
         Args:
-            extent: of the box along x and y [m].
-            beside: (H, W) cells of what it is to stand close to; not empty.
-            within: (H, W) cells that it may stand on; all if None.
+            extent: extents of the box along x and y [m].
+            beside: (H, W) cells to be close to; not empty.
+            within: (H, W) cells that the box may occupy; all if None.
 
         Returns:
-            (2,) its lower left corner [m]; None if there is no room within 5 cm.
+            (2,) lower left corner of the box [m]; None if there is no room within 5 cm.
         """
         max_distance = 0.05  # Metres between a label and its object.
         columns, rows = (max(1, int(np.ceil(e / LABEL_CELL_SIZE))) for e in extent)
         window = _mask_window(beside, max(rows, columns) + round(max_distance / LABEL_CELL_SIZE))
-        taken, beside = self.taken[window], beside[window]
+        taken, beside = self.occupied[window], beside[window]
         blocked = taken if within is None else taken | ~within[window]
         if rows > taken.shape[0] or columns > taken.shape[1]:
             return None
         sums = cv2.integral(blocked.astype(np.uint8))
         inside = sums[rows:, columns:] - sums[:-rows, columns:]
         inside += sums[:-rows, :-columns] - sums[rows:, :-columns]
-        # Close by: the box's nearest cell, and among those alike its middle.
+        # Distance of the box's nearest cell, then of its middle.
         away = cv2.distanceTransform((~beside).astype(np.uint8), cv2.DIST_L2, 5)
         near = cv2.erode(away, np.ones((rows, columns), np.uint8), anchor=(0, 0))
         near = near[: inside.shape[0], : inside.shape[1]]
@@ -347,7 +348,7 @@ class FreeSpace:
 
     def _cells(self, lower: Array, upper: Array) -> tuple[slice, slice]:
         """Rows and columns that a rectangle touches."""
-        (height, width), y = self.taken.shape, self.grid.size[1]
+        (height, width), y = self.occupied.shape, self.grid.size[1]
         left, right = np.floor(lower[0] / LABEL_CELL_SIZE), np.ceil(upper[0] / LABEL_CELL_SIZE)
         top, bottom = (
             np.floor((y - upper[1]) / LABEL_CELL_SIZE),
@@ -358,7 +359,7 @@ class FreeSpace:
 
 
 def _mask_window(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
-    """Rows and columns of a mask's cells, and so many more on all sides."""
+    """Slices of the rows and columns of a mask's cells, extended by `reach` cells on all sides."""
     rows, columns = (np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1))
     return (
         slice(max(rows[0] - reach, 0), rows[-1] + reach + 1),
@@ -378,12 +379,12 @@ ALIGNMENT_MARK_RADIUS = 2e-3
 
 @dataclass(frozen=True)
 class ObjectName:
-    """Words on the board.
+    """A text on the board.
 
     Attributes:
-        words: what they say.
-        position: where their baseline begins [m].
-        color: of the words.
+        words: the text.
+        position: start of its baseline [m].
+        color: colour of the text.
     """
 
     words: str
@@ -393,15 +394,15 @@ class ObjectName:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Everything on a board.
+    """Everything drawn on a board.
 
     Attributes:
         size: extents [m].
         layout: the markers.
         drawings: the objects.
-        arrows: to what is out of bounds.
-        marks: (N, 2) middles of alignment marks, on the cuts [m].
-        names: words beside objects and arrows.
+        arrows: arrows to objects out of bounds.
+        marks: (N, 2) centres of alignment marks, on the cuts [m].
+        names: texts beside objects and arrows.
     """
 
     size: tuple[float, float]
@@ -413,7 +414,7 @@ class Sheet:
 
 
 def alignment_marks(layout: MarkerLayout, tiling: Tiling) -> Array:
-    """(N, 2) points on the cuts, midway between markers, where pages have to meet [m]."""
+    """(N, 2) centres of the alignment marks, on the cuts midway between markers [m]."""
     marks: list[tuple[float, float]] = []
     middles = []
     for axis in (0, 1):
@@ -429,24 +430,24 @@ def alignment_marks(layout: MarkerLayout, tiling: Tiling) -> Array:
 
 
 def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
-    """Finds places for the names of objects and arrows: on paper, on no marker, on no object, and
-    on every page that shows a part of an object.
+    """Finds places for the names of objects and arrows, clear of margins, markers and objects, on
+    every page that shows a part of an object.
 
     Returns:
-        The sheet with names, and those words for which there was no room, quoted, with the page.
+        The sheet with names, and the quoted names without room, with their page.
     """
     min_area = 0.5e-4  # Square metres of an object on a page that repeats its name.
     space = _space_for_names(sheet, tiling)
-    masks = {d.name: space.take_layer(d.layer, NAME_CLEARANCE) for d in sheet.drawings}
+    masks = {d.name: space.occupy_layer(d.layer, NAME_CLEARANCE) for d in sheet.drawings}
     beyond = {arrow.name for arrow in sheet.arrows}
     wanted = [
         (d.words, d.footprint_color, masks[d.name]) for d in sheet.drawings if d.name not in beyond
     ]
     for arrow in sheet.arrows:
         box = np.sort(np.array([arrow.start, arrow.tip]), axis=0)
-        space.take(box[0], box[1], 2 * NAME_CLEARANCE)
+        space.occupy(box[0], box[1], 2 * NAME_CLEARANCE)
         wanted.append(
-            (arrow.words, OUT_OF_BOUNDS_COLOR, masks.get(arrow.name, space.cell(arrow.start)))
+            (arrow.words, OUT_OF_BOUNDS_COLOR, masks.get(arrow.name, space.cell_mask(arrow.start)))
         )
     names: list[ObjectName] = []
     homeless: list[str] = []
@@ -463,9 +464,9 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
         shift = np.array([NAME_CLEARANCE, 0.22 * extent[1]])
         corners = [corner]
         for tile in tiling.tiles if len(tiling.tiles) > 1 else ():
-            page = space.within(*tile.core)
+            page = space.rectangle_mask(*tile.visible_corners)
             part = beside & page
-            stands_here = page[space.cell_of(corner + LABEL_CELL_SIZE)]
+            stands_here = page[space.cell_index(corner + LABEL_CELL_SIZE)]
             if part.sum() * LABEL_CELL_SIZE**2 < min_area or stands_here:
                 continue
             again = space.place(extent, part, page)
@@ -480,27 +481,27 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
 
 
 def _space_for_names(sheet: Sheet, tiling: Tiling) -> FreeSpace:
-    """The sheet without margins, markers, cuts, alignment marks and the corner of the origin."""
+    """Free space outside margins, markers, cuts, alignment marks and the corner of the origin."""
     space = FreeSpace(sheet.size)
     first, last = tiling.tiles[0], tiling.tiles[-1]
     on_paper = (first.lower[0], last.lower[1]), (last.upper[0], first.upper[1])
     inner = np.array([[0.0, 0.0], sheet.size]) + 2 * NAME_CLEARANCE * np.array([[1.0], [-1.0]])
-    space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
-    space.take((0.0, 0.0), (ORIGIN_CORNER_SIZE, ORIGIN_CORNER_SIZE))
+    space.occupy_outside(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
+    space.occupy((0.0, 0.0), (ORIGIN_CORNER_SIZE, ORIGIN_CORNER_SIZE))
     clear = max(NAME_CLEARANCE, frame_width(sheet.layout))
     for corners in sheet.layout.p_SQ[:, :, :2]:
-        space.take(corners.min(axis=0), corners.max(axis=0), clear)
+        space.occupy(corners.min(axis=0), corners.max(axis=0), clear)
     for x in tiling.x_cuts:
-        space.take((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), NAME_CLEARANCE)
+        space.occupy((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), NAME_CLEARANCE)
     for y in tiling.y_cuts:
-        space.take((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), NAME_CLEARANCE)
+        space.occupy((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), NAME_CLEARANCE)
     for mark in sheet.marks:
-        space.take(mark, mark, ALIGNMENT_MARK_RADIUS + NAME_CLEARANCE)
+        space.occupy(mark, mark, ALIGNMENT_MARK_RADIUS + NAME_CLEARANCE)
     return space
 
 
 def draw_sheet(pen: Pen, sheet: Sheet) -> None:
-    """Draws all of a board."""
+    """Draws a whole board."""
     for drawing in sheet.drawings:
         _draw_tints(pen, drawing)
     for arrow in sheet.arrows:
@@ -532,10 +533,10 @@ def _draw_tints(pen: Pen, drawing: ObjectDrawing) -> None:
 
 
 def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
-    """White frames, then all black cells as one shape.
+    """Draws white frames, and then all black cells as one shape.
 
-    White lines lead from the corners of a frame outwards: a tint all around it would else have a
-    square edge, which a detector can take for that of the marker.
+    White lines lead from the corners of a frame outwards. Without them, a tint around the frame has
+    a square edge that a detector can take for that of the marker.
     """
     seam_width = 0.8e-3  # Metres; without it detectors take the edge of a frame for a marker.
     gap, frame = _marker_gap(layout), frame_width(layout)
@@ -552,8 +553,8 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
 
 
 def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
-    """The objects' lines across everything, dark on white and light on black cells, but along the
-    edges of markers, which detectors follow all around."""
+    """Draws the objects' lines over everything, dark on white and light on black cells, except at
+    the edges of markers, which detectors follow."""
     outline_width = 0.2e-3  # Metres.
     footprint_width = 0.4e-3  # Metres.
     raised_dash = 0.8e-3  # Metres, for outlines above other objects.
@@ -580,7 +581,8 @@ def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
 
 
 def _black_cell_outlines(layout: MarkerLayout) -> list[Array]:
-    """Outlines of the black cells of all markers (N, 2) [m]; holes run the other way round."""
+    """Outlines (N, 2) of the black cells of all markers [m]; holes run in the opposite
+    direction."""
     flip = np.array([1.0, -1.0]) * layout.side / layout.cells
     return [
         corners[0] + loop * flip
@@ -590,7 +592,7 @@ def _black_cell_outlines(layout: MarkerLayout) -> list[Array]:
 
 
 def frame_width(layout: MarkerLayout) -> float:
-    """Width of the white frames around the markers, which tints keep clear of [m]."""
+    """Width of the white frames around the markers, free of tints [m]."""
     max_frame = 3e-3  # Metres, where the gap between markers is wide enough.
     max_gap_share = 0.2  # Share of a gap for one frame, so that objects remain visible.
     return min(max_frame, max_gap_share * _marker_gap(layout))

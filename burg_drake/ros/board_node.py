@@ -13,15 +13,14 @@ from burg_drake.scene import Scene
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sighting:
-    """What one image says.
+    """The board in one image.
 
     Attributes:
         stamp: the image's time, in the type that its message has it.
         camera_frame: tf frame of the camera, x right, y down, z forward; may be empty.
-        estimate: where the camera is over the board; where an image could not be used at all,
-            `reason` says why.
-        image: (H, W, 3) RGB, or None where it could not be read.
-        intrinsics: of the camera that took it, or None where they are not known.
+        estimate: pose of the camera over the board; `reason` says why an image could not be used.
+        image: (H, W, 3) RGB; None if it could not be read.
+        intrinsics: of the camera; None if unknown.
     """
 
     stamp: Any
@@ -32,7 +31,7 @@ class Sighting:
 
     @property
     def status(self) -> str:
-        """One line for people."""
+        """Status as one line of text."""
         estimate = self.estimate
         if not estimate.valid:
             return f"no pose: {estimate.reason}"
@@ -45,10 +44,10 @@ class Sighting:
 
 
 class BoardNode:
-    """A scene's board in the images of one camera.
+    """Locates a scene's board in the images of one camera.
 
-    The camera's resolution may change at any time. Nothing that a message holds ends the node: an
-    image that cannot be used is a sighting that says why.
+    The camera's resolution may change at any time. Invalid messages never raise: the sighting says
+    why an image could not be used.
     """
 
     def __init__(
@@ -61,24 +60,24 @@ class BoardNode:
     ) -> None:
         """
         Args:
-            scene: what stands on the board.
+            scene: objects on the board.
             intrinsics: of the camera; from its camera_info if None.
             rectified: the images are free of distortion (`image_rect`).
-            print_scale: size of the printed board against the document's, along x and y.
+            print_scale: size of the printed board relative to the document, along x and y.
         """
         self._scene = scene
         self._rectified = rectified
-        self._given = intrinsics
+        self._fixed_intrinsics = intrinsics
         self._print_scale = print_scale
         self._board: BoardPose | None = None
         self._overlay: Overlay | None = None
 
     def locate(self, image: Any, camera_info: Any | None) -> Sighting:
-        """Finds the board.
+        """Locate the board in an image.
 
         Args:
             image: `sensor_msgs/Image` or `CompressedImage`.
-            camera_info: `sensor_msgs/CameraInfo`, the latest; None if there was none yet.
+            camera_info: `sensor_msgs/CameraInfo`, the latest; None before the first.
         """
         rgb = intrinsics = None
         try:
@@ -98,8 +97,9 @@ class BoardNode:
         )
 
     def draw(self, sighting: Sighting) -> Bytes | None:
-        """(H, W, 3) RGB with the scene's objects in it, or with a line that says why there are
-        none; None if there is no image."""
+        """Draw the scene's objects over the image (H, W, 3), or a line that says why there are
+        none; None without an image.
+        """
         image, intrinsics = sighting.image, sighting.intrinsics
         if image is None:
             return None
@@ -110,8 +110,8 @@ class BoardNode:
         return self._overlay.draw(image, sighting.estimate.X_SC)
 
     def _intrinsics(self, camera_info: Any | None, image: Bytes) -> Intrinsics:
-        if self._given is not None:
-            found, source = self._given, "intrinsics are of"
+        if self._fixed_intrinsics is not None:
+            found, source = self._fixed_intrinsics, "intrinsics are of"
         elif camera_info is not None:
             found = intrinsics_from_camera_info(camera_info, rectified=self._rectified)
             source = "camera_info says"

@@ -22,12 +22,12 @@ from burg_drake.station import HALF_PIXEL
 
 @dataclass(frozen=True)
 class PixelEncoding:
-    """How an encoding lays out a pixel.
+    """Memory layout of a pixel.
 
     Attributes:
-        channels: numbers a pixel.
-        dtype: of the numbers.
-        to_rgb: OpenCV's name of the conversion, without `COLOR_`; none is needed if empty.
+        channels: numbers per pixel.
+        dtype: type of the numbers.
+        to_rgb: OpenCV's name of the conversion, without `COLOR_`; empty if none is needed.
     """
 
     channels: int
@@ -58,16 +58,16 @@ IMAGE_ENCODINGS = {
 
 
 def decode_image_message(message: Any) -> Bytes:
-    """Image of a message.
+    """Decode the image of a message.
 
     Args:
         message: `sensor_msgs/Image`, or `sensor_msgs/CompressedImage` (JPEG, PNG, ...).
 
     Returns:
-        (H, W, 3) RGB, the caller's own. 16 bits are cut to their upper 8.
+        (H, W, 3) RGB, a new array. 16-bit values keep their upper 8 bits.
 
     Raises:
-        InvalidInputError: the encoding is none of `IMAGE_ENCODINGS`, or the data are damaged.
+        InvalidInputError: the encoding is not in `IMAGE_ENCODINGS`, or the data are damaged.
     """
     return _decode_raw(message) if hasattr(message, "encoding") else _decode_compressed(message)
 
@@ -116,19 +116,19 @@ def _decode_compressed(message: Any) -> Bytes:
 
 
 def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Intrinsics:
-    """Intrinsics of the images that come with a `camera_info`.
+    """Read the intrinsics of a `camera_info` message.
 
-    K and P are those of the full sensor; the images may be a part of it (`roi`), with pixels
-    merged (`binning_x`, `binning_y`). A merged pixel's centre is the centre of what it was merged
-    from, which `image_geometry` leaves out: (b - 1) / 2b pixels for b pixels a side.
+    K and P are of the full sensor; the images may be cropped (`roi`) and binned (`binning_x`,
+    `binning_y`). A binned pixel's centre is the centre of its sensor pixels, which `image_geometry`
+    ignores: (b - 1) / 2b pixels for b pixels per side.
 
     Args:
         message: `sensor_msgs/CameraInfo`; its matrices are K, D, P in ROS 1, k, d, p in ROS 2.
-        rectified: the images are those of `image_rect`: P instead of K, no distortion. The baseline
-            of a stereo camera in P is left out, so that poses are those of the camera itself.
+        rectified: the images are from `image_rect`: use P instead of K and no distortion. A stereo
+            baseline in P is ignored, so that poses are of the camera itself.
 
     Raises:
-        InvalidInputError: the camera is not calibrated, or has another model of its lens.
+        InvalidInputError: the camera is not calibrated, or its lens model is not supported.
     """
     matrix = _read_field(message, "P" if rectified else "K")
     columns = 4 if rectified else 3

@@ -29,18 +29,19 @@ ROS_2_HINT = (
 
 
 def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.environ) -> int:
-    """1 or 2: the ROS that is wanted, else the one whose set-up script was sourced, else the one
-    whose client library can be imported.
+    """Choose ROS 1 or 2: the requested one, else the one whose set-up script was sourced, else the
+    one whose client library can be imported.
 
-    Debian's folder of packages is put behind all others on the path if nothing else helps: what
-    this environment has comes first, and ROS's pure Python packages are found.
+    As a last resort, Debian's package folder is appended to the path: ROS's pure Python packages
+    are found there, and this environment's packages come first.
 
     Args:
         wanted: 1, 2 or None.
-        environment: variables.
+        environment: environment variables.
 
     Raises:
-        MissingDependencyError: it cannot be imported; says why, and what to install.
+        MissingDependencyError: its client library cannot be imported; the message says why and what
+            to install.
     """
     version_variable = environment.get("ROS_VERSION", "")
     order = sorted(CLIENT_LIBRARIES, key=lambda version: str(version) != version_variable)
@@ -56,7 +57,7 @@ def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.
 
 
 def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) -> RosNode:
-    """Starts the node; see `Ros1Node` and `Ros2Node` for what may go wrong.
+    """Start the node; `Ros1Node` and `Ros2Node` document further errors.
 
     Raises:
         MissingDependencyError: message packages are not installed.
@@ -72,7 +73,7 @@ def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) ->
 
 
 def _try_import(name: str) -> str | None:
-    """Imports a module; what went wrong, or None."""
+    """Try to import a module; return the error, or None."""
     try:
         importlib.import_module(name)
         return None

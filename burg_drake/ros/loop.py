@@ -10,7 +10,7 @@ from burg_drake.ros.ros_node import RosNode
 
 
 class StatusLogIntervals:
-    """How often the log says what is going on, in seconds; see `StatusLog`."""
+    """Intervals of log messages in seconds; see `StatusLog`."""
 
     no_image = 5.0  # Seconds without images until a hint is logged.
     no_pose = 0.5  # Seconds without a pose until the reason is logged.
@@ -19,7 +19,7 @@ class StatusLogIntervals:
 
 
 class StatusLog:
-    """Decides what is worth a line in the log."""
+    """Selects the lines for the log."""
 
     def __init__(self, now: float) -> None:
         """
@@ -27,7 +27,7 @@ class StatusLog:
             now: time on any clock [s].
         """
         self._last_image = now
-        self._hinted = False
+        self._warned = False
         self._reason: str | None = None
         self._reason_since = now
         self._reported: str | None = None
@@ -36,8 +36,8 @@ class StatusLog:
         self._images = self._poses = 0
 
     def record_image(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
-        """After an image: a line and whether it is a warning, or None."""
-        self._last_image, self._hinted = now, False
+        """Process an image's sighting; return a line and whether it is a warning, or None."""
+        self._last_image, self._warned = now, False
         if not self._images:
             self._since = now
         self._images += 1
@@ -59,20 +59,20 @@ class StatusLog:
         return sighting.status, True
 
     def record_no_image(self, publishers: Mapping[str, int], now: float) -> str | None:
-        """Without an image: a warning, once."""
-        if self._hinted or now - self._last_image < StatusLogIntervals.no_image:
+        """Process a timeout without an image; return a warning, once."""
+        if self._warned or now - self._last_image < StatusLogIntervals.no_image:
             return None
-        self._hinted = True
+        self._warned = True
         silent = [topic for topic, count in publishers.items() if not count]
         if silent:
             return f"nothing publishes {' and '.join(silent)}; is the camera running? Still waiting"
         return f"{next(iter(publishers))} has a publisher, but no images arrive; still waiting"
 
     def rate(self, now: float, *, last: bool = False) -> str | None:
-        """Images answered a second, and how many of them with a pose.
+        """Line on the processed images per second, and the share with a pose.
 
-        None without images, and while the time since the last such line is less than
-        `StatusLogIntervals.rate`, unless this is the last one.
+        None without images, and within `StatusLogIntervals.rate` of the previous line unless `last`
+        is set.
         """
         elapsed = now - self._since
         if not self._images or elapsed <= 0.0 or not (last or elapsed >= StatusLogIntervals.rate):
@@ -86,8 +86,9 @@ class StatusLog:
 
 
 def run_node(link: RosNode, node: BoardNode) -> None:
-    """Answers every image until ROS or Ctrl-C ends it. While one is being worked at, newer ones
-    replace each other: the latest is next."""
+    """Process images until ROS or Ctrl-C ends the node. Of the images that arrive meanwhile only
+    the latest is kept.
+    """
     account = StatusLog(time.monotonic())
     try:
         while link.running():

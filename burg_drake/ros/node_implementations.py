@@ -38,7 +38,7 @@ class Ros1Node(RosNode):
         require_master(os.environ.get(MASTER_VARIABLE, "http://localhost:11311"))
         self._rospy = rospy
         rospy.init_node(names.node, argv=["burg-drake"], disable_signals=True)
-        self._news = threading.Condition()
+        self._image_arrived = threading.Condition()
         self.publications = Publications(
             names,
             classes,
@@ -59,8 +59,8 @@ class Ros1Node(RosNode):
 
     def next_image(self, timeout: float) -> Any | None:
         """See `RosNode`."""
-        with self._news:
-            self._news.wait_for(lambda: self._image is not None, timeout)
+        with self._image_arrived:
+            self._image_arrived.wait_for(lambda: self._image is not None, timeout)
             image, self._image = self._image, None
         return image
 
@@ -78,13 +78,13 @@ class Ros1Node(RosNode):
         self._rospy.signal_shutdown("the node ends")
 
     def _store_image(self, message: Any) -> None:
-        with self._news:
+        with self._image_arrived:
             self._image = message
-            self._news.notify()
+            self._image_arrived.notify()
 
 
 class _TimeoutTransport(xmlrpc.client.Transport):
-    """One that does not wait for ever."""
+    """An XML-RPC transport with a timeout."""
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         connection = super().make_connection(host)
@@ -93,10 +93,10 @@ class _TimeoutTransport(xmlrpc.client.Transport):
 
 
 def require_master(uri: str) -> None:
-    """Asks the master for its process id.
+    """Check that a ROS master answers.
 
     Raises:
-        InvalidInputError: there is none at that address.
+        InvalidInputError: no master answers at that address.
     """
     try:
         proxy: Any = xmlrpc.client.ServerProxy(uri, transport=_TimeoutTransport())
@@ -135,7 +135,7 @@ class Ros2Node(RosNode):
 
         classes = message_classes(lambda octets: array.array("B", octets))
         self._rclpy = rclpy
-        self._ended = ExternalShutdownException
+        self._shutdown_error = ExternalShutdownException
         # Ctrl-C stays Python's: rclpy's handlers end the context under a publisher that is at work.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node(names.node)
@@ -156,11 +156,11 @@ class Ros2Node(RosNode):
             self._subscribe(topic, reliable=True)
 
     def _subscribe(self, topic: str, *, reliable: bool) -> None:
-        """Listens to a topic; depth 1 keeps the latest message alone.
+        """Subscribe to a topic; depth 1 keeps only the latest message.
 
-        A reliable subscription is asked for first, although it hears reliable publishers alone: an
-        image is sent in hundreds of packets, and with best effort one that is lost costs the image
-        (two of three at 640 x 480, by Fast DDS on one machine).
+        A reliable subscription is tried first, although it only receives from reliable publishers:
+        an image is sent in hundreds of packets, and with best effort a lost one costs the image
+        (two of three at 640 x 480, with Fast DDS on one machine).
         """
         from rclpy.event_handler import SubscriptionEventCallbacks
         from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -191,7 +191,7 @@ class Ros2Node(RosNode):
                 self._executor.spin_once(timeout_sec=left)
                 while self._incompatible:
                     self._subscribe_with_best_effort(self._incompatible.pop())
-        except self._ended:
+        except self._shutdown_error:
             return None
         image, self._image = self._image, None
         return image

@@ -30,11 +30,11 @@ from burg_drake.ros.board_node import Sighting
 
 @dataclass(frozen=True)
 class MessageClasses:
-    """The messages of a ROS distribution.
+    """The message classes of a ROS distribution.
 
     Attributes:
         TFMessage: None where tf2_msgs is not installed.
-        octets: makes of bytes what a field `uint8[]` takes.
+        octets: converts bytes to the type of a field `uint8[]`.
     """
 
     Image: type
@@ -48,10 +48,10 @@ class MessageClasses:
 
 
 def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
-    """Those that are installed; their modules have the same names in ROS 1 and ROS 2.
+    """Import the message classes; their modules have the same names in ROS 1 and ROS 2.
 
     Raises:
-        ImportError: a package is not there.
+        ImportError: a package is not installed.
     """
     packages = {
         "sensor_msgs": ("Image", "CompressedImage", "CameraInfo"),
@@ -71,7 +71,7 @@ def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
 
 
 def image_message(classes: MessageClasses, sighting: Sighting, image: Bytes) -> Any:
-    """`sensor_msgs/Image` of (H, W, 3) RGB, with the header of the image that was seen."""
+    """Build a `sensor_msgs/Image` of (H, W, 3) RGB, with the header of the input image."""
     message = classes.Image()
     _set_header(message, sighting, sighting.camera_frame)
     message.height, message.width = image.shape[:2]
@@ -139,7 +139,7 @@ def _set_header(message: Any, sighting: Sighting, frame: str) -> None:
 
 
 def _set_pose(position: Any, orientation: Any, X: Array) -> None:
-    """Writes a (4, 4) pose; messages of ROS 2 take no other numbers than Python's own."""
+    """Write a (4, 4) pose to a message; ROS 2 only accepts Python's own numbers."""
     position.x, position.y, position.z = (float(value) for value in X[:3, 3])
     quaternion = quaternion_from_rotation(X[:3, :3])
     orientation.w, orientation.x, orientation.y, orientation.z = (float(v) for v in quaternion)
@@ -154,7 +154,7 @@ COMPRESSED_SUFFIX = "compressed"
 
 
 class ParentFrame(Enum):
-    """Which frame is the parent of the other on tf."""
+    """The parent frame on tf."""
 
     CAMERA = "camera"
     BOARD = "board"
@@ -166,12 +166,11 @@ class NodeNames:
     """Names in the ROS graph.
 
     Attributes:
-        node: of the node; what it publishes is below it.
+        node: of the node, and namespace of its topics.
         image: topic with images, compressed ones if its last part is `compressed`.
         camera_info: topic with the camera's intrinsics; `camera_info` beside the images if empty.
         board_frame: tf frame of the board.
-        parent: whether the camera's frame is the parent of the board's, or the reverse, or the
-            node leaves tf alone.
+        parent: the parent frame on tf: the camera's, the board's, or no transform is published.
     """
 
     node: str = "burg_board"
@@ -196,12 +195,12 @@ class NodeNames:
 
     @property
     def compressed(self) -> bool:
-        """The images are `sensor_msgs/CompressedImage`."""
+        """Whether the images are `sensor_msgs/CompressedImage`."""
         return self.image.rsplit("/", 1)[-1] == COMPRESSED_SUFFIX
 
     @property
     def info_topic(self) -> str:
-        """Where the intrinsics come from."""
+        """Topic of the intrinsics."""
         if self.camera_info:
             return self.camera_info
         base = self.image.removesuffix(f"/{COMPRESSED_SUFFIX}") if self.compressed else self.image
@@ -223,9 +222,9 @@ class Publications:
         Args:
             names: of node and frames.
             classes: of the messages.
-            advertise: a publisher for a topic (`~` is the node's name), a message class, and how
-                many messages may wait for a slow listener.
-            listeners: how many listen to a publisher.
+            advertise: creates a publisher from a topic (`~` is the node's name), a message class
+                and a queue size.
+            listeners: returns a publisher's number of subscribers.
         """
         queue_size = 10  # Small messages that may wait for a slow subscriber.
         self._names = names
@@ -245,8 +244,9 @@ class Publications:
             self._frames = advertise("/tf", classes.TFMessage, 100)  # As in tf2_ros.
 
     def publish(self, sighting: Sighting, draw: Callable[[Sighting], Any]) -> None:
-        """Publishes what an image says; pose and frame only where they are known, and the overlay
-        only where somebody listens."""
+        """Publish a sighting: pose and transform only if known, and the overlay only if it has
+        subscribers.
+        """
         classes, names = self._classes, self._names
         self._status.publish(status_message(classes, sighting))
         if sighting.estimate.valid:
@@ -270,8 +270,9 @@ class RosNode(ABC):
     """A running node of ROS 1 or ROS 2.
 
     Attributes:
-        publications: what it publishes.
-        camera_info: the latest `sensor_msgs/CameraInfo`, None before the first.
+        publications: its topics.
+        camera_info: the latest `sensor_msgs/CameraInfo`, None before the
+            first.
     """
 
     publications: Publications
@@ -280,28 +281,28 @@ class RosNode(ABC):
 
     @abstractmethod
     def running(self) -> bool:
-        """False once ROS, or Ctrl-C, has ended the node."""
+        """Whether the node runs; False once ROS or Ctrl-C has ended it."""
 
     @abstractmethod
     def next_image(self, timeout: float) -> Any | None:
-        """The latest image that was not given yet, or None if none comes within `timeout` [s]."""
+        """Wait for the latest new image; None after `timeout` [s]."""
 
     @abstractmethod
     def publishers(self) -> Mapping[str, int]:
-        """How many publish each of the topics that the node listens to."""
+        """Number of publishers of each subscribed topic."""
 
     @abstractmethod
     def log(self, text: str, *, warning: bool = False) -> None:
-        """A line in the log of ROS."""
+        """Write a line to the log of ROS."""
 
     @abstractmethod
     def close(self) -> None:
-        """Leaves the graph."""
+        """Shut down the node."""
 
     def _handlers(
         self, names: NodeNames, classes: MessageClasses, with_camera_info: bool
     ) -> dict[str, tuple[type, Callable[[Any], None]]]:
-        """By topic that the node listens to, the class of its messages and what stores them."""
+        """Message class and callback of each subscribed topic."""
         image_class = classes.CompressedImage if names.compressed else classes.Image
         handlers: dict[str, tuple[type, Callable[[Any], None]]] = {
             names.image: (image_class, self._store_image)

@@ -1,4 +1,4 @@
-"""Scene documents: which objects stand where on the board, and whether they can.
+"""Scene documents: objects and their poses on the board, and checks of these.
 
 Read `scene_document` first; `scene_validation` checks where objects stand, `arrangement` finds
 room for them.

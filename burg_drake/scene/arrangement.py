@@ -44,18 +44,18 @@ from burg_drake.scene.scene_document import (
 def place_beside(
     occupied: OccupiedBoard, turned: StandingObject, rng: np.random.Generator, *, touching: bool
 ) -> StandingObject | None:
-    """Looks for a place beside one of those that stand there, or anywhere for the first one.
+    """Looks for a place beside one of the standing objects, or anywhere for the first object.
 
-    One try: one of them and a direction from there are drawn, each as probable.
+    Each try draws a standing object and a direction from it, both uniformly.
 
     Args:
         occupied: the board and what stands there.
         turned: the object, turned by a yaw.
-        rng: draws.
-        touching: push it against them until the pieces of both touch.
+        rng: random generator.
+        touching: push the object against the others until their pieces touch.
 
     Returns:
-        None if there is no room, or nothing to be pushed against.
+        None if there is no room, or no object to push against.
     """
     gap_range = (0.002, 0.010)  # Metres between adjacent footprints, too little for a finger.
     start_gap = 1e-4  # Metres between footprints before one object is pushed.
@@ -71,9 +71,9 @@ def place_beside(
     place = middle + distance * direction
     if touching:
         return _push_to_contact(occupied, partner, turned, place, -direction, distance)
-    one = turned.shifted(place)
-    if occupied.in_bounds(one) and occupied.is_free(turned, place, gap_range[0]):
-        return one
+    standing = turned.shifted(place)
+    if occupied.in_bounds(standing) and occupied.is_free(turned, place, gap_range[0]):
+        return standing
     return None
 
 
@@ -85,46 +85,46 @@ def _push_to_contact(
     direction: Array,
     limit: float,
 ) -> StandingObject | None:
-    """An object that is pushed from a place (2,) towards its partner along a unit vector (2,) until
-    it touches others; None if the place is not free, it touches nothing within the limit [m], or it
-    ends off the board."""
-    one = turned.shifted(place)
-    least, most = occupied.exit_distances(one, direction)
+    """Pushes an object from a place (2,) towards its partner along a unit vector (2,) until it
+    touches others; None if the place is not free, nothing is touched within the limit [m], or the
+    object ends off the board."""
+    standing = turned.shifted(place)
+    least, most = occupied.distance_range_in_bounds(standing, direction)
     if least > min(most, limit) + BOX_TOLERANCE or most < -BOX_TOLERANCE:
         return None
     if not occupied.is_free(turned, place, 0.0):
         return None
     along = np.array([*direction, 0.0])
     distance = free_distance(
-        one.pieces, occupied.pieces(partner), along, limit, stop_below=least - BOX_TOLERANCE
+        standing.pieces, occupied.pieces(partner), along, limit, stop_below=least - BOX_TOLERANCE
     )
     if distance == limit:
         return None
-    one = one.shifted(distance * direction)
-    return one if occupied.in_bounds(one) else None
+    standing = standing.shifted(distance * direction)
+    return standing if occupied.in_bounds(standing) else None
 
 
 class Heap:
-    """A spot of a board, and what hangs above it."""
+    """Objects that hang above a spot of a board, to be dropped."""
 
     def __init__(self, occupied: OccupiedBoard, shapes: list[ObjectShape]) -> None:
         """Args:
-        occupied: the board, and what stands there.
-        shapes: of all objects that are to come.
+        occupied: the board and the objects on it.
+        shapes: shapes of all objects to be added.
         """
         layer_count = 3.0  # Layers of objects on the spot, if they were balls of their size.
         self._size = occupied.size
         self._below = [*occupied.obstacles]
-        for one in occupied.standing:
-            self._below.append(one.shape.hull.moved(one.X_SO))
+        for standing in occupied.standing:
+            self._below.append(standing.shape.hull.moved(standing.X_SO))
         covered = sum(np.pi * np.ptp(s.corners, axis=0).mean() ** 2 / 4.0 for s in shapes)
         self._radius = np.sqrt(covered / np.pi / layer_count)
 
     def place_above(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
-        """Hangs an object above the spot, in a random orientation, as low as it goes.
+        """Places an object above the spot, in a random orientation, as low as possible.
 
         Returns:
-            Its pose (4, 4) in S; None if at none of the places it is within the board.
+            Its pose (4, 4) in S; None if it is within the board at none of the places.
         """
         draw_count = 6  # Random places, of which the lowest is taken.
         wxyz = rng.normal(size=4)
@@ -138,7 +138,7 @@ class Heap:
             xy = self._size / 2.0 + radius * np.array([np.cos(angle), np.sin(angle)]) - middle
             if (xy + lower[:2] < 0.0).any() or (xy + upper[:2] > self._size).any():
                 continue
-            X_SO = self._lowered(shape, R_SO, xy, float(lower[2]))
+            X_SO = self._lowered_pose(shape, R_SO, xy, float(lower[2]))
             if best is None or X_SO[2, 3] < best[2, 3]:
                 best = X_SO
         if best is not None:
@@ -146,12 +146,12 @@ class Heap:
         return best
 
     def add(self, shape: ObjectShape, X_SO: Array) -> None:
-        """An object is there, at a pose (4, 4) in S."""
+        """Adds an object at a pose (4, 4) in S."""
         self._below.append(shape.hull.moved(X_SO))
 
-    def place_low(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
-        """Hangs an object where its centre of mass gets lowest, anywhere on the board, in one of
-        its stable poses: so it finds what room there is beside a heap.
+    def place_lowest(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
+        """Places an object anywhere on the board, in one of its stable poses, where its centre of
+        mass gets lowest. This finds free room beside a heap.
 
         Returns:
             Its pose (4, 4) in S; None if it is larger than the board.
@@ -167,7 +167,7 @@ class Heap:
             least, most = edge_margin - lower[:2], self._size - edge_margin - upper[:2]
             if (least > most).any():
                 continue
-            X_SO = self._lowered(shape, R_SO, rng.uniform(least, most), float(lower[2]))
+            X_SO = self._lowered_pose(shape, R_SO, rng.uniform(least, most), float(lower[2]))
             height = float((X_SO @ (*entry.mass_properties.center_of_mass, 1.0))[2])
             if height < lowest:
                 best, lowest = X_SO, height
@@ -175,8 +175,8 @@ class Heap:
             self.add(shape, best)
         return best
 
-    def _lowered(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
-        """The pose of an object that is lowered onto what is below."""
+    def _lowered_pose(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
+        """The pose of an object that is lowered onto the objects below."""
         hull_gap = 0.004  # Metres between the hulls of dropped objects.
         top = max((float(body.points[..., 2].max()) for body in self._below), default=0.0)
         start = max(top, 0.0) + hull_gap - lowest
@@ -200,15 +200,15 @@ def choose_objects(
     """Draws objects of a library.
 
     Args:
-        library: the library; what has no mass or no stable pose is left out.
-        count: how many.
-        rng: draws.
+        library: the library; objects without mass or stable pose are left out.
+        count: number of objects.
+        rng: random generator.
         only: names of the objects to draw from; all if empty.
-        repeat: an object may come several times.
+        repeat: an object may be drawn several times.
         taken: names that instances must not get.
 
     Raises:
-        UnknownNameError: `only` names an object that is not there.
+        UnknownNameError: `only` names an object that is not in the library.
         InvalidInputError: there are not enough objects.
     """
     usable = [n for n, e in library.objects.items() if not e.is_fixed and e.stable_poses]
@@ -249,36 +249,37 @@ def arrange(
 ) -> Arrangement:
     """Looks for a place for each object.
 
-    Each gets its stable pose first, then up to `tries` random places and yaws; large ones begin.
-    What finds no place is missing in the result.
+    Each object gets a stable pose, and then up to `tries` random places and yaws; large objects
+    come first. Objects without a place are missing in the result.
 
     Args:
         wanted: the objects.
-        shapes: of the library's objects; to be kept for the next time.
+        shapes: shapes of the library's objects; keep them for further calls.
         board: objects stay within its edges.
-        rng: draws; the same one gives the same result.
-        layout: how they stand to one another.
-        poses: how stable poses are drawn.
-        obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as the
-            boxes of a station.
-        tries: places to look at for each object.
-        needs_all: stop at the first object that finds no place.
+        rng: random generator; the same state gives the same result.
+        layout: arrangement of the objects relative to one another.
+        poses: how to draw stable poses.
+        obstacles: points (N, 3) in S of convex bodies to avoid [m], such as the boxes of a station.
+        tries: number of places to try for each object.
+        needs_all: stop at the first object without a place.
 
     Raises:
         UnknownNameError: an object is not in the library.
-        InvalidInputError: an object cannot be placed, as it has no mass, for example; or there is
-            no such layout.
+        InvalidInputError: an object cannot be placed, for example because it has no mass; or there
+            is no such layout.
     """
     if layout not in LAYOUT_NAMES:
         raise InvalidInputError(
             f"layout {layout!r} does not exist; {suggest_names(layout, LAYOUT_NAMES)}"
         )
     occupied = OccupiedBoard(board, obstacles)
-    for one in wanted:
-        _ = shapes[one.object]
+    for request in wanted:
+        _ = shapes[request.object]
     if layout == "heap":
         return _place_above_heap(wanted, shapes, occupied, rng, tries)
-    chosen = [(shapes[one.object], draw_pose(one, shapes, rng, poses)) for one in wanted]
+    chosen = [
+        (shapes[request.object], draw_pose(request, shapes, rng, poses)) for request in wanted
+    ]
     if layout == "packed":
         places, used = _pack_in_best_order(chosen, board, obstacles, rng, needs_all)
     else:
@@ -295,7 +296,7 @@ def _scatter(
     tries: int,
     needs_all: bool,
 ) -> tuple[list[StandingObject | None], int]:
-    """Places by trial and error, large objects first; and the number of trials."""
+    """Places objects by trial and error, large ones first; also returns the number of tries."""
     gaps = {"random": 0.001, "wide": 0.040}  # Metres between footprints, by layout.
     max_places = 20  # Random places for each random yaw.
     places: list[StandingObject | None] = [None] * len(chosen)
@@ -327,7 +328,8 @@ def _pack_in_best_order(
     rng: np.random.Generator,
     needs_all: bool,
 ) -> tuple[list[StandingObject | None], int]:
-    """The densest of several orders; the first two are by size, the others are random."""
+    """Packs the objects in several orders, two by size and the others random; returns the densest
+    result."""
     order_count = 4  # Orders in which the objects are packed.
     best: list[StandingObject | None] = [None] * len(chosen)
     value = (-1, 0.0)
@@ -351,14 +353,14 @@ def _place_above_heap(
     tries: int,
 ) -> Arrangement:
     """Start poses above the middle of the board."""
-    heap = Heap(occupied, [shapes[one.object] for one in wanted])
+    heap = Heap(occupied, [shapes[request.object] for request in wanted])
     X_SO: list[Array | None] = []
     used = 0
-    for one in wanted:
+    for request in wanted:
         found = None
         for _ in range(tries):
             used += 1
-            found = heap.place_above(shapes[one.object], rng)
+            found = heap.place_above(shapes[request.object], rng)
             if found is not None:
                 break
         X_SO.append(found)
@@ -366,7 +368,7 @@ def _place_above_heap(
 
 
 def _indices_by_area(chosen: Sequence[tuple[ObjectShape, int]]) -> list[int]:
-    """Numbers of objects, those that cover most of the board first."""
+    """Indices of objects, by the area that they cover, largest first."""
     size = [np.prod(np.ptp(shape.outline(pose).hull.corners, axis=0)) for shape, pose in chosen]
     return [int(i) for i in np.argsort(-np.array(size), kind="stable")]
 
@@ -375,5 +377,5 @@ def _make_arrangement(
     wanted: Sequence[ObjectRequest], X_SO: Sequence[Array | None], tries: int
 ) -> Arrangement:
     pairs = list(zip(wanted, X_SO, strict=True))
-    placed = tuple(to_instance(one, X) for one, X in pairs if X is not None)
-    return Arrangement(placed, tuple(one.name for one, X in pairs if X is None), tries)
+    placed = tuple(to_instance(request, X) for request, X in pairs if X is not None)
+    return Arrangement(placed, tuple(request.name for request, X in pairs if X is None), tries)

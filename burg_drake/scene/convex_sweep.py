@@ -1,4 +1,4 @@
-"""Distances that convex shapes can move along a line before they touch others."""
+"""Distances that convex shapes can move along a line before they touch other shapes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LINE_OFFSET = np.array([3e-9, 7e-9, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class ConvexShapes:
-    """Convex shapes: each the hull of points, thickened by an ellipsoid.
+    """Convex shapes: each is the Minkowski sum of a point hull and an ellipsoid.
 
     Attributes:
-        points: (S, V, 3) [m]; shapes of fewer points repeat one.
+        points: (S, V, 3) [m]; shapes with fewer points repeat one.
         spread: (S, 3, 3) matrices A [m]: the ellipsoid is A u for all vectors u up to length 1. 0
             for a polytope, r times identity for a ball or capsule, of rank two, a disc, for a
             cylinder.
@@ -30,14 +30,14 @@ class ConvexShapes:
 
     @classmethod
     def of(cls, points: Sequence[Array], spread: Sequence[Array]) -> ConvexShapes:
-        """From points (N, 3) and spread (3, 3) of each; at least one."""
+        """Makes shapes from points (N, 3) and spread (3, 3) of each; at least one."""
         most = max(len(p) for p in points)
         padded = [np.concatenate([p, np.repeat(p[:1], most - len(p), axis=0)]) for p in points]
         return cls(np.array(padded), np.array(spread))
 
     @classmethod
     def joined(cls, shapes: Sequence[ConvexShapes]) -> ConvexShapes:
-        """Those of all, in their order."""
+        """Concatenates shapes, in their order."""
         return cls.of([p for s in shapes for p in s.points], [A for s in shapes for A in s.spread])
 
     def __len__(self) -> int:
@@ -52,7 +52,7 @@ class ConvexShapes:
         return bool(self.spread.any())
 
     def support(self, shape: Indices, n: Array) -> Array:
-        """The points (K, 3) of K shapes that are farthest along vectors n (K, 3)."""
+        """Support points (K, 3) of K shapes, the farthest ones along vectors n (K, 3)."""
         points, spread = self.points[shape], self.spread[shape]
         corner = np.einsum("kvi,ki->kv", points, n).argmax(axis=1)
         if not self._round:
@@ -63,7 +63,7 @@ class ConvexShapes:
         return np.asarray(points[np.arange(len(n)), corner] + np.einsum("kij,kj->ki", spread, unit))
 
     def boxes(self) -> tuple[Array, Array]:
-        """Lower and upper corners (S, 3) of the boxes around the shapes."""
+        """Lower and upper corners (S, 3) of the bounding boxes of the shapes."""
         reach = np.sqrt((self.spread**2).sum(axis=2))
         return self.points.min(axis=1) - reach, self.points.max(axis=1) + reach
 
@@ -77,20 +77,20 @@ def contact_distances(
     offsets: Array | None = None,
     stop_below: float = -np.inf,
 ) -> Array:
-    """Ways of pairs of shapes, the first one moved, until they touch.
+    """Distances that the first shapes of pairs can move until they touch the second ones.
 
     Args:
         moving, still: the shapes.
-        pairs: (K,) indices of the former and of the latter; the two must be apart.
-        direction: (3,) unit vector along which the former go.
-        limit: longer distances do not count [m].
-        offsets: (K, 3) by which the first of each pair starts beside its place; nowhere if None.
-        stop_below: once a distance is known to be shorter than this [m], the search ends: it may
-            still be shorter than what is returned, which is below this, too.
+        pairs: (K,) indices of moving and of still shapes; the two of a pair must be apart.
+        direction: (3,) unit vector along which the moving shapes go.
+        limit: longer distances are returned as infinite [m].
+        offsets: (K, 3) offsets of the first shape of each pair at the start; zero if None.
+        stop_below: the search ends once a distance is known to be below this [m]. The returned
+            value is then also below this, but may exceed the distance.
 
     Returns:
-        Ways (K,) [m], after which the gap between the two surfaces is at most some 1e-7 m, either
-        way. Infinite for what does not meet within the limit, or only after others have met.
+        Distances (K,) [m], after which the gap or overlap of the two surfaces is at most some 1e-7
+        m. Infinite for pairs that do not meet within the limit, or only after others have met.
     """
     block_size = 16  # Pairs that are solved at once.
     R = _sweep_basis(direction)
@@ -114,7 +114,7 @@ def contact_distances(
 
 
 def _sweep_basis(direction: Array) -> Array:
-    """(3, 3) rows: two directions across, and the direction."""
+    """(3, 3) rows: two directions perpendicular to the direction, and the direction."""
     across = np.eye(3)[np.abs(direction).argmin()]
     u = _cross(direction, across)
     u /= np.linalg.norm(u)
@@ -122,7 +122,7 @@ def _sweep_basis(direction: Array) -> Array:
 
 
 def _cross(u: Array, v: Array) -> Array:
-    """Cross product of two vectors (3,): numpy's own takes ten times as long for a single one."""
+    """Cross product of two vectors (3,), ten times as fast as numpy's for a single product."""
     (a, b, c), (d, e, f) = u, v
     return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
 
@@ -137,13 +137,13 @@ def _smallest_distances(
     limit: float,
     stop_below: float,
 ) -> Array:
-    """Ways (K,) of a few pairs along z; infinite above the limit. M reaches from the first to the
-    second of `across` (K, 2)."""
+    """Distances (K,) of a few pairs along z; infinite above the limit. Each Minkowski difference M
+    reaches from the first to the second value of `across` (K, 2)."""
     accuracy = 1e-7  # Metres between the final bounds of a distance.
     max_steps = 200  # Simplex steps; boxes need about 5, round shapes 15.
     start_radius = 10.0  # Metres of the first three points from the line, beyond any shape.
     start_height = 1e6  # Metres ahead; the points remain only if the line misses M.
-    max_start_share = 1e-10  # Share of a start point above which the line misses M.
+    max_start_share = 1e-10  # Weight of a start point above which the line misses M.
     max_graze = 1e-7  # Metres of overlap at which shapes still slide along each other.
     distances = np.full(len(i), np.inf)
     middle = np.column_stack([(across[0] + across[1]) / 2.0, np.zeros(len(i))])
@@ -161,7 +161,7 @@ def _smallest_distances(
         w = b.support(j[left], -m) - a.support(i[left], m) - shift[left] - middle[left]
         w = middle[left] + scale[left] * w + LINE_OFFSET
         lower = (triangles.normal * w).sum(axis=1)
-        share = triangles.shares(0.0, 0.0)
+        share = triangles.barycentric_coordinates(0.0, 0.0)
         height = (share * basis[..., 2]).sum(axis=1)
         foreign = (np.where(basis[..., 2] == start_height, share, 0.0) > max_start_share).any(
             axis=1
@@ -170,14 +170,14 @@ def _smallest_distances(
         done = ends & ~foreign & (lower >= -accuracy)
         distances[left[done]] = lower[done]
         limit = min(limit, float(distances[left].min(initial=np.inf)))
-        short = ~foreign & (height < stop_below) & (height >= 0.0)  # what is behind is below 0
+        short = ~foreign & (height < stop_below) & (height >= 0.0)  # heights behind are below 0
         if short.any():
             distances[left[short]] = height[short]
             break
         goes_on = ~ends & (lower <= limit)
         if not goes_on.any():
             break
-        fall = triangles.shares(w[:, 0], w[:, 1])[goes_on]
+        fall = triangles.barycentric_coordinates(w[:, 0], w[:, 1])[goes_on]
         left, basis = left[goes_on], basis[goes_on]
         basis[np.arange(len(left)), _leaving_point(fall, share[goes_on])] = w[goes_on]
     else:
@@ -186,7 +186,7 @@ def _smallest_distances(
 
 
 class _Triangles:
-    """Triangles above the plane across the line.
+    """Triangles above the plane perpendicular to the line.
 
     Args:
         corners: (K, 3 corners, 3).
@@ -203,8 +203,8 @@ class _Triangles:
         """(K, 3) normals of the triangles' planes, 1 along z."""
         self.normal[:, :2] = -(rise / self._twice_area).T
 
-    def shares(self, x: Array | float, y: Array | float) -> Array:
-        """(K, 3) barycentric coordinates of points in the plane across, by x (K,) and y (K,)."""
+    def barycentric_coordinates(self, x: Array | float, y: Array | float) -> Array:
+        """(K, 3) barycentric coordinates of points x (K,), y (K,) in the perpendicular plane."""
         x, y = x - self._x, y - self._y
         share = np.empty((len(self._x), 3))
         share[:, 1] = (x * self._by - y * self._bx) / self._twice_area
@@ -214,8 +214,8 @@ class _Triangles:
 
 
 def _leaving_point(fall: Array, share: Array) -> Indices:
-    """Which of the three points (K,) makes room for a new one, whose shares of them are `fall`
-    (K, 3): the first one whose share falls to 0 while that of the new one rises."""
+    """Indices (K,) of the simplex points to replace by a new point with coordinates `fall` (K, 3):
+    the first point whose share falls to 0 while the share of the new point rises."""
     falls = fall > 1e-9
     ratio = np.where(falls, share / np.where(falls, fall, 1.0), np.inf)
     return np.asarray(ratio.argmin(axis=1))

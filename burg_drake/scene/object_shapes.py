@@ -18,10 +18,11 @@ from burg_drake.scene.scene_validation import read_library_vertices
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """What an object covers of the plane that it rests on, its centre of mass above the origin.
+    """Outline of an object on its support plane, with the centre of mass above the origin.
 
     Attributes:
-        corners: (N + M, 2) of the convex hull, and of a polygon around it that has fewer [m].
+        corners: (N + M, 2) corners of the convex hull, and of a polygon around it with fewer
+            corners [m].
         count: N.
         height: of its highest point [m].
     """
@@ -37,15 +38,15 @@ class Outline:
 
     @cached_property
     def coarse(self) -> Footprint:
-        """A polygon around the hull that has fewer corners."""
+        """A polygon around the hull with fewer corners."""
         return Footprint(self.corners[self.count :])
 
     def rotated(self, yaw: float) -> Outline:
-        """The same, turned by a yaw [rad] about the origin."""
+        """The outline turned by a yaw [rad] about the origin."""
         return Outline(rotate_polygon(self.corners, yaw), self.count, self.height)
 
     def moved(self, offset: Array) -> Outline:
-        """The same, moved by an offset (2,) [m]."""
+        """The outline moved by an offset (2,) [m]."""
         return Outline(self.corners + offset, self.count, self.height)
 
 
@@ -54,9 +55,9 @@ class ObjectShape:
     """The shapes of one object, in its frame O.
 
     Attributes:
-        library: where it is from.
-        name: in the library.
-        corners: (N, 3) corners of the convex hull of all that is seen of it or touches others [m].
+        library: library of the object.
+        name: name in the library.
+        corners: (N, 3) corners of the convex hull of its visual mesh and contact geometry [m].
     """
 
     library: ObjectLibrary
@@ -67,13 +68,13 @@ class ObjectShape:
     _outlines: dict[int, Outline] = field(default_factory=dict)
 
     def X_SO(self, pose: int) -> Array:
-        """(4, 4) in a stable pose, its centre of mass above the board's corner."""
+        """(4, 4) pose in a stable pose, with the centre of mass above the board's corner."""
         if pose not in self._poses:
             self._poses[pose] = self.library.entry(self.name).X_SO(pose)
         return self._poses[pose]
 
     def outline(self, pose: int) -> Outline:
-        """What it covers in a stable pose."""
+        """The outline in a stable pose."""
         outline_tolerance = 2e-4  # Metres that an outline may exceed the true one.
         coarse_tolerance = 1.5e-3  # Metres, of the coarse outline.
         if pose not in self._outlines:
@@ -85,13 +86,13 @@ class ObjectShape:
 
     @property
     def shadows(self) -> tuple[Array, ...]:
-        """The hulls (N, 2) of what it covers, one a stable pose [m]."""
+        """Outline hulls (N, 2) of all stable poses [m]."""
         count = len(self.library.entry(self.name).stable_poses)
         return tuple(self.outline(pose).hull.corners for pose in range(count))
 
     @cached_property
     def pieces(self) -> ConvexShapes:
-        """What of it touches others."""
+        """Convex shapes of its contact geometry."""
         entry = self.library.entry(self.name)
         if entry.contact.primitive is not None:
             return _primitive_shape(entry.contact.primitive)
@@ -105,7 +106,7 @@ class ObjectShape:
 
 
 class ObjectShapes:
-    """Shapes of a library's objects, each read when it is first asked for."""
+    """Shapes of a library's objects, each read on first use."""
 
     def __init__(self, library: ObjectLibrary) -> None:
         self.library = library
@@ -115,9 +116,9 @@ class ObjectShapes:
         """The shape of an object.
 
         Raises:
-            UnknownNameError: there is no such object, or a file of it is missing.
-            MeshError: a file of it is damaged.
-            InvalidInputError: it has no mass, or no stable pose.
+            UnknownNameError: there is no such object, or one of its files is missing.
+            MeshError: one of its files is damaged.
+            InvalidInputError: the object has no mass, or no stable pose.
         """
         if name not in self._shapes:
             self._shapes[name] = _read_object_shape(self.library, name)
@@ -141,7 +142,7 @@ def _read_object_shape(library: ObjectLibrary, name: str) -> ObjectShape:
 
 
 def _contact_points(library: ObjectLibrary, name: str) -> list[Array]:
-    """Points (N, 3) of each convex piece that touches others, or of the whole surface."""
+    """Points (N, 3) of each convex contact piece, or of the whole surface."""
     entry = library.entry(name)
     if entry.contact.primitive is not None:
         return [np.asarray(primitive_mesh(entry.contact.primitive).vertices)]
@@ -151,7 +152,7 @@ def _contact_points(library: ObjectLibrary, name: str) -> list[Array]:
 
 
 def _primitive_shape(primitive: Primitive) -> ConvexShapes:
-    """A primitive, with its round surface."""
+    """Convex shape of a primitive, with its round surface."""
     size, spread = primitive.size, np.zeros((3, 3))
     if primitive.shape == "box":
         points = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size

@@ -21,12 +21,12 @@ BOX_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectRequest:
-    """An object that is to be placed.
+    """An object to place.
 
     Attributes:
-        name: of the instance.
-        object: in the library.
-        pose: number of its stable pose; drawn if None. Of no matter in a heap.
+        name: name of the instance.
+        object: name of the object in the library.
+        pose: number of its stable pose; drawn if None. Not used in a heap.
     """
 
     name: str
@@ -36,12 +36,12 @@ class ObjectRequest:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """What found a place.
+    """Result of an arrangement.
 
     Attributes:
-        instances: in the order that was asked for.
-        missing: names of those that found none.
-        tries: places that were looked at.
+        instances: placed instances in the order of the requests.
+        missing: names of objects without a place.
+        tries: number of places tried.
     """
 
     instances: tuple[Instance, ...]
@@ -51,14 +51,14 @@ class Arrangement:
 
 @dataclass(frozen=True, eq=False)
 class StandingObject:
-    """An object in a stable pose, at a place of the board.
+    """An object in a stable pose at a place on the board.
 
     Attributes:
         shape: of the object.
         pose: number of its stable pose.
-        yaw: by which it is turned about its centre of mass [rad].
-        offset: (2,) of its centre of mass from the board's corner [m].
-        outline: what it covers of the board.
+        yaw: rotation about the vertical through its centre of mass [rad].
+        offset: (2,) position of its centre of mass from the board's corner [m].
+        outline: its outline on the board.
     """
 
     shape: ObjectShape
@@ -76,33 +76,33 @@ class StandingObject:
 
     @property
     def footprint(self) -> Footprint:
-        """The convex hull of what it covers."""
+        """Convex hull of the outline."""
         return self.outline.hull
 
     def shifted(self, offset: Array) -> StandingObject:
-        """The same one elsewhere: `offset` is (2,) [m]."""
+        """The object at another `offset` (2,) [m]."""
         outline = self.outline.moved(offset)
         return StandingObject(self.shape, self.pose, self.yaw, self.offset + offset, outline)
 
     @cached_property
     def pieces(self) -> ConvexShapes:
-        """What of it touches others, in the scene frame."""
+        """Convex shapes of its contact geometry in the scene frame."""
         return self.shape.pieces.moved(self.X_SO)
 
 
 def place_in_stable_pose(shape: ObjectShape, pose: int, yaw: float) -> StandingObject:
-    """An object in its k-th stable pose, turned by a yaw [rad] about its centre of mass, which is
-    above the board's corner."""
+    """Places an object in a stable pose, turned by a yaw [rad], with the centre of mass above the
+    board's corner."""
     return StandingObject(shape, pose, yaw, np.zeros(2), shape.outline(pose).rotated(yaw))
 
 
 class OccupiedBoard:
-    """A board and what stands on it, seen from above."""
+    """A board and the objects on it, seen from above."""
 
     def __init__(self, board: Board, obstacles: Sequence[Array] = ()) -> None:
         """Args:
         board: the board.
-        obstacles: points (N, 3) of convex bodies that are there already, in S [m].
+        obstacles: points (N, 3) in S of convex bodies to avoid [m].
         """
         self.size = np.array(board.size)
         self.obstacles = [ConvexShapes.of([p], [np.zeros((3, 3))]) for p in obstacles]
@@ -112,47 +112,52 @@ class OccupiedBoard:
             low, high = float(p[:, 2].min()), float(p[:, 2].max())
             self._footprints.append((Footprint(convex_polygon(p[:, :2])), low, high))
 
-    def add(self, one: StandingObject) -> None:
-        """Something stands there from now on."""
-        self.standing.append(one)
-        self._footprints.append((one.footprint, 0.0, one.outline.height))
+    def add(self, standing: StandingObject) -> None:
+        """Adds an object to the board."""
+        self.standing.append(standing)
+        self._footprints.append((standing.footprint, 0.0, standing.outline.height))
 
-    def in_bounds(self, one: StandingObject) -> bool:
-        """Whether nothing of it is beyond the board's edge."""
-        footprint = one.footprint
+    def in_bounds(self, standing: StandingObject) -> bool:
+        """Whether an object is within the board's edges."""
+        footprint = standing.footprint
         return bool((footprint.low >= 0.0).all() and (footprint.high <= self.size).all())
 
-    def exit_distances(self, one: StandingObject, direction: Array) -> tuple[float, float]:
-        """After which ways along a unit vector (2,) nothing of it may be beyond the board's edge
-        [m]: from the former to the latter, and never if that is less."""
+    def distance_range_in_bounds(
+        self, standing: StandingObject, direction: Array
+    ) -> tuple[float, float]:
+        """Range of distances along a unit vector (2,) at which an object is within the board's
+        edges [m]; empty if the first is larger than the second."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            to_low = -one.footprint.low / direction
-            to_high = (self.size - one.footprint.high) / direction
+            to_low = -standing.footprint.low / direction
+            to_high = (self.size - standing.footprint.high) / direction
         distances = np.sort([to_low, to_high], axis=0)
         return float(distances[0].max()), float(distances[1].min())
 
-    def are_free(self, one: StandingObject, offsets: Array, least: float) -> NDArray[np.bool_]:
-        """Whether what it covers, moved by offsets (N, 2) [m], is at least that far [m] from all
-        that is there, (N,); what hangs above it and what is below the board is not in the way."""
+    def are_free(
+        self, standing: StandingObject, offsets: Array, min_gap: float
+    ) -> NDArray[np.bool_]:
+        """Whether an object's outline, moved by offsets (N, 2) [m], is at least `min_gap` [m] away
+        from all others (N,). Bodies that hang above it or are below the board do not count."""
         headroom = 0.005  # Metres between an object and one above it.
         free = np.ones(len(offsets), dtype=bool)
-        low, high = offsets + one.footprint.low, offsets + one.footprint.high
+        low, high = offsets + standing.footprint.low, offsets + standing.footprint.high
         for footprint, bottom, top in self._footprints:
-            if bottom <= one.outline.height + headroom and top >= 0.0:
+            if bottom <= standing.outline.height + headroom and top >= 0.0:
                 beside = np.maximum(footprint.low - high, low - footprint.high).max(axis=1)
-                near = np.flatnonzero(free & (beside < least + BOX_TOLERANCE))
+                near = np.flatnonzero(free & (beside < min_gap + BOX_TOLERANCE))
                 if len(near):
-                    around = footprint.no_fit_polygon(one.footprint)
-                    free[near] = distances_from_polygon(around, offsets[near]) >= least
+                    around = footprint.no_fit_polygon(standing.footprint)
+                    free[near] = distances_from_polygon(around, offsets[near]) >= min_gap
         return free
 
-    def is_free(self, one: StandingObject, offset: Array, least: float) -> bool:
-        """The same of one offset (2,)."""
-        return bool(self.are_free(one, offset[None], least)[0])
+    def is_free(self, standing: StandingObject, offset: Array, min_gap: float) -> bool:
+        """As `are_free`, for one offset (2,)."""
+        return bool(self.are_free(standing, offset[None], min_gap)[0])
 
     def pieces(self, first: StandingObject) -> list[ConvexShapes]:
-        """What of all that is there touches others, in the scene frame; one of them comes first."""
-        others = (one.pieces for one in self.standing if one is not first)
+        """Contact shapes of all objects and obstacles in the scene frame, beginning with those of
+        object `first`."""
+        others = (standing.pieces for standing in self.standing if standing is not first)
         return [first.pieces, *others, *self.obstacles]
 
 
@@ -163,8 +168,8 @@ def free_distance(
     limit: float,
     stop_below: float = -np.inf,
 ) -> float:
-    """How far shapes can be moved together along a unit vector (3,), at most `limit`, until they
-    touch others [m]; anything shorter than `stop_below`, once that is known to be too far."""
+    """Distance that shapes can be moved together along a unit vector (3,), at most `limit`, until
+    they touch others [m]; some value below `stop_below` if the distance is below that."""
     for others in still:
         if limit < stop_below:
             break
@@ -179,10 +184,10 @@ def free_distance(
 def draw_pose(
     wanted: ObjectRequest, shapes: ObjectShapes, rng: np.random.Generator, how: PoseChoice
 ) -> int:
-    """The number of a stable pose.
+    """Draws the number of a stable pose.
 
     Raises:
-        InvalidInputError: the one that is wanted does not exist.
+        InvalidInputError: the requested pose does not exist.
     """
     entry = shapes.library.entry(wanted.object)
     if wanted.pose is not None:
@@ -199,30 +204,34 @@ def draw_pose(
 
 
 def random_place(
-    occupied: OccupiedBoard, one: StandingObject, rng: np.random.Generator, least: float, tries: int
+    occupied: OccupiedBoard,
+    standing: StandingObject,
+    rng: np.random.Generator,
+    min_gap: float,
+    tries: int,
 ) -> tuple[StandingObject | None, int]:
-    """Draws places all over the board, evenly distributed, until one is free.
+    """Draws uniformly distributed places on the board until one is free.
 
     Args:
-        occupied: the board and what stands there.
-        one: the object.
-        rng: draws.
-        least: that it has to be away from others [m].
-        tries: places to look at.
+        occupied: the board and the objects on it.
+        standing: the object.
+        rng: random generator.
+        min_gap: least distance from other objects [m].
+        tries: number of places to try.
 
     Returns:
-        The object there, or None; and the number of places that were looked at.
+        The object at the free place, or None; and the number of places tried.
     """
-    low, high = -one.footprint.low, occupied.size - one.footprint.high
+    low, high = -standing.footprint.low, occupied.size - standing.footprint.high
     if (low > high).any():
         return None, tries
     offsets = rng.uniform(low, high, (tries, 2))
-    free = occupied.are_free(one, offsets, least)
+    free = occupied.are_free(standing, offsets, min_gap)
     first = int(free.argmax())
-    return (one.shifted(offsets[first]), first + 1) if free[first] else (None, tries)
+    return (standing.shifted(offsets[first]), first + 1) if free[first] else (None, tries)
 
 
 def to_instance(wanted: ObjectRequest, X_SO: Array) -> Instance:
-    """An instance whose pose can be read; it has no name of its own if that is its object's."""
+    """Makes an instance with a readable pose. Its name is left out if it equals the object's."""
     name = "" if wanted.name == wanted.object else wanted.name
     return Instance(name=name, object=wanted.object, X_SO=Pose.readable(X_SO))

@@ -26,26 +26,28 @@ PACKING_GAP = 3e-4
 def pack_objects(
     occupied: OccupiedBoard,
     objects: Sequence[tuple[ObjectShape, int]],
-    quarter: int = 0,
+    quarter_turns: int = 0,
     needs_all: bool = False,
 ) -> list[StandingObject | None]:
-    """Finds places, one object after the other, and adds them to what stands there.
+    """Packs objects one after the other, and adds them to the board.
 
     Args:
-        occupied: the board and what stands there.
-        objects: with the numbers of their stable poses.
-        quarter: turns of 90 degrees of the first one against the board.
-        needs_all: stop at the first one for which there is no room.
+        occupied: the board and the objects on it.
+        objects: objects with the numbers of their stable poses.
+        quarter_turns: rotation of the first object against the board, in turns of 90 degrees.
+        needs_all: stop at the first object without room.
 
     Returns:
-        None for those for which there is no room.
+        The placed objects; None for objects without room.
     """
     max_yaws = 10  # Yaws tried for each object.
     found: list[StandingObject | None] = [None] * len(objects)
     for i, (shape, pose) in enumerate(objects):
         best, best_area = None, np.inf
         yaws = _aligned_yaws(shape.outline(pose).hull.corners, occupied.standing)
-        for yaw in yaws[:max_yaws] if occupied.standing else yaws[quarter : quarter + 1]:
+        for yaw in (
+            yaws[:max_yaws] if occupied.standing else yaws[quarter_turns : quarter_turns + 1]
+        ):
             turned = place_in_stable_pose(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
             if place is not None and place_area < best_area - 1e-12:
@@ -59,19 +61,20 @@ def pack_objects(
 
 
 def packing_density(placed: Sequence[StandingObject]) -> float:
-    """Share of the convex hull of all footprints that they cover."""
+    """Share of the convex hull of all footprints that the footprints cover."""
     if not placed:
         return 0.0
-    hull = convex_polygon(np.concatenate([one.footprint.corners for one in placed]))
-    return sum(polygon_area(one.footprint.corners) for one in placed) / polygon_area(hull)
+    hull = convex_polygon(np.concatenate([standing.footprint.corners for standing in placed]))
+    return sum(polygon_area(standing.footprint.corners) for standing in placed) / polygon_area(hull)
 
 
 def _aligned_yaws(footprint: Array, others: Sequence[StandingObject]) -> list[float]:
-    """Yaws that lay the longest side of a footprint along a side of something [rad]."""
+    """Yaws that align the longest side of a footprint with the board's or the others' sides
+    [rad]."""
     own = _side_headings(footprint)[0]
     towards = [k * np.pi / 2.0 for k in range(4)]
-    for one in others[::-1]:
-        towards += [heading + np.pi for heading in _side_headings(one.footprint.corners)]
+    for standing in others[::-1]:
+        towards += [heading + np.pi for heading in _side_headings(standing.footprint.corners)]
     found: list[float] = []
     for heading in towards:
         yaw = float((heading - own) % (2.0 * np.pi))
@@ -91,12 +94,12 @@ def _side_headings(polygon: Array) -> Array:
 def _best_place(
     occupied: OccupiedBoard, turned: StandingObject
 ) -> tuple[StandingObject | None, float]:
-    """The place where the hull of all footprints is smallest, and its area [m^2]."""
+    """The place with the smallest hull of all footprints, and the hull's area [m^2]."""
     low, high = -turned.footprint.low, occupied.size - turned.footprint.high
     if (low > high).any():
         return None, np.inf
-    there = [one.footprint for one in occupied.standing]
-    coarse = [one.outline.coarse for one in occupied.standing]
+    there = [standing.footprint for standing in occupied.standing]
+    coarse = [standing.outline.coarse for standing in occupied.standing]
     points = (
         _touching_positions(turned.outline.coarse, coarse, low, high)
         if there
@@ -117,7 +120,7 @@ def _best_place(
 def _touching_positions(
     footprint: Footprint, there: Sequence[Footprint], low: Array, high: Array
 ) -> Array:
-    """Places (N, 2) of a footprint's origin at which it touches what is there, once or twice."""
+    """Places (N, 2) of a footprint's origin at which it touches one or two other footprints."""
     around = [_grow_polygon(other.no_fit_polygon(footprint)) for other in there]
     starts = np.concatenate(around)
     ends = np.concatenate([next_vertices(polygon) for polygon in around])
@@ -136,7 +139,7 @@ def _touching_positions(
 
 
 def _grow_polygon(polygon: Array) -> Array:
-    """A polygon that is larger by `PACKING_GAP` all around."""
+    """A polygon grown by `PACKING_GAP` on all sides."""
     along = next_vertices(polygon) - polygon
     normal = np.empty_like(along)
     normal[:, 0], normal[:, 1] = along[:, 1], -along[:, 0]

@@ -31,7 +31,7 @@ def previous_vertices(corners: Array) -> Array:
 
 
 def convex_polygon(points: Array) -> Array:
-    """The corners (M, 2) of the convex hull of points (N, 2) that span an area [m]."""
+    """Corners (M, 2) of the convex hull of points (N, 2), which must span an area [m]."""
     return np.asarray(points[ConvexHull(points).vertices])
 
 
@@ -51,14 +51,14 @@ def polygon_area(polygon: Array) -> float:
 
 
 def no_fit_polygon(still: Array, moving: Array) -> Array:
-    """Where a polygon's origin must not be, so that it does not overlap another one.
+    """No-fit polygon: the origins at which a moving polygon overlaps a fixed one.
 
     Args:
-        still: (N, 2) the other one.
-        moving: (M, 2) corners relative to the origin that is to be placed.
+        still: (N, 2) corners of the fixed polygon.
+        moving: (M, 2) corners relative to the moving polygon's origin.
 
     Returns:
-        The Minkowski difference (K, 2): the two touch where the origin is on its edge, and are as
+        The Minkowski difference (K, 2). The polygons touch if the origin is on its edge, and are as
         far apart as the origin is from it.
     """
     return _merge_sides(_polygon_sides(still), _polygon_sides(-moving))
@@ -85,8 +85,7 @@ def support_area(reach: Array) -> Array:
 
     Args:
         reach: (..., K) largest `direction . point` of a shape along K directions, such as those of
-            `SUPPORT_DIRECTIONS`: the result is the area of its convex hull, and a little above it
-            [m^2].
+            `SUPPORT_DIRECTIONS`. The result is slightly above the area of its convex hull [m^2].
     """
     step = 2.0 * np.pi / reach.shape[-1]
     before, after = np.roll(reach, 1, axis=-1), np.roll(reach, -1, axis=-1)
@@ -94,13 +93,13 @@ def support_area(reach: Array) -> Array:
     return np.asarray((reach * side).sum(axis=-1) / 2.0)
 
 
-def simplify_polygon(polygon: Array, most: float) -> Array:
-    """A polygon with fewer corners around a polygon: short sides are left out, and their
-    neighbours go on until they meet.
+def simplify_polygon(polygon: Array, max_excess: float) -> Array:
+    """Simplifies a polygon to an enclosing one with fewer corners: short sides are removed, and
+    their neighbours extended until they meet.
 
     Args:
         polygon: (N, 2).
-        most: that it may reach beyond a side that is left out [m].
+        max_excess: largest distance by which it may reach beyond a removed side [m].
     """
     while len(polygon) > 3:
         ends = next_vertices(polygon)
@@ -112,7 +111,7 @@ def simplify_polygon(polygon: Array, most: float) -> Array:
             beyond = -_cross(along, tip - polygon) / np.hypot(along[:, 0], along[:, 1])
         beyond = np.where((turn > 0.0) & (beyond >= 0.0), beyond, np.inf)
         k = int(beyond.argmin())
-        if beyond[k] > most:
+        if beyond[k] > max_excess:
             break
         polygon = polygon.copy()
         polygon[k] = tip[k]
@@ -121,14 +120,14 @@ def simplify_polygon(polygon: Array, most: float) -> Array:
 
 
 def distances_from_polygon(polygon: Array, points: Array) -> Array:
-    """Distances (M,) of points (M, 2) from a polygon [m], below 0 inside."""
+    """Distances (M,) of points (M, 2) from a polygon [m], negative inside."""
     side, beside = _distances_and_feet(polygon, points)
     inside = (side <= 0.0).all(axis=1)
     return np.asarray(np.where(inside, side.max(axis=1), np.hypot(side, beside).min(axis=1)))
 
 
 def exit_distance(polygon: Array, origin: Array, direction: Array) -> float:
-    """How far a point (2,) inside a polygon has to go along a unit direction (2,) to leave it."""
+    """Distance from a point (2,) inside a polygon to its edge along a unit direction (2,)."""
     along, to_corner = next_vertices(polygon) - polygon, polygon - origin
     speed = along[:, 1] * direction[0] - along[:, 0] * direction[1]
     room = along[:, 1] * to_corner[:, 0] - along[:, 0] * to_corner[:, 1]
@@ -141,8 +140,8 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _distances_and_feet(polygon: Array, points: Array) -> tuple[Array, Array]:
-    """Of points (M, 2) and the edges of a polygon (N, 2): how far the points are outside of the
-    edges' lines (M, N), and how far beyond the edges' ends, seen along them (M, N) [m]."""
+    """Distances of points (M, 2) outside the edges' lines of a polygon (N, 2), and beyond the
+    edges' ends along the lines; both (M, N) [m]."""
     along = next_vertices(polygon) - polygon
     length = np.hypot(along[:, 0], along[:, 1])
     along = along / length[:, None]
@@ -154,7 +153,7 @@ def _distances_and_feet(polygon: Array, points: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """A convex polygon. What follows from its corners is computed once, when it is first needed.
+    """A convex polygon. Derived properties are computed on first use.
 
     Attributes:
         corners: (N, 2) counter-clockwise [m].
@@ -164,17 +163,17 @@ class Footprint:
 
     @cached_property
     def low(self) -> Array:
-        """The lower corner (2,) of the box around it."""
+        """Lower corner (2,) of the bounding box."""
         return np.asarray(self.corners.min(axis=0))
 
     @cached_property
     def high(self) -> Array:
-        """The upper corner (2,) of the box around it."""
+        """Upper corner (2,) of the bounding box."""
         return np.asarray(self.corners.max(axis=0))
 
     @cached_property
     def middle(self) -> Array:
-        """The mean (2,) of its corners."""
+        """Mean (2,) of the corners."""
         return np.asarray(self.corners.mean(axis=0))
 
     @cached_property
@@ -188,9 +187,9 @@ class Footprint:
 
     @cached_property
     def _opposite_sides(self) -> PolygonSides:
-        """Its sides when it is turned by half a turn about the origin."""
+        """Sides of the polygon after half a turn about the origin."""
         return _polygon_sides(-self.corners)
 
     def no_fit_polygon(self, moving: Footprint) -> Array:
-        """Where another one's origin must not be, see the function of this name."""
+        """No-fit polygon of a moving footprint around this one; see the function of this name."""
         return _merge_sides(self._sides, moving._opposite_sides)

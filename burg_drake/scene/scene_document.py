@@ -101,10 +101,10 @@ class MarkerLayout:
 
 
 def marker_dictionary(name: str) -> Any:
-    """OpenCV's dictionary of a name (without `DICT_`, in any case).
+    """OpenCV's marker dictionary by name (without `DICT_`, in any case).
 
     Raises:
-        InvalidInputError: OpenCV has none of that name.
+        InvalidInputError: OpenCV has no dictionary of this name.
     """
     import cv2
 
@@ -123,7 +123,7 @@ def marker_layout(size: tuple[float, float], markers: Markers) -> MarkerLayout:
 
     Args:
         size: extents of the sheet along x and y [m].
-        markers: of the board.
+        markers: markers of the board.
 
     Raises:
         InvalidInputError: no marker, or not all of `count`, fit on the sheet; the dictionary does
@@ -191,10 +191,10 @@ class Board:
 
     @cached_property
     def layout(self) -> MarkerLayout:
-        """Where its markers lie; see `marker_layout`.
+        """Layout of the board's markers; see `marker_layout`.
 
         Raises:
-            InvalidInputError: they do not fit.
+            InvalidInputError: the markers do not fit.
         """
         return marker_layout(self.size, self.markers)
 
@@ -287,7 +287,8 @@ class SceneRecipe:
 
     @property
     def content(self) -> str:
-        """Hash of all but where library and station are: seeds of scenes follow from it."""
+        """Hash of all fields except the paths of library and station; seeds of scenes derive from
+        it."""
         return content_hash(dump_document(replace(self, library="", station="")))
 
 
@@ -309,8 +310,8 @@ class SamplingProvenance:
     versions: dict[str, str] = field(default_factory=dict)
 
     def differences(self, other: SamplingProvenance) -> list[str]:
-        """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those of packages that matter."""
+        """Differences in words; `other` is "here", this is "there". Libraries and stations are
+        compared by content, not by path, and versions only of packages that matter."""
         # Packages whose versions change sampled scenes.
         packages = ("burg_drake", "drake", "numpy", "scipy")
         found = []
@@ -446,11 +447,10 @@ class Scene:
         return {i.name or i.object: i for i in self.document.background}
 
     def require_markers(self) -> None:
-        """Refuses a board whose markers cannot be, before anything is done with them.
+        """Refuses a board with impossible markers.
 
         Raises:
-            InvalidInputError: see `marker_layout`; it names the file and the
-            key.
+            InvalidInputError: see `marker_layout`; the message names file and key.
         """
         try:
             _ = self.board.layout
@@ -480,8 +480,7 @@ class Scene:
 
     @cached_property
     def content(self) -> str:
-        """Hash of the placement and of every object in it; neither where files are nor the origin
-        counts."""
+        """Hash of the placement and of every object in it, independent of file paths and origin."""
         objects = {i.object for i in (*self.instances.values(), *self.background.values())}
         placed = plain_data(replace(self.document, description="", origin=None)) | {
             "name": "",
@@ -504,7 +503,8 @@ def load_scene(
 
     Args:
         reference: path of a scene file, or the bare name of a built-in scene.
-        library: loads a library, by its reference and the folder that this is relative to.
+        library: function that loads a library by its reference and the folder that this is relative
+            to.
 
     Raises:
         UnknownNameError: no such file or library, or an instance of an unknown object.
@@ -541,11 +541,11 @@ def load_scene(
 
 
 SceneLike = Scene | str | Path
-"""A scene, loaded or by what `load_scene` takes: a path, or the name of a built-in one."""
+"""A loaded scene, or an argument of `load_scene`: a path, or the name of a built-in scene."""
 
 
 def as_scene(scene: SceneLike) -> Scene:
-    """A scene, loaded if it is given by name.
+    """Returns a scene, loaded if it is given by name.
 
     Raises:
         UnknownNameError, DocumentError: see `load_scene`.
@@ -565,17 +565,17 @@ def save_scene(document: SceneDocument, path: str | Path) -> None:
 
 
 def scene_references(references: Iterable[str]) -> list[str]:
-    """References of scenes, each of them one scene.
+    """Expands folders and patterns into references of single scenes.
 
     Args:
-        references: of scenes as `load_scene` takes them; a folder stands for the scenes in it, and
-            a pattern, which a shell has not replaced, for the files that fit it.
+        references: scene references as for `load_scene`; folders, for all scenes in them; or
+            patterns, which the shell has not expanded, for matching files.
 
     Returns:
-        References in the order given, those of a folder or pattern sorted.
+        References in the given order, sorted within a folder or pattern.
 
     Raises:
-        InvalidInputError: a folder has no scenes, or no file fits a pattern.
+        InvalidInputError: a folder has no scenes, or no file matches a pattern.
     """
     found: list[str] = []
     for reference in references:

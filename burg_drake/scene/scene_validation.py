@@ -37,17 +37,17 @@ IssueKind = Literal[
 
 @dataclass(frozen=True, kw_only=True)
 class SceneIssue:
-    """Something about a scene that its author should know.
+    """An error or warning about a scene.
 
     Attributes:
-        instance: name of the instance it is about.
-        kind: what is wrong. `hovering`, `sunken` (in the table, which bears it there) and
-            `surface_overlap` (only the surfaces overlap, not what objects touch others with) are
-            warnings, all else are errors.
-        amount: how far beyond, below, above or into something [m].
+        instance: name of the instance.
+        kind: kind of the issue. `hovering`, `sunken` (in the table, which carries it there) and
+            `surface_overlap` (only the surfaces overlap, not the contact geometry) are warnings,
+            all other kinds are errors.
+        amount: distance beyond, below or above something, or penetration depth [m].
         message: one clear line.
-        other: what it overlaps or hovers above: another instance, the table, the board, or a body
-            of the station.
+        other: body that it overlaps or hovers above: another instance, the table, the board, or a
+            body of the station.
     """
 
     instance: str
@@ -58,17 +58,17 @@ class SceneIssue:
 
     @property
     def is_error(self) -> bool:
-        """Grasps of this scene would be judged in a world other than the document's."""
+        """Whether grasps would be evaluated in a world that differs from the document's."""
         return self.kind not in ("hovering", "sunken", "surface_overlap")
 
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """The box around a placed object, along the axes of the board.
+    """Bounding box of a placed object, along the axes of the board.
 
     Attributes:
         low, high: (3,) its corners in the scene frame [m].
-        support: height of the lowest point of what it rests with, in the scene frame [m].
+        support: height of the lowest point of its contact geometry, in the scene frame [m].
     """
 
     low: Array
@@ -77,25 +77,25 @@ class Extent:
 
     @classmethod
     def of(cls, p_SV: Array, p_SC: Array) -> Extent:
-        """The box around points (N, 3) of an object that rests with points (M, 3)."""
+        """Makes the extent of an object with points (N, 3) and contact points (M, 3)."""
         return cls(p_SV.min(axis=0), p_SV.max(axis=0), float(p_SC[:, 2].min()))
 
 
 def validate_scene(
     scene: SceneLike, extents: Mapping[str, Extent] | None = None
 ) -> tuple[SceneIssue, ...]:
-    """Checks where the instances of a scene stand on the board.
+    """Checks the placement of a scene's instances on the board.
 
-    What hovers above another object goes by the boxes around both, so that nothing is told of what
-    may be in a mug; `SceneCheck` looks at their shapes.
+    Hovering above another object is judged by bounding boxes, so that an object inside a mug is not
+    reported; `SceneCheck` uses the shapes.
 
     Args:
         scene: the scene; fixed background objects may stand anywhere.
-        extents: of all instances, background included, if they are known; read from the library's
-            meshes otherwise.
+        extents: extents of all instances, including background, if known; otherwise read from the
+            library's meshes.
 
     Returns:
-        What was found, in the order of the document; nothing if all is well.
+        Issues in the order of the document; empty if there are none.
     """
     scene = as_scene(scene)
     if extents is None:
@@ -136,12 +136,12 @@ def placed_vertices(scene: Scene, instance: str) -> Array:
 
 
 def support_vertices(library: ObjectLibrary, name: str) -> Array:
-    """(N, 3) points of an object with which it rests on a plane, in the object frame [m]: of its
-    primitive, else of its pieces; of its surface if it has none.
+    """(N, 3) points of an object's primitive, else its pieces, else its surface, in the object
+    frame [m]; it rests on a plane with these.
 
     Raises:
         UnknownNameError: there is no such object, or one of its files is missing.
-        MeshError: one is damaged.
+        MeshError: one of its files is damaged.
     """
     entry = library.entry(name)
     if entry.contact.primitive is None and not entry.pieces:
@@ -175,10 +175,10 @@ def read_library_vertices(library: ObjectLibrary, file: str) -> Array:
 
 
 def read_vertices(mesh: Path) -> Array:
-    """(N, 3) vertices of an .obj file as a library holds it.
+    """(N, 3) vertices of an .obj file of a library.
 
     Raises:
-        OSError, ValueError: it cannot be read, or holds no vertices.
+        OSError, ValueError: the file cannot be read, or holds no vertices.
     """
     status = mesh.stat()
     return _cached_vertices(mesh, status.st_mtime_ns, status.st_size)
@@ -186,7 +186,7 @@ def read_vertices(mesh: Path) -> Array:
 
 @functools.lru_cache(maxsize=32)
 def _cached_vertices(mesh: Path, changed: int, size: int) -> Array:
-    """As `read_vertices`, read-only; of files read before, what was in them."""
+    """As `read_vertices`, cached by file, modification time and size; the array is read-only."""
     rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
     p_OV = np.array(rows, dtype=float).reshape(-1, 3)
     if not len(p_OV) or not np.isfinite(p_OV).all():
@@ -252,12 +252,12 @@ def _hovering_issue(name: str, extent: Extent, others: Mapping[str, Extent]) -> 
 
 
 def hovering_issue(name: str, height: float, below: str) -> SceneIssue:
-    """Says that an instance hovers.
+    """Issue for a hovering instance.
 
     Args:
-        name: of the instance.
-        height: how far it falls [m].
-        below: name of what it falls on; `BOARD_NAME`, or empty if nothing is below it.
+        name: name of the instance.
+        height: height of its fall [m].
+        below: name of the object that it falls on, or `BOARD_NAME`; empty if nothing is below it.
     """
     where = "the board" if below == BOARD_NAME else repr(below)
     hovers = f"hovers {length_text(height)} above {where}" if below else "has nothing below it"
@@ -271,12 +271,12 @@ def hovering_issue(name: str, height: float, below: str) -> SceneIssue:
 
 
 def reaches_into_ground(surface: float) -> bool:
-    """Whether a surface whose lowest point is at this height over the ground [m] reaches into it:
-    if not, the object stands there, however far what it rests with in simulation reaches."""
+    """Whether a surface with its lowest point at this height over the ground [m] reaches into it.
+    If not, the object stands on the ground, whatever the height of its contact geometry."""
     rounding_tolerance = 1e-4  # Metres below the ground, because of rounding.
     return surface < -rounding_tolerance
 
 
 def length_text(length: float) -> str:
-    """A length [m] for people."""
+    """A length [m] as text."""
     return f"{length * 1e3:.1f} mm" if length < 0.1 else f"{length:.3g} m"

@@ -39,23 +39,22 @@ from burg_drake.station import (
 
 
 class CommandSequence:
-    """Trajectories one after the other, by steps of the simulation; the end of the last one from
-    then on.
+    """Samples consecutive trajectories at the simulation's steps, then holds the last position.
 
-    A trajectory begins at the step at which the one before it has ended, at most a step late.
+    A trajectory begins at the first step after the previous one has ended.
 
     Args:
         trajectories: at least one; each begins where the one before it ends.
-        step: of the simulation [s].
-        steps_per_check: steps from one look at the contacts to the next.
+        step: time step of the simulation [s].
+        steps_per_check: steps between contact checks.
         forward: (K, 3) positions of the grasp frame in the world at arm positions (K, n) [m].
-        rest: looks that follow after the end.
+        rest: contact checks after the end.
 
     Attributes:
         steps_per_check: as given.
-        checks: from start to end.
+        checks: number of contact checks from start to end.
         desired: (S + 1, 2 n) positions and velocities, by steps since the start.
-        p_WG: (looks + 1, 3) where that leads the grasp frame in the world, by looks [m].
+        p_WG: (checks + 1, 3) positions of the grasp frame in the world at the contact checks [m].
     """
 
     def __init__(
@@ -76,17 +75,17 @@ class CommandSequence:
         self.p_WG = forward(np.array([self.q_at_check(check) for check in range(self.checks + 1)]))
 
     def at(self, step: int) -> Array:
-        """(2 n,) positions and velocities to be reached at the end of a step since the start."""
+        """Desired positions and velocities (2 n,) at the end of a step, counted from the start."""
         desired: Array = self.desired[min(step, len(self.desired) - 1)]
         return desired
 
     def q_at_check(self, check: int) -> Array:
-        """(n,) desired positions some looks after the start."""
+        """Desired positions (n,) at a contact check, counted from the start."""
         return self.at(check * self.steps_per_check)[: self.desired.shape[1] // 2]
 
 
 def _desired_states(trajectory: Trajectory, time: Array) -> Array:
-    """(T, 2 n) positions and velocities at times (T,)."""
+    """Positions and velocities (T, 2 n) of a trajectory at times (T,)."""
     v = [np.interp(time, trajectory.t, column) for column in trajectory.v.T]
     return np.concatenate([trajectory.at(time), np.stack(v, axis=1)], axis=1)
 
@@ -95,15 +94,15 @@ class ArmCarrier:
     """Moves the hand with the arm; see `Carrier`.
 
     Commands change at every step of the simulation, which is what a real arm's controller gets (a
-    Panda's takes one a millisecond). The servos are part of a step, so that they are told what is
-    wanted at its end.
+    Panda's takes one a millisecond). The servos are part of a step, so each command is the state
+    desired at its end.
 
     Args:
-        world: that of a trial with an arm which has been brought to its start.
+        world: of a trial with an arm, prepared for its start.
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
-        segments: from there on, at least one; the hand goes straight on each.
-        closed: how far the fingers can close at a grasp (4, 4) in the world before they touch.
+        segments: from the grasp on, at least one; the hand moves straight on each.
+        closed: how far the fingers can close at a grasp (4, 4) in the world before contact.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
@@ -144,7 +143,7 @@ class ArmCarrier:
 
     @property
     def touched(self) -> str:
-        """The first touch that was not planned."""
+        """The robot's first unplanned contact; see `TrialResult`."""
         return self._touches.first
 
     def approach(self) -> None:
@@ -152,8 +151,8 @@ class ArmCarrier:
         self._follow(self._approach)
 
     def close(self) -> None:
-        """Closes the hand; the fingers begin where they would touch something first, as nothing
-        happens before, unless something has been moved."""
+        """Closes the hand. If nothing has been moved, the fingers start just before the first
+        contact."""
         self._arrived = True
         self._follow(None)
         world = self._world
@@ -170,11 +169,11 @@ class ArmCarrier:
             self._follow(self._commands[number])
 
     def stop(self) -> None:
-        """Stays where the last segment ends."""
+        """Holds the arm at the end of the last segment."""
         self._follow(None)
 
     def advance_to(self, time: float) -> None:
-        """Steps, with a command of its own for each step."""
+        """Advances the simulation, with a new command for each step."""
         context, simulator = self._world.context, self._world.simulator
         if self._current is None:
             simulator.AdvanceTo(time)
@@ -185,22 +184,22 @@ class ArmCarrier:
             simulator.AdvanceTo(step * self._step)
 
     def watch(self, contacts: list[BodyContact]) -> str:
-        """Looks at the whole robot's contacts, and at how well it follows its command."""
+        """Checks the contacts of the whole robot, and records its tracking error."""
         if self._current is not None:
             self._track(self._current)
         return self._touches.update(contacts, self._arrived)
 
     def travelled(self) -> float:
-        """Of the grasp frame since the beginning of a segment as it was commanded [m]."""
+        """Commanded distance of the grasp frame from the start of its segment [m]."""
         p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
         p_GG_W = p_WG - self._commands[self._number].p_WG[0]
         return float(p_GG_W @ self.segments[self._number].direction_W)
 
     def carries_full_load(self, check: int) -> bool:
-        """Compares what gravity and acceleration of the planned motion have loaded and will.
+        """Compares past and future loads from gravity and the planned acceleration.
 
-        Not straight up, the load when the hand brakes is another one than when it accelerates, and
-        both count.
+        Unless the hand moves straight up, braking and accelerating load the grip in different
+        directions, and both count.
         """
         polls = self._world.settings.steady_polls
         window = self._loads[max(0, check + 1 - polls) : check + 1]
@@ -209,7 +208,7 @@ class ArmCarrier:
         return bool(brakes and ahead <= 1.01 * window.max())
 
     def is_free_ahead(self) -> bool:
-        """Looks along the planned motion."""
+        """Checks the rest of the planned motion for collisions."""
         spacing = 0.01  # Metres of the hand's path between checks of the rest of the lift.
         commands = self._commands[-1]
         check = self._checks_done(commands)
@@ -221,7 +220,7 @@ class ArmCarrier:
         return self._lift_clearance().is_free(self._world, q)
 
     def _follow(self, commands: CommandSequence | None) -> None:
-        """Follows a course from now on; without one the last command stays."""
+        """Follows a sequence of commands from now on; None keeps the last command."""
         self._current = commands
         self._start = self._steps(self._world.context.get_time())
 
@@ -229,7 +228,7 @@ class ArmCarrier:
         return round(time / self._step)
 
     def _checks_done(self, commands: CommandSequence) -> int:
-        """Looks since the start of the course that is followed."""
+        """Number of contact checks since the start of the command sequence."""
         steps = self._steps(self._world.context.get_time()) - self._start
         return steps // commands.steps_per_check
 
@@ -244,7 +243,7 @@ class ArmCarrier:
 
 
 def _hand_segment(commands: CommandSequence) -> HandSegment:
-    """The straight segment along which a course leads the hand."""
+    """The straight segment along which a command sequence moves the hand."""
     p_GG_W = commands.p_WG[-1] - commands.p_WG[0]
     # A plan may leave its straight segment by half a millimetre.
     direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), 3)
@@ -253,8 +252,8 @@ def _hand_segment(commands: CommandSequence) -> HandSegment:
 
 
 def _specific_loads(p_WG: Array, interval: float, gravity: float) -> Array:
-    """(L,) what gravity and the acceleration of the hand load on a target in it, over its mass
-    [m/s^2], in each interval between positions (L + 1, 3)."""
+    """Load of gravity and the hand's acceleration on a held target per mass (L,) [m/s^2], in each
+    interval between positions (L + 1, 3)."""
     velocity = np.diff(p_WG, axis=0) / interval
     velocity = np.concatenate([np.zeros((1, 3)), velocity, np.zeros((1, 3))])
     at_ends = np.diff(velocity, axis=0) / interval
@@ -286,7 +285,7 @@ class ArmTrial(DrakeTrial):
         settings: phases of a trial; the hand's paths come from the plan, so that `motion` and
             `lift_time` do not count.
         transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
-            its contacts are looked at after every step up to the grasp, and not only at `poll`.
+            contacts are checked after every step up to the grasp, and not only at `poll`.
         clearance: the screen of the open hand in this scene, if there is one already.
         meshcat: where to show the trials; recording is the caller's.
 
@@ -362,7 +361,7 @@ class ArmTrial(DrakeTrial):
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
         self._check_plan(plan, X_WG)
-        # Which finger is on which side is the plan's; of a hand that is not symmetric that matters.
+        # The plan decides which finger is on which side; that matters if the hand is not symmetric.
         as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
         if rotation_angle(X_WG[:3, :3].T @ as_planned) > MAX_PLAN_ANGLE:
             X_WG = swap_fingers(X_WG)
@@ -381,15 +380,15 @@ class ArmTrial(DrakeTrial):
         mass: float | None = None,
         world: TrialWorld | None = None,
     ) -> Execution:
-        """Brings the Context to the start of a trial; nothing of an earlier one remains.
+        """Resets the Context to the start of a trial.
 
         All objects, the target among them, are locked until something moving touches them.
 
         Args:
             instance: the target.
-            plan: where the arm goes.
+            plan: the arm's motion.
             friction, mass: as in `run`.
-            world: in which it runs; by default the complete one.
+            world: world of the trial; by default the complete one.
         """
         world = self._use_world(world)
         assert isinstance(world.hand, MountedHand)
@@ -415,11 +414,11 @@ class ArmTrial(DrakeTrial):
         return Execution(world, target, moving, carrier)
 
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
-        """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
-        the grasp are all that can be told.
+        """Checks that a plan is for this scene, arm and grasp; without an origin, for arm and grasp
+        only.
 
         Raises:
-            InvalidInputError: it is not.
+            InvalidInputError: the plan is for another one.
         """
         if plan.origin is not None:
             plan.require_for(self.scene, self.station)
@@ -455,7 +454,7 @@ class ArmTrial(DrakeTrial):
             )
 
     def _X_WG_at(self, q: Array) -> Array:
-        """(K, 4, 4) grasp frames in the world at arm positions (K, n)."""
+        """Grasp frames in the world (K, 4, 4) at arm positions (K, n)."""
         return self._X_WA @ self._kinematics.forward(q)[0] @ self.station.hand.X_HG.matrix()
 
     def _p_WG(self, q: Array) -> Array:
@@ -463,6 +462,6 @@ class ArmTrial(DrakeTrial):
 
 
 def _phases_with_target(plan: Plan) -> list[Trajectory]:
-    """Those of retreat and lift that move the hand."""
+    """The phases of retreat and lift in which the hand moves."""
     parts = [plan.retreat, plan.lift]
     return [part for part in parts if part is not None and (part.q[-1] != part.q[0]).any()]

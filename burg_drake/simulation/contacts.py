@@ -101,7 +101,7 @@ class ContactReader:
 
     @staticmethod
     def has_any(results: ContactResults, geometries: Collection[GeometryId]) -> bool:
-        """Whether one of these geometries meets something at a point."""
+        """Whether one of the geometries is in point contact."""
         pairs = map(results.point_pair_contact_info, range(results.num_point_pair_contacts()))
         points = (pair.point_pair() for pair in pairs)
         return any(p.id_A in geometries or p.id_B in geometries for p in points)
@@ -129,7 +129,7 @@ def finger_contact(
 def touched_bodies(
     contacts: list[BodyContact], moving: Collection[BodyIndex], still: Collection[BodyIndex]
 ) -> set[BodyIndex]:
-    """Those of the bodies in `still` that a body in `moving` touches."""
+    """The bodies in `still` that a body in `moving` touches."""
     found = set()
     for contact in contacts:
         one, other = contact.body_A, contact.body_B
@@ -141,12 +141,12 @@ def touched_bodies(
 
 
 def is_touched_from_outside(contacts: list[BodyContact], bodies: Collection[BodyIndex]) -> bool:
-    """Whether one of the bodies touches a body that is not one of them."""
+    """Whether one of the bodies touches a body outside the collection."""
     return any((c.body_A in bodies) != (c.body_B in bodies) for c in contacts)
 
 
 class NamedBodies(Protocol):
-    """A world with a robot, and what people call its bodies; see `StationDiagram`."""
+    """A world with a robot, and the display names of its bodies; see `StationDiagram`."""
 
     @property
     def body_names(self) -> Mapping[BodyIndex, str]: ...
@@ -159,15 +159,15 @@ class NamedBodies(Protocol):
 
 
 class RobotContactWatch:
-    """Watches a robot.
+    """Finds contacts that stop a robot, and its first unplanned contact.
 
     Args:
         world: with a robot.
-        links: the arm's bodies, without the hand's; none of the hand alone.
+        links: the arm's bodies, without the hand's; empty for the hand alone.
         target: the body to be grasped.
 
     Attributes:
-        first: the first such touch, "panda_link5 vs can"; "" if there was none.
+        first: the first unplanned contact, "panda_link5 vs can"; "" if there was none.
     """
 
     def __init__(self, world: NamedBodies, links: Collection[BodyIndex], target: BodyIndex) -> None:
@@ -180,17 +180,17 @@ class RobotContactWatch:
         self.first = ""
 
     def update(self, contacts: Collection[BodyContact], arrived: bool) -> str:
-        """Takes down the contacts of a look.
+        """Evaluates the contacts of one check.
 
         Args:
-            contacts: all that there are.
-            arrived: whether the hand has come to the grasp, from when on it may touch target and
+            contacts: all present contacts.
+            arrived: whether the hand has reached the grasp; from then on it may touch target and
                 table.
 
         Returns:
-            What stops the robot: "panda_link5 vs shelf" of a link that touches something fixed or
-            another link, "shelf" of the hand; on the way to the grasp `table`, if the hand presses
-            on it with more than 20 N. "" if nothing does.
+            The obstacle that stops the robot: "panda_link5 vs shelf" if a link touches something
+            fixed or another link, "shelf" if the hand does; `table` if the hand presses on it with
+            more than 20 N on its approach. "" if the robot can go on.
         """
         stops, on_table = [], np.zeros(3)
         for contact in contacts:
@@ -226,8 +226,8 @@ class Neighbours:
     def __init__(self, station_diagram: StationDiagram) -> None:
         self._beside = touching_bodies(station_diagram, station_diagram.free.values())
 
-    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
-        """The bodies, their neighbours, the neighbours of these, and so on."""
+    def with_neighbours(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies and all bodies connected to them through neighbours."""
         found, fresh = set(), set(bodies)
         while fresh:
             found |= fresh
@@ -236,7 +236,7 @@ class Neighbours:
 
 
 def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
-    """The free objects, where the documents place them, by islands.
+    """Groups the free objects that touch each other where the documents place them.
 
     Args:
         built: a built diagram.
@@ -244,7 +244,7 @@ def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
     neighbours, left = Neighbours(built), list(built.free.values())
     found = []
     while left:
-        island = neighbours.close_to([left[0]])
+        island = neighbours.with_neighbours([left[0]])
         found.append([index for index in left if index in island])
         left = [index for index in left if index not in island]
     return found
@@ -253,12 +253,12 @@ def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
 def assign_friction(
     built: StationDiagram, root: Context, bodies: Iterable[BodyIndex], friction: float
 ) -> None:
-    """Gives bodies one coefficient of friction in a Context.
+    """Sets the friction coefficient of bodies in a Context.
 
     Args:
         built: the diagram.
         root: its Context.
-        bodies: of the plant.
+        bodies: bodies of the plant.
         friction: static and dynamic coefficient.
     """
     graph, source = built.scene_graph, built.plant.get_source_id()
@@ -272,12 +272,12 @@ def assign_friction(
 
 
 def freeze_bodies(built: StationDiagram, root: Context, bodies: Collection[BodyIndex]) -> None:
-    """Locks bodies, and takes their contacts with each other and with what is fixed out.
+    """Locks bodies, and excludes contacts among them and with fixed bodies.
 
     Args:
         built: the diagram.
         root: its Context.
-        bodies: free ones.
+        bodies: free bodies.
     """
     if not bodies:
         return

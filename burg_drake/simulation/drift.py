@@ -1,7 +1,7 @@
-"""How far the objects of a simulated scene move, and a prediction of which will not stay.
+"""How far the objects of a simulated scene move, and a prediction of which ones drift.
 
-Creep in Drake has nearly the same speed whatever the time step: within 2 % in steps of 1 and 10
-ms. 0.2 s tell most objects that stay from the others. Objects that lean on others or rock are
+Creep in Drake has nearly the same speed whatever the time step: within 2 % in steps of 1 and 10 ms.
+0.2 s distinguish most stable objects from drifting ones. Objects that lean on others or rock are
 simulated for up to 2 s, while all else is frozen; that predicts 0.9 to 1.05 times the motion.
 """
 
@@ -53,14 +53,14 @@ def stillness(
     duration: float = StillnessLimits.duration,
     engine: Engine | str = ENGINES["reference"],
 ) -> Mapping[str, Displacement]:
-    """Simulates a scene as it stands, without the robot, and tells how far each object moves.
+    """Simulates a scene without the robot, and measures how far each object moves.
 
-    The world is that of `build_station_diagram` with this engine, and resists rolling, which
-    trials do not.
+    The world is that of `build_station_diagram` with this engine, and resists rolling, which trials
+    do not.
 
-    An object that touches nothing but the table may sink straight into it, as far as the table
-    yields to what stands on it: that is no movement. `settle_scene` lifts such objects onto the
-    table, and they sink in again.
+    The depth by which an object that touches only the table sinks straight into the compliant table
+    does not count as motion. `settle_scene` lifts such objects onto the table, and they sink in
+    again.
 
     Args:
         scene: the scene.
@@ -69,8 +69,8 @@ def stillness(
         engine: how time is stepped.
 
     Returns:
-        By free instance: how far it is at the end from where the document places it, without how
-        far it has sunk into the table if it stands there alone.
+        Displacement of each free instance from its pose in the document, by name; without the depth
+        it sank into the table if it touches nothing else.
 
     Raises:
         InvalidInputError: the duration is not above 0.
@@ -99,7 +99,7 @@ def stillness(
 
 
 def _without_sinking(built: StationDiagram, name: str, X_WO: Array) -> Array:
-    """`X_WO` without how far the instance has sunk straight into the table since the start."""
+    """`X_WO` raised by the depth that the instance has sunk straight into the table."""
     center_of_mass = np.array((*built.scene.entry(name).mass_properties.center_of_mass, 1.0))
     lowered = float(((built.X_WO(name) - X_WO) @ center_of_mass)[2])
     sunk = min(lowered, depth_in_table(built.scene, X_WO, name), MAX_SINK_DEPTH)
@@ -109,13 +109,12 @@ def _without_sinking(built: StationDiagram, name: str, X_WO: Array) -> Array:
 
 
 def is_still(displacements: Mapping[str, Displacement]) -> bool:
-    """Whether nothing has moved further than a settled scene may."""
+    """Whether all displacements are within the limits of a settled scene."""
     return all(map(_has_stayed, displacements.values()))
 
 
 def _has_stayed(moved: Displacement, share: float = 1.0) -> bool:
-    """Whether an object has moved less than a share of what one of a settled scene may move in
-    `StillnessLimits.duration`; NaN is not less."""
+    """Whether a displacement is below a share of `StillnessLimits`; False for NaN."""
     limits = StillnessLimits
     return moved.distance < share * limits.distance and moved.angle < share * limits.angle
 
@@ -126,14 +125,14 @@ DRIFT_CHECK_TIMES = ((0.1, 0.2, 0.1), (0.2, 0.4, 0.4), (0.5, 1.0, 0.4), (1.0, 2.
 
 @dataclass(frozen=True)
 class DriftPrediction:
-    """What becomes of a scene that is let go.
+    """Predicted drift of a scene that is released.
 
     Attributes:
-        moving: free objects that would move further in `StillnessLimits.duration` than those of a
-            settled scene may, with their mean speed in that time, by name.
-        X_WO: (4, 4) poses in the world of the free objects that are still on the table, by name: at
-            the end for those that were in doubt until then, else as in the document.
-        doubtful: those that were in doubt until the end, and what touches them.
+        moving: mean speed of each free object that would exceed `StillnessLimits` within their
+            duration, by name.
+        X_WO: (4, 4) poses in the world of the free objects that are still on the table, by name:
+            final poses of doubtful objects, else those of the document.
+        doubtful: objects that were simulated until the end, and the objects that touch them.
     """
 
     moving: Mapping[str, BodySpeed]
@@ -141,8 +140,8 @@ class DriftPrediction:
     doubtful: frozenset[str]
 
     @property
-    def pace(self) -> float:
-        """Of the fastest one, in shares of what a settled scene may go."""
+    def relative_speed(self) -> float:
+        """Speed of the fastest object relative to the limit of a settled scene."""
         shares = [
             max(moved.speed / StillnessLimits.distance, moved.turning / StillnessLimits.angle)
             for moved in self.moving.values()
@@ -153,13 +152,13 @@ class DriftPrediction:
 def predict_drift(
     built: StationDiagram, *, among: Collection[str] | None = None, once: bool = False
 ) -> DriftPrediction:
-    """Lets a scene go, from where the documents place everything.
+    """Simulates a scene from the poses in the documents, and predicts which objects drift.
 
     Args:
         built: the scene without a robot.
-        among: free objects to look at, with all that touches them; others are known to stay. All if
-            None.
-        once: leave it at the first look by which something does not stay.
+        among: free objects to simulate, with all objects that touch them; others are known to stay.
+            All if None.
+        once: stop at the first check at which an object drifts.
 
     Raises:
         RuntimeError, SystemExit: from Drake.
@@ -169,17 +168,19 @@ def predict_drift(
     for start, end, share in DRIFT_CHECK_TIMES:
         shifts = watch.check_between(start, end)
         watch.freeze_all_but([n for n, shift in shifts.items() if not _has_stayed(shift, share)])
-        if not watch.awake or (once and not all(map(_has_stayed, shifts.values()))):
+        if not watch.moving_objects or (once and not all(map(_has_stayed, shifts.values()))):
             break
-    doubtful = frozenset(watch.awake)
+    doubtful = frozenset(watch.moving_objects)
     kept = {name: built.X_WO(name) for name in built.free if name not in doubtful}
     last = DRIFT_CHECK_TIMES[-1][-1]
-    moving = {n: _mean_speed(shifts[n]) for n in watch.awake if not _has_stayed(shifts[n], last)}
+    moving = {
+        n: _mean_speed(shifts[n]) for n in watch.moving_objects if not _has_stayed(shifts[n], last)
+    }
     return DriftPrediction(moving, kept | watch.on_table(), doubtful)
 
 
 class _DriftSimulation:
-    """A scene that is simulated, and looked at now and then."""
+    """Simulation of a scene, with checks of its motion between two times."""
 
     def __init__(self, built: StationDiagram) -> None:
         self._built, self._plant = built, built.plant
@@ -192,12 +193,12 @@ class _DriftSimulation:
         self._names = {index: name for name, index in built.free.items()}
 
     @property
-    def awake(self) -> list[str]:
+    def moving_objects(self) -> list[str]:
         """Objects that are not frozen."""
         return [self._names[index] for island in self._islands for index in island]
 
     def freeze_all_but(self, names: Iterable[str]) -> None:
-        """Freezes all objects but these and what touches them."""
+        """Freezes all objects except the named ones and the objects that touch them."""
         chosen = {self._built.free[name] for name in names}
         for island in self._islands:
             if chosen.isdisjoint(island):
@@ -205,9 +206,10 @@ class _DriftSimulation:
         self._islands = [i for i in self._islands if not chosen.isdisjoint(i)]
 
     def check_between(self, start: float, end: float) -> dict[str, Displacement]:
-        """How far what is awake would move altogether, by its pace from `start` to `end` [s]."""
+        """Displacements of the moving objects, extrapolated from their speed from `start` to `end`
+        [s]."""
         built, context = self._built, self._context
-        bodies = {name: self._plant.get_body(built.free[name]) for name in self.awake}
+        bodies = {name: self._plant.get_body(built.free[name]) for name in self.moving_objects}
         self._simulator.AdvanceTo(start)
         before = {name: body_place(body, context) for name, body in bodies.items()}
         self._simulator.AdvanceTo(end)
@@ -221,9 +223,11 @@ class _DriftSimulation:
         return shifts
 
     def on_table(self) -> dict[str, Array]:
-        """Poses in the world of what is awake and still on the table."""
+        """Poses in the world of the moving objects that are still on the table."""
         built, X_WO = self._built, free_poses(self._built, self._context)
-        above = (n for n in self.awake if not is_below(built, self._context, built.free[n]))
+        above = (
+            n for n in self.moving_objects if not is_below(built, self._context, built.free[n])
+        )
         return {name: X_WO[name] for name in above}
 
 

@@ -25,16 +25,16 @@ from burg_drake.station import StationDiagram, make_compliant
 
 
 def compliant_while_falling(built: StationDiagram) -> list[str]:
-    """Free objects of few pieces that are in the air or below one that is.
+    """Names of free objects of few pieces that are in the air, or below an object in the air.
 
     Args:
-        built: a diagram; all is where the documents place it.
+        built: a diagram, with all objects where the documents place them.
     """
     lateral_margin = 0.01  # Metres between bounding boxes, seen from above.
     bounds = {name: _world_bounds(built, name) for name in built.free}
     found: set[str] = set()
     for lower, upper in bounds.values():
-        # Higher above the table an object stands on another one or falls.
+        # Objects higher above the table stand on another object or fall.
         if lower[2] < 0.0005:
             continue
         for other, (low, high) in bounds.items():
@@ -68,12 +68,12 @@ SLOW_CRITERION = RestCriterion(speed=0.01, turning=0.1, dying=6.0)
 
 @dataclass(frozen=True)
 class FallResult:
-    """Where a fall ended.
+    """Final state of a simulated fall.
 
     Attributes:
-        X_WO: (4, 4) poses of what is still on the table, by name.
+        X_WO: (4, 4) poses of the objects that are still on the table, by name.
         fallen: objects that fell off the table.
-        moving: objects on the table that are not slow, with their speed.
+        moving: speed of each object on the table that is not slow, by name.
         duration: simulated time [s].
     """
 
@@ -91,16 +91,16 @@ def fall(
     held: Collection[BodyIndex] = (),
     before_poll: Callable[[Context, Collection[BodyIndex]], None] | None = None,
 ) -> FallResult:
-    """Simulates until all objects are slow, or time is up.
+    """Simulates until all objects are slow, or the time limit is reached.
 
     Args:
         built: the scene without a robot; everything starts where the documents place it.
         time_limit: simulated time allowed [s].
-        progress: called now and then with the simulated time since the last call [s] and how many
-            objects still move.
-        held: free bodies that stay where they are.
-        before_poll: called now and then with the plant's Context, whose velocities it may change,
-            and what falls.
+        progress: called regularly with the simulated time since the last call [s] and the number of
+            objects that still move.
+        held: free bodies that are locked.
+        before_poll: called regularly with the plant's Context, whose velocities it may change, and
+            the falling bodies.
 
     Raises:
         RuntimeError, SystemExit: from Drake, or a pose is not finite.
@@ -116,7 +116,7 @@ def fall(
         watched = [index for index, name in names.items() if name not in fallen]
 
         def intervene(watched: list[BodyIndex] = watched) -> None:
-            _brake(built, context, watched, SLOW_CRITERION.poll)
+            _damp_rotation(built, context, watched, SLOW_CRITERION.poll)
             if before_poll is not None:
                 before_poll(context, watched)
 
@@ -144,11 +144,11 @@ def fall(
 
 
 def free_poses(built: StationDiagram, context: Context) -> dict[str, Array]:
-    """Where the free instances are: (4, 4) poses in the world by name.
+    """Poses (4, 4) of the free instances in the world, by name.
 
     Args:
         built: the scene.
-        context: of its plant.
+        context: Context of its plant.
     """
     return {
         name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
@@ -169,10 +169,10 @@ def is_below(built: StationDiagram, context: Context, index: BodyIndex) -> bool:
     return bool(p_WOcm[2] < 0.0)
 
 
-def _brake(
+def _damp_rotation(
     built: StationDiagram, context: Context, bodies: list[BodyIndex], interval: float
 ) -> None:
-    """Takes from the turning of bodies about their centres of mass what an interval costs."""
+    """Damps the rotation of bodies about their centres of mass over an interval [s]."""
     time_constant = 0.1  # Seconds. Stands for air and rolling resistance, which Drake lacks.
     plant, lost = built.plant, -math.expm1(-interval / time_constant)
     for index in bodies:

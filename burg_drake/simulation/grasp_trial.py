@@ -1,10 +1,10 @@
-"""Trials of grasps: what all of them share, and the trial of the floating hand.
+"""Trials of grasps: their common base classes, and the trial of the floating hand.
 
 A trial screens the open hand, chooses the world to run in, executes the phases there, and adds the
 confidence to the result.
 
-The open hand starts at the grasp, or at the pregrasp if `TrialSettings.approach` asks for it.
-After Rudorfer et al., "BURG-Toolkit" (2022): a grasp in collision is rejected before any step; the
+The open hand starts at the grasp, or at the pregrasp if `TrialSettings.approach` asks for it. After
+Rudorfer et al., "BURG-Toolkit" (2022): a grasp in collision is rejected before any step; the
 fingers close with a limited force until the grip settles; the hand rises by 0.30 m along world z,
 unless another motion is given, and holds. A trial succeeds if both fingers still hold the target.
 """
@@ -54,7 +54,7 @@ from burg_drake.station import (
 )
 
 MAX_KEPT_WORLDS = 16
-"""Worlds of a target alone that are kept; each takes 20 MB, and 0.1 s to build."""
+"""Cached single-target worlds; each takes 20 MB, and 0.1 s to build."""
 
 
 W = TypeVar("W", bound=SteppedWorld)
@@ -63,22 +63,22 @@ W = TypeVar("W", bound=SteppedWorld)
 class GraspTrial(ABC, Generic[W]):
     """Executes grasps in one scene.
 
-    A trial runs in a world in which the target alone can move, which costs less. If it meets
-    another object there, it runs again in the complete world, from its beginning.
+    A trial runs in a single-target world, in which only the target can move, as that is cheaper. If
+    the target or the robot meets another object there, the trial is repeated in the complete world.
 
     Args:
         scene: the scene.
         station: the station.
-        engine: how trials are stepped.
+        engine: time step and contact settings.
         settings: phases of a trial.
         clearance: the screen of the open hand in the scene.
-        motion: where the hand goes, if not as the settings or else the station say.
-        lock: keep objects locked until something moving touches them, and run in worlds of the
-            target alone.
+        motion: the hand's motion around the grasp; by default that of the settings, else the
+            station's.
+        lock: keep objects locked until something moving touches them, and use single-target worlds.
 
     Attributes:
         scene, station, engine, settings, clearance: as given.
-        motion: where the hand goes.
+        motion: the hand's motion around the grasp.
         failures: errors of the simulator; a trial that has one ends as `SIMULATION_FAILED`.
     """
 
@@ -106,12 +106,12 @@ class GraspTrial(ABC, Generic[W]):
 
     @property
     def world(self) -> W:
-        """That of the last trial; before the first one the complete world."""
+        """The world of the last trial; before the first trial the complete world."""
         return self._world or self.complete_world
 
     @property
     def complete_world(self) -> W:
-        """The one in which all objects can move."""
+        """The world in which all objects can move."""
         if self._complete is None:
             self._complete = self._build(None)
         return self._complete
@@ -139,14 +139,15 @@ class GraspTrial(ABC, Generic[W]):
         mass: float | None = None,
         without_hull: bool = False,
     ) -> TrialResult:
-        """Executes a grasp, if the open hand is clear at it, and where its approach begins.
+        """Executes a grasp, if the open hand is clear at the grasp and at the start of its
+        approach.
 
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world.
-            begin: brings a world to the start of the trial.
-            friction, mass: with which it begins; the library's if None.
-            without_hull: not in a world in which parts of the robot meet the target's hull.
+            begin: prepares a world for the start of the trial.
+            friction, mass: of the target; the library's if None.
+            without_hull: avoid worlds in which parts of the robot meet the target's hull.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
@@ -176,8 +177,8 @@ class GraspTrial(ABC, Generic[W]):
             return simulation_failure_result(error, screen, world.time)
 
     def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
-        """The screen of the open hand where a trial begins; None if that is at the grasp, or the
-        plan of an arm tells."""
+        """The screen of the open hand at the start of the approach; None if the trial begins at the
+        grasp, or an arm follows a plan."""
         return None
 
     def grip_load(
@@ -188,7 +189,7 @@ class GraspTrial(ABC, Generic[W]):
         friction: float | None = None,
         mass: float | None = None,
     ) -> GripLoad:
-        """What a grip has to carry.
+        """Load on the grip.
 
         Args:
             instance: the target.
@@ -207,8 +208,8 @@ class GraspTrial(ABC, Generic[W]):
         )
 
     def closed_before_contact(self, instance: str, X_WG: Array) -> float:
-        """How far the fingers can close, from 0 (open) to 1, before they touch anything: the
-        clearance knows pieces, out of which the target's surface stands a little.
+        """How far the fingers can close, from 0 (open) to 1, before contact. Considers the target's
+        surface, which may protrude a little from the convex pieces that the clearance uses.
 
         Args:
             instance: the target.
@@ -219,33 +220,33 @@ class GraspTrial(ABC, Generic[W]):
         return max(0.0, self.clearance.free_travel(X_WG) - excess)
 
     def _use_world(self, world: W | None) -> W:
-        """Makes a world, the complete one if None, the present one."""
+        """Makes a world the current one; the complete world if None."""
         self._world = self.complete_world if world is None else world
         return self._world
 
     def _world_of(self, instance: str) -> W:
-        """The cheapest in which a trial of an instance can begin."""
+        """The cheapest usable world for trials of an instance."""
         if not self._lock:
             return self.complete_world
         if instance not in self._alone:
             world = self._build(instance)
             self._alone[instance] = world if world.is_usable() else None
-        self._alone[instance] = found = self._alone.pop(instance)  # used last comes last
+        self._alone[instance] = found = self._alone.pop(instance)  # most recent last
         if len(self._alone) > MAX_KEPT_WORLDS:
             del self._alone[next(iter(self._alone))]
         return found or self.complete_world
 
     @abstractmethod
     def _build(self, alone: str | None) -> W:
-        """A world in which one object alone can move, or the complete one."""
+        """Builds the world in which only object `alone` can move; the complete world if None."""
 
 
 class DrakeTrial(GraspTrial[TrialWorld]):
     """A trial in Drake.
 
     Attributes:
-        robot: what of the station moves.
-        hand_type: the handle on the hand in its diagrams.
+        robot: moving part of the station.
+        hand_type: class of the handle on the hand in its diagrams.
     """
 
     robot: ClassVar[Robot]
@@ -254,7 +255,7 @@ class DrakeTrial(GraspTrial[TrialWorld]):
 
     @property
     def diagram(self) -> StationDiagram:
-        """Of `world`."""
+        """The diagram of `world`."""
         return self.world.diagram
 
     @property
@@ -264,7 +265,7 @@ class DrakeTrial(GraspTrial[TrialWorld]):
 
     @property
     def context(self) -> Context:
-        """Of the trial that runs or ran last."""
+        """The Context of the current or last trial."""
         return self.world.context
 
     def _build(self, alone: str | None) -> TrialWorld:
@@ -304,17 +305,17 @@ class HandAloneTrial(GraspTrial[W]):
         self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(partial(HandLiftClearance, self._plain))
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
-        """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
+        """Straight paths of the hand with the target: the retreat, if any, and the lift.
 
         Args:
             X_WG: (4, 4) grasp in the world.
             lift: length of the lift [m], in place of the motion's.
 
         Returns:
-            One or two, each longer than 0.
+            One or two paths, each longer than 0.
 
         Raises:
-            InvalidInputError: the hand would not move, or a length is not one.
+            InvalidInputError: the hand would not move, or a length is invalid.
         """
         motion, height = self.motion, self.motion.lift_height if lift is None else lift
         if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
@@ -326,7 +327,7 @@ class HandAloneTrial(GraspTrial[W]):
         return tuple(path for path in paths if path.length > 0.0)
 
     def X_WG_start(self, X_WG: Array) -> Array:
-        """Where (4, 4) the hand begins, of a grasp in the world: there, or at its pregrasp."""
+        """Start pose (4, 4) of the hand for a grasp in the world: the grasp or its pregrasp."""
         return X_WG if self._approach(X_WG) is None else self._pregrasp(X_WG)
 
     def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
@@ -335,23 +336,23 @@ class HandAloneTrial(GraspTrial[W]):
         return self.clearance.check(instance, self._pregrasp(X_WG))
 
     def _approach(self, X_WG: Array) -> LiftPath | None:
-        """The path of the hand to a grasp (4, 4) in the world; None if it begins there."""
+        """The approach path to a grasp (4, 4) in the world; None if the hand begins there."""
         if not self.settings.approach or self.motion.standoff <= 0.0:
             return None
         return LiftPath(X_WG[:3, 2], self.motion.standoff)
 
     def _pregrasp(self, X_WG: Array) -> Array:
-        """(4, 4) pregrasp of a grasp in the world."""
+        """Pregrasp (4, 4) of a grasp in the world."""
         return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
 
 
 class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
     """Executes grasps of one scene with the hand alone.
 
-    The approach is not simulated: the open hand begins at the grasp, and what is in its way there
-    is a collision. With `TrialSettings.approach` it begins at the pregrasp, the standoff back along
-    the approach, and goes straight in with open fingers, as fast as it lifts. What it meets on the
-    way is pushed, or stops it, as in the trial of the whole arm.
+    The approach is not simulated: the open hand begins at the grasp, and an overlap there is a
+    collision. With `TrialSettings.approach` it begins at the pregrasp, the standoff back along the
+    approach, and goes straight in with open fingers, as fast as it lifts. It pushes objects, or is
+    stopped by them, as in the trial of the whole arm.
 
     Example::
 
@@ -365,8 +366,8 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         station: table, board pose and hand.
         engine: time step and contact settings, or the name of a preset.
         settings: phases of a trial.
-        motion: where the hand goes, if not as the settings or else the station say; the standoff
-            counts only if the approach is simulated.
+        motion: the hand's motion around the grasp; by default that of the settings, else the
+            station's. The standoff counts only if the approach is simulated.
         lock: keep objects locked until something moving touches them. Without it all free objects
             are simulated from the start, which costs more and gives the same verdicts.
         meshcat: where to show the trials; recording is the caller's.
@@ -424,15 +425,15 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
             friction: the target's friction coefficient, in place of the library's.
             mass: the target's mass [kg], in place of the library's; its inertia scales with it.
             lift: length of the lift [m], in place of the motion's.
-            without_hull: for who goes on in `world`: run where no part of the hand meets a hull in
-                the place of the target.
+            without_hull: avoid worlds in which parts of the hand meet the target's hull; for
+                callers that continue in `world`.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
 
         Raises:
             InvalidInputError: `X_OG` is not a pose, `instance` cannot be grasped, friction is below
-                0, the mass is not above 0, or the lift is of no length.
+                0, the mass is not above 0, or the lift has no length.
         """
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
@@ -455,26 +456,26 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         mass: float | None = None,
         world: TrialWorld | None = None,
     ) -> Execution:
-        """Brings the Context to the start of a trial; nothing of an earlier one remains.
+        """Resets the Context to the start of a trial.
 
-        The fingers start where they would touch something first: until then nothing happens. Only
-        the target, and what stands so close that it may lean on it, is free to move; others are
-        released when something moving touches them. What nothing touches stays at rest, so that
-        the result is the one with all objects free, at the cost of those that matter. With an
-        approach the fingers start open, and the target is locked like the others.
+        The fingers start just before their first contact, as nothing happens earlier. Only the
+        target and its neighbours, on which it may lean, are free to move; other objects are
+        released when something moving touches them. Untouched objects stay at rest, so the result
+        is that with all objects free, at a lower cost. With an approach the fingers start open, and
+        the target is locked like the others.
 
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world at which the open hand is clear.
-            paths: of the hand with the target; those of the motion if None.
+            paths: paths of the hand with the target; those of the motion if None.
             friction, mass: as in `run`.
-            world: in which it runs; by default the complete one.
+            world: world of the trial; by default the complete one.
         """
         world = self._use_world(world)
         target = world.diagram.free[instance]
         everything = set(world.diagram.free.values())
         approach = self._approach(X_WG)
-        beside_hand = set() if approach else world.neighbours.close_to({target})
+        beside_hand = set() if approach else world.neighbours.with_neighbours({target})
         moving = beside_hand if self._lock else everything
         world.prepare(instance, moving, friction, mass)
         paths = self.lift_paths(X_WG) if paths is None else paths

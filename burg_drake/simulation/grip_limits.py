@@ -1,4 +1,4 @@
-"""How strong a grip is: the tugs, the shaking and the lack of friction that it withstands.
+"""Strength of a grip: the tugs and the shaking that it withstands, and the friction that it needs.
 
 A load is a force on the target's centre of mass, given as an acceleration times the target's mass.
 The target would feel the same if the hand accelerated the other way without turning. Every load
@@ -30,21 +30,22 @@ from burg_drake.station import FloatingHand
 def largest_passing(
     passes: Callable[[float], bool], *, guess: float, low: float, high: float, tolerance: float
 ) -> float:
-    """Searches from a guess in growing or falling strides, then by bisection of the logarithm.
+    """Searches for the largest load that passes: geometric steps from a guess, then bisection of
+    the logarithm.
 
-    What bears a load need not bear every smaller one; the load that is returned is borne, and one
-    that is larger by at most `tolerance` is not.
+    Passing need not be monotonic: the returned load passes, and a load larger by at most
+    `tolerance` fails.
 
     Args:
-        passes: whether a load is borne.
-        guess: where the search starts; the nearer to the limit, the fewer loads are tried.
+        passes: whether a load passes.
+        guess: start of the search; the closer to the limit, the fewer loads are tried.
         low, high: smallest and largest load tried, above 0.
         tolerance: relative, above 0.
 
     Returns:
-        The load; 0 if not even `low` is borne, infinity if `high` is.
+        The load; 0 if `low` fails, infinity if `high` passes.
     """
-    stride = 1.5  # Factor between two loads until the limit lies between two of them.
+    stride = 1.5  # Factor between tried loads until two of them bracket the limit.
     borne, lost = 0.0, math.inf
     load = min(max(guess, low), high)
     while True:
@@ -69,17 +70,17 @@ def largest_passing(
 class Grip:
     """The hand with the target in it after a trial that ended with the target held.
 
-    The hand brakes and stands. From then on there is nothing but hand and target: what else is in
-    the scene neither moves nor touches them.
+    The hand stops. From then on all other bodies of the scene are locked and touch neither hand nor
+    target.
 
     Args:
-        trial: its last run was one of this target `without_hull`, and held it.
+        trial: its last run was a successful grasp of this target `without_hull`.
         instance: the target.
-        friction: its coefficient in that run, if not the library's.
+        friction: the target's coefficient in that run, if not the library's.
 
     Attributes:
         weight: of the target [N].
-        friction_force: what the pads carry by friction in all, 2 mu N [N].
+        friction_force: total friction limit of both pads, 2 mu N [N].
     """
 
     def __init__(self, trial: HandTrial, instance: str, friction: float | None = None) -> None:
@@ -94,12 +95,12 @@ class Grip:
         mu = trial.scene.entry(instance).friction if friction is None else friction
         self.friction_force = 2.0 * mu * trial.station.hand.force
         world.isolate(self._target.index())
-        self._brake()
-        self._rest()
+        self._stop_hand()
+        self._wait_until_at_rest()
         self._time, self._state = world.time, world.state()
         self._X_GO = self._current_X_GO()
 
-    def withstands(
+    def bears_load(
         self,
         load: Callable[[float], Array],
         duration: float,
@@ -107,22 +108,22 @@ class Grip:
         *,
         steady_from: float = math.inf,
     ) -> bool:
-        """Whether the grip bears a load.
+        """Whether the grip withstands a load.
 
         Args:
-            load: (3,) acceleration in G [g] by the time since the load began [s].
-            duration: of the load [s].
-            slide: how far the point of the target at the grasp may move in the hand [m].
-            steady_from: time from which the load is constant [s], so that what is at rest stays
-                so, and the rest can be left out.
+            load: (3,) acceleration in G [g] as a function of the time since the load began [s].
+            duration: duration of the load [s].
+            slide: largest motion of the target's point at the grasp in the hand [m].
+            steady_from: time from which the load is constant [s]; a target at rest then ends the
+                simulation early.
 
         Returns:
-            Whether both fingers touch the target and it has not slid further, at every look.
+            True if both fingers touch the target, and it has not slid further, at every check.
 
         Raises:
             RuntimeError, SystemExit: from Drake.
         """
-        self._world.go_back(self._time, self._state)
+        self._world.restore_state(self._time, self._state)
         self._world.simulator.Initialize()
         R_WG = self._world.X_WG()[:3, :3]
         steps_per_check = max(1, round(self._world.settings.poll / self._step))
@@ -137,7 +138,7 @@ class Grip:
                 if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
                 at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
-                # What slides under 1 % of excess load is faster by the third check.
+                # A target that slides under 1 % of excess load is faster by the third check.
                 if check * steps_per_check * self._step >= steady_from and at_rest >= 3:
                     return True
             return True
@@ -145,7 +146,7 @@ class Grip:
             self._forces_port.FixValue(self._world.context, [])
 
     def _apply(self, f_W: Array) -> None:
-        """Puts a force (3,) on the target's centre of mass [N]."""
+        """Applies a force (3,) to the target's centre of mass [N]."""
         force = ExternallyAppliedSpatialForce()
         force.body_index = self._target.index()
         force.p_BoBq_B = self._target.default_com()
@@ -153,15 +154,15 @@ class Grip:
         self._forces_port.FixValue(self._world.context, [force])
 
     def _is_touched(self) -> bool:
-        contacts = self._world.look()
+        contacts = self._world.read_contacts()
         return finger_contact(contacts, self._world.fingers, self._target.index()).both
 
     def _is_at_rest(self, before: Array, after: Array) -> bool:
-        """Whether the target has hardly moved in the hand from one look to the next."""
+        """Whether the target has hardly moved in the hand between two checks."""
         distance, angle = motion_in_hand(before, after)
         return max(distance, angle * SLIP_LEVER) <= 0.002 * self._world.settings.poll
 
-    def _brake(self) -> None:
+    def _stop_hand(self) -> None:
         """Stops the hand as gently as it was accelerated."""
         settings = self._world.settings
         braking = settings.acceleration
@@ -172,7 +173,7 @@ class Grip:
             self._advance()
         self._world.command("lift", np.zeros(2))
 
-    def _rest(self) -> None:
+    def _wait_until_at_rest(self) -> None:
         """Waits until the target is at rest in the hand."""
         at_rest, X_GO = 0, self._current_X_GO()
         for _ in range(50):  # then the grip is loaded in any case
@@ -186,7 +187,7 @@ class Grip:
         self._advance_by(max(1, round(self._world.settings.poll / self._step)))
 
     def _advance_by(self, steps: int) -> None:
-        """To a whole number of steps since 0, with the rounding that Drake's own steps have."""
+        """Advances by whole time steps, with the rounding of Drake's own steps."""
         done = round(self._world.time / self._step)
         self._world.simulator.AdvanceTo((done + steps) * self._step)
 
@@ -204,16 +205,16 @@ def take_grip(
     mass: float | None = None,
     lift: float | None = None,
 ) -> Grip | TrialResult:
-    """Executes a grasp, and takes the hand as it then holds the target.
+    """Executes a grasp, and returns the grip of the held target.
 
-    A load may bring the target to parts of the hand that the trial kept clear of. They have to meet
-    it as it is: a hull would hold a bowl by its hollow.
+    A load may push the target against parts of the hand that the trial did not touch. They have to
+    meet its true surface: with a convex hull, a bowl could be held by its hollow.
 
     Args:
         trial, instance, X_OG, friction, mass, lift: as for `HandTrial.run`.
 
     Returns:
-        The grip; the trial's result if the target is not held at its end.
+        The grip, or the trial's result if the target is not held at its end.
 
     Raises:
         InvalidInputError: as `HandTrial.run`.
@@ -235,12 +236,12 @@ SHAKE_AXES: dict[str, Array] = {axis: np.eye(3)[k] for k, axis in enumerate("xyz
 
 @dataclass(frozen=True)
 class HoldForces:
-    """What a grip bears.
+    """Largest loads that a grip withstands.
 
     Attributes:
-        accelerations: by direction or axis of G [g], beside the pull of gravity: the largest load
-            of those tried that the grip bears, while it does not bear one that is larger by the
-            tolerance. 0 if not even the smallest is borne, infinity if the largest is.
+        accelerations: largest load that the grip withstands in addition to gravity [g], by
+            direction or axis of G; a load larger by the tolerance fails. 0 if the smallest tried
+            load fails, infinity if the largest is withstood.
         weight: of the target [N].
     """
 
@@ -249,12 +250,12 @@ class HoldForces:
 
     @property
     def forces(self) -> dict[str, float]:
-        """The same as forces on the centre of mass [N]."""
+        """The loads as forces on the centre of mass [N], by direction or axis."""
         return {name: value * self.weight for name, value in self.accelerations.items()}
 
     @property
-    def weakest(self) -> tuple[str, float]:
-        """Direction or axis of the smallest, and the acceleration there [g]."""
+    def lowest_limit(self) -> tuple[str, float]:
+        """Direction or axis with the smallest load, and that load as an acceleration [g]."""
         return min(self.accelerations.items(), key=lambda item: item[1])
 
 
@@ -267,24 +268,24 @@ def tug(
     """Tugs a held target along directions of the grasp frame.
 
     Args:
-        grip: the held target; every load starts from the same state of it.
+        grip: the held target; every load starts from the same state.
         settings: loads.
-        directions: some of `TUG_DIRECTIONS`.
+        directions: names from `TUG_DIRECTIONS`.
 
     Raises:
         UnknownNameError: no such direction.
         RuntimeError, SystemExit: from Drake.
     """
 
-    def withstands(direction: Array, amplitude: float) -> bool:
-        return grip.withstands(
+    def bears_load(direction: Array, amplitude: float) -> bool:
+        return grip.bears_load(
             lambda t: amplitude * min(1.0, t / settings.tug_rise) * direction,
             settings.tug_rise + settings.tug_time,
             settings.slide,
             steady_from=settings.tug_rise,
         )
 
-    return _hold_forces(grip, _select_by_name(TUG_DIRECTIONS, directions), withstands, settings)
+    return _hold_forces(grip, _select_by_name(TUG_DIRECTIONS, directions), bears_load, settings)
 
 
 def shake(
@@ -296,12 +297,12 @@ def shake(
     """Shakes a held target to and fro along the axes of the grasp frame.
 
     Args:
-        grip: the held target; every load starts from the same state of it.
+        grip: the held target; every load starts from the same state.
         settings: loads.
-        axes: some of `SHAKE_AXES`.
+        axes: names from `SHAKE_AXES`.
 
     Returns:
-        Amplitudes of the sinusoidal acceleration that the grip bears for some periods.
+        Largest amplitudes of the sinusoidal acceleration that the grip withstands.
 
     Raises:
         UnknownNameError: no such axis.
@@ -309,14 +310,14 @@ def shake(
     """
     omega = 2.0 * np.pi * settings.frequency
 
-    def withstands(axis: Array, amplitude: float) -> bool:
-        return grip.withstands(
+    def bears_load(axis: Array, amplitude: float) -> bool:
+        return grip.bears_load(
             lambda t: amplitude * min(1.0, t * settings.frequency) * np.sin(omega * t) * axis,
             settings.periods / settings.frequency,
             settings.slide,
         )
 
-    return _hold_forces(grip, _select_by_name(SHAKE_AXES, axes), withstands, settings)
+    return _hold_forces(grip, _select_by_name(SHAKE_AXES, axes), bears_load, settings)
 
 
 def _select_by_name(known: Mapping[str, Array], names: Iterable[str]) -> dict[str, Array]:
@@ -332,12 +333,12 @@ def _select_by_name(known: Mapping[str, Array], names: Iterable[str]) -> dict[st
 def _hold_forces(
     grip: Grip,
     directions: Mapping[str, Array],
-    withstands: Callable[[Array, float], bool],
+    bears_load: Callable[[Array, float], bool],
     settings: LoadSettings,
 ) -> HoldForces:
     found = {
         name: largest_passing(
-            partial(withstands, direction),
+            partial(bears_load, direction),
             guess=grip.friction_force / grip.weight,
             low=settings.smallest,
             high=settings.largest,
@@ -357,10 +358,10 @@ def friction_limit(
     lift: float | None = None,
     settings: FrictionSettings = FrictionSettings(),
 ) -> float:
-    """Looks for the smallest coefficient between target and pads with which a grasp lifts.
+    """Searches for the smallest friction coefficient of target and pads with which a grasp lifts.
 
-    A grasp that lifts need not lift with every larger coefficient. What is returned is a
-    coefficient that lifts, while one that is smaller by the tolerance does not.
+    A grasp that lifts need not lift with every larger coefficient. The grasp lifts with the
+    returned coefficient, and fails with one that is smaller by the tolerance.
 
     Args:
         trial: executes the trials.
@@ -368,17 +369,17 @@ def friction_limit(
         X_OG: (4, 4) grasp in the target's frame.
         mass: of the target in place of the library's [kg].
         lift: length of the lift in place of the motion's [m].
-        settings: which coefficients are tried.
+        settings: range of coefficients, and tolerance.
 
     Returns:
-        The coefficient; 0 if it lifts with the smallest that is tried, infinity if it does not with
-        the largest.
+        The coefficient; 0 if the grasp lifts with the smallest tried, infinity if it fails with the
+        largest.
 
     Raises:
         InvalidInputError: as `HandTrial.run`.
     """
 
-    # Times the friction that carries the weight at the centre; few grasps are there.
+    # Relative to the friction that carries the weight at the centre; few grasps are there.
     guess_factor = 1.25
 
     def lifts(inverse: float) -> bool:
@@ -398,8 +399,8 @@ def friction_limit(
 def friction_to_carry(
     trial: HandTrial | MujocoTrial, instance: str, mass: float | None = None
 ) -> float:
-    """Coefficient with which two pads carry the target as fast as the hand speeds up, if they grip
-    it at its centre: m (g + a) / (2 N)."""
+    """Friction coefficient with which two pads that grip the target at its centre carry it during
+    the lift's acceleration: m (g + a) / (2 N)."""
     settings = trial.settings
     if mass is None:
         mass = trial.scene.entry(instance).mass

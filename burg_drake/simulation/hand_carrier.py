@@ -33,28 +33,29 @@ from burg_drake.station import (
 
 
 class PlacedRobot(Protocol):
-    """A world in its present state, of whatever engine."""
+    """Current state of a world of any engine."""
 
     @property
     def free(self) -> Mapping[str, BodyIndex]:
-        """What can move, by name."""
+        """Bodies that can move, by name."""
         ...
 
     def X_WB(self, body: BodyIndex) -> Array:
-        """(4, 4) of a body."""
+        """Pose (4, 4) of a body in the world."""
         ...
 
     def robot_positions(self, model: str) -> Array | None:
-        """Of one of `ROBOT_MODELS`, in the order of a station diagram; None if there is none."""
+        """Positions of one of `ROBOT_MODELS`, in the order of a station diagram; None if
+        missing."""
         ...
 
 
 class HandLiftClearance:
-    """Looks along the straight segment ahead of one target in the hand.
+    """Checks the straight path ahead of the hand and one target in it for collisions.
 
     Args:
         station_diagram: a diagram built with `robot="hand"`, without contact parts.
-        instance: name of what is in the hand.
+        instance: name of the target.
     """
 
     def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
@@ -80,12 +81,12 @@ class HandLiftClearance:
         self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
     def is_free(self, world: PlacedRobot, X_WG: Array, length: float, direction_W: Array) -> bool:
-        """Whether nothing is met on the way.
+        """Whether the path is free of collisions.
 
         Args:
             world: in its present state.
-            X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
-            length: how far there is to go [m].
+            X_WG: (4, 4) grasp at which the path began; it sets the frames of the lift.
+            length: remaining length of the path [m].
             direction_W: (3,) unit vector of the lift.
         """
         # Metres between checks. A hand and what it meets are thicker, taken together.
@@ -104,9 +105,9 @@ class HandLiftClearance:
         return True
 
     def _boxes_meet(self, p_W: Array) -> bool:
-        """Whether an upright box about what moves, drawn out by a way (3,), meets one of the
-        others."""
-        min_gap = 0.002  # Metres between boxes that are apart.
+        """Whether the world-aligned bounding box of the moving geometries, swept along a
+        displacement (3,), overlaps the box of another geometry."""
+        min_gap = 0.002  # Smallest distance between separate boxes in metres.
         query = self._query()
         low, high = _box_bounds(query, self._carried)
         low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
@@ -121,22 +122,22 @@ class HandLiftClearance:
         return port.Eval(self._diagram.scene_graph.GetMyContextFromRoot(self._context))
 
     def _boxes(self, bodies: set[BodyIndex]) -> list[tuple[GeometryId, tuple[Array, Array]]]:
-        """Collision geometries with the pose (4, 4) and half size (3,) of a box about each."""
+        """Collision geometries, each with pose (4, 4) and half size (3,) of its bounding box."""
         inspector = self._query().inspector()
         found = []
         for geometry in collision_geometries(self._plant, bodies):
             box = inspector.GetObbInGeometryFrame(geometry)
-            assert box is not None  # only half spaces have none
+            assert box is not None  # only half spaces have no box
             found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
         return found
 
 
 class ArmLiftClearance:
-    """Looks along the way up of one target in the hand of an arm.
+    """Checks the lift of one target in the hand of an arm for collisions.
 
     Args:
         station_diagram: a diagram built with `robot="arm"`, without contact parts.
-        instance: name of what is in the hand.
+        instance: name of the target.
     """
 
     def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
@@ -159,11 +160,11 @@ class ArmLiftClearance:
             manager.Apply(CollisionFilterDeclaration().ExcludeWithin(geometries))
 
     def is_free(self, world: PlacedRobot, q: Array) -> bool:
-        """Whether nothing is met.
+        """Whether the path is free of collisions.
 
         Args:
             world: in its present state.
-            q: (K, n) arm positions on the way.
+            q: (K, n) arm positions along the path.
         """
         context = self._plant_context
         _take_positions(self._diagram, context, world)
@@ -183,7 +184,7 @@ class ArmLiftClearance:
 
 
 def _take_positions(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
-    """Puts robot and objects where they are in a world; what cannot move there is in its place."""
+    """Copies the state of the robot and the movable objects from a world."""
     plant = diagram.plant
     for model in ROBOT_MODELS:
         q = world.robot_positions(model)
@@ -199,7 +200,7 @@ def _take_positions(diagram: StationDiagram, plant_context: Context, world: Plac
 def _box_bounds(
     query: QueryObject, boxes: list[tuple[GeometryId, tuple[Array, Array]]]
 ) -> tuple[Array, Array]:
-    """Lower and upper corners (N, 3) of upright boxes about geometries, in the world."""
+    """Lower and upper corners (N, 3) of world-aligned bounding boxes of geometries."""
     X_WB = np.array([query.GetPoseInWorld(g).GetAsMatrix4() @ X_GB for g, (X_GB, _) in boxes])
     half = np.array([half for _, (_, half) in boxes])
     reach = np.einsum("nij,nj->ni", np.abs(X_WB[:, :3, :3]), half)
@@ -222,16 +223,16 @@ W = TypeVar("W", bound=SteppedWorld)
 
 
 class FloatingCarrier(ABC, Generic[W]):
-    """What carriers of the floating hand share, of whatever engine: the segments, and what is in
-    the way; see `Carrier`.
+    """Base of the floating hand's carriers in any engine: segments and obstacle checks; see
+    `Carrier`.
 
     Args:
-        world: that of a trial which has been brought to its start, with the joint along the first
-            of all paths: the floating hand is at the grasp, or where the approach begins.
-        paths: of the hand from the grasp on, straight, at least one.
+        world: of a trial, prepared for its start: the floating hand is at the grasp, or at the
+            start of its approach, with the lift joint along the first path.
+        paths: straight paths of the hand from the grasp on, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
-        approach: the path to the grasp; None if the hand is there.
-        target: the body to be grasped, which the hand may touch once it has come to the grasp.
+        approach: the path to the grasp; None if the hand starts there.
+        target: the body to be grasped, which the hand may touch once it is at the grasp.
     """
 
     tracking_error = tracking_distance = math.nan
@@ -267,12 +268,12 @@ class FloatingCarrier(ABC, Generic[W]):
 
     @property
     def touched(self) -> str:
-        """The first touch that was not planned; "" without an approach."""
+        """The first unplanned contact; "" without an approach."""
         return "" if self._touches is None else self._touches.first
 
     def watch(self, contacts: list[BodyContact]) -> str:
-        """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
-        goes down with the target, or presses on it on its way to the grasp."""
+        """Finds a fixed body that the hand touches. The table counts only if the hand moves down
+        with the target, or presses on the table on its approach."""
         if self._touches is not None:
             stop = self._touches.update(contacts, arrived=not self._is_approaching)
             if self._is_approaching:
@@ -292,14 +293,14 @@ class FloatingCarrier(ABC, Generic[W]):
         return bears_full_load(self.segments[-1], check, self._world.settings)
 
     def is_free_ahead(self) -> bool:
-        """Looks along the joint's axis."""
+        """Checks the rest of the path along the lift joint's axis."""
         last = self.segments[-1]
         return self._lift_clearance().is_free(
             self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
 
     def _begin_segment(self, number: int) -> bool:
-        """Makes a segment the present one. Returns whether it was not yet."""
+        """Makes a segment the current one. Returns whether it changed."""
         self._is_lifting = True
         if number == self._number:
             return False
@@ -308,10 +309,11 @@ class FloatingCarrier(ABC, Generic[W]):
 
 
 class LiftCarrier(FloatingCarrier[TrialWorld]):
-    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`.
+    """Moves the floating hand to the grasp, if an approach is given, and away from it; see
+    `Carrier`.
 
-    Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
-    the new direction.
+    Between two segments the hand comes to rest, and its lift joint is aligned with the new
+    direction.
 
     Args:
         world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
@@ -323,7 +325,7 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         return self._world.hand
 
     def approach(self) -> None:
-        """Begins the way to the grasp; the speed is commanded from look to look."""
+        """Starts the approach; the speed is commanded at every contact check."""
         self._is_approaching = True
 
     def close(self) -> None:
@@ -334,8 +336,8 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
             self._world.command("hand", self._floating.closing_command())
 
     def lift(self, number: int, check: int) -> None:
-        """Commands the speed of the middle of the interval; in one interval more, where another
-        segment follows, the hand comes to rest."""
+        """Commands the mean speed of the interval. Before another segment, the hand comes to rest
+        in one more interval."""
         segment = self.segments[number]
         if self._begin_segment(number):
             self._floating.set_lift_direction(self._world.plant_context, segment.direction_W)
@@ -343,11 +345,11 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         self._command_speed(segment.length, check, self._world.settings.poll)
 
     def stop(self) -> None:
-        """Stands still."""
+        """Commands zero speed."""
         self._world.command("lift", np.zeros(2))
 
     def advance_to(self, time: float) -> None:
-        """Steps; commands change only from look to look."""
+        """Advances the simulation; commands change only at contact checks."""
         if self._is_approaching and self._approach is not None:
             interval = self.approach_steps * self._world.engine.time_step
             check = round(self._world.context.get_time() / interval)
@@ -359,7 +361,7 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         return self._floating.travelled(self._world.plant_context)
 
     def _command_speed(self, length: float, check: int, interval: float) -> None:
-        """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
+        """Commands the mean speed of an interval [s] of a path with a length [m]."""
         checks = check_count(length, self._world.settings)
         top_speed = 2 * length / (checks * interval)
         speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
@@ -367,12 +369,11 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
 
 
 def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> bool:
-    """Whether the load on a grip was as large as it will ever be, up to an interval of the last
-    segment.
+    """Whether the grip has already carried the largest load of the last segment by interval
+    `check`.
 
-    The hand accelerates in the first half of a segment and brakes in the second. Straight up, the
-    first adds to the weight and the second takes away from it. Otherwise both count, and standing
-    still is in between.
+    The hand accelerates in the first half of a segment and brakes in the second. Straight up,
+    accelerating adds to the weight and braking reduces the load. Otherwise both load the grip.
     """
     half = check_count(last.length, settings) // 2
     if last.is_straight_up:
@@ -381,5 +382,5 @@ def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> b
 
 
 def check_count(length: float, settings: TrialSettings) -> int:
-    """Looks on a path of a length [m]: as many to speed up as to brake."""
+    """Number of contact checks on a path with a length [m]; even, for acceleration and braking."""
     return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))

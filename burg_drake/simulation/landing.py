@@ -1,10 +1,10 @@
 """Drops objects of a scene onto the others, with less friction, and keeps them on the board.
 
 Friction is reduced meanwhile, so that objects come to lie flat and low. Objects that come to rest
-where full friction just holds them would creep: Drake's regularized friction creeps fastest there.
+at their friction limit would creep: Drake's regularized friction creeps fastest there.
 
-What gets beyond the edge is sent back as fast as it has to be to slide that far. Objects would
-lean on walls, and fall over without them.
+An object beyond the edge gets the speed at which it slides back. Walls are no alternative: objects
+would lean on them, and fall over without them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from burg_drake.station import Engine, Station, StationDiagram, build_station_di
 def placed_scene(
     built: StationDiagram, X_WO: Mapping[str, Array], exact: Collection[str] = ()
 ) -> Scene:
-    """The scene with its free objects elsewhere.
+    """The scene with new poses of its free objects.
 
     Args:
-        built: a diagram of the scene as it was.
-        X_WO: (4, 4) poses; objects that have none are left out.
-        exact: objects that get their pose even if it is the old one but for a trifle: the forces
-            between objects that touch depend on trifles.
+        built: a diagram of the original scene.
+        X_WO: (4, 4) poses by name; objects without a pose are left out.
+        exact: objects that get their new pose even if `has_moved` is False, as the forces between
+            touching objects depend on tiny changes.
     """
     scene = built.scene
     X_SW = inverse(built.station.document.X_WS.matrix())
@@ -50,30 +50,30 @@ def placed_scene(
 
 
 def has_moved(built: StationDiagram, name: str, X_WO: Array) -> bool:
-    """Whether an object is elsewhere than in the document by more than a trifle (`STILL`)."""
+    """Whether an object's pose differs from the document by more than a small tolerance."""
     pose_tolerance = (5e-5, float(np.deg2rad(0.02)))  # Metres and radians.
     moved = displacement_from_document(built, name, X_WO)
     return moved.distance > pose_tolerance[0] or moved.angle > pose_tolerance[1]
 
 
 def reduce_friction(built: StationDiagram, share: float = 0.5) -> None:
-    """Lowers all coefficients of friction, in all Contexts that are created from now on.
+    """Lowers all friction coefficients, in all Contexts that are created from now on.
 
     Args:
         built: a diagram.
-        share: of the coefficients that is left.
+        share: factor on the coefficients.
     """
     bodies = [built.table, *built.free.values(), *built.fixed.values()]
     reduce_friction_of(built, dict.fromkeys(bodies, share))
 
 
 def reduce_friction_of(built: StationDiagram, shares: Mapping[BodyIndex, float]) -> None:
-    """Lowers the coefficients of friction of some bodies, in all Contexts that are created from now
+    """Lowers the friction coefficients of some bodies, in all Contexts that are created from now
     on.
 
     Args:
         built: a diagram.
-        shares: of a body's coefficients that are left.
+        shares: factor on the coefficients, by body.
     """
     graph, source = built.diagram.mutable_scene_graph(), built.plant.get_source_id()
     inspector = graph.model_inspector()
@@ -89,7 +89,7 @@ def reduce_friction_of(built: StationDiagram, shares: Mapping[BodyIndex, float])
 
 
 class BoardEdgeGuard:
-    """Sends bodies back that get beyond the edge of the board."""
+    """Pushes bodies back that move beyond the edge of the board."""
 
     def __init__(
         self, built: StationDiagram, shapes: ObjectShapes, *, margin: float, share: float
@@ -97,11 +97,11 @@ class BoardEdgeGuard:
         """
         Args:
             built: a diagram.
-            shapes: of the library's objects.
-            margin: that objects keep from the edge [m].
-            share: of friction that is left.
+            shapes: shapes of the library's objects.
+            margin: distance of objects from the edge [m].
+            share: factor on the friction coefficients.
         """
-        braking_friction = 0.3  # A little less than that of `household` on `panda_tabletop`, 0.32.
+        braking_friction = 0.3  # A little below 0.32, that of `household` on `panda_tabletop`.
         scene = built.scene
         self._plant = built.plant
         self._corners = {
@@ -114,11 +114,11 @@ class BoardEdgeGuard:
         self._braking = share * braking_friction * 9.81
 
     def push_back(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
-        """Gives those that are too far out the speed at which they slide back.
+        """Gives bodies beyond the margin the speed at which they slide back.
 
         Args:
             context: the plant's; its velocities change.
-            bodies: free ones; those that are locked stay where they are.
+            bodies: free bodies; locked ones are skipped.
         """
         for index in bodies:
             body = self._plant.get_body(index)
@@ -151,14 +151,14 @@ def drop_onto_scene(
     shapes: ObjectShapes,
     margin: float,
 ) -> Scene:
-    """The scene once some objects have fallen, without those that fell off the table.
+    """The scene after some objects have fallen, without those that fell off the table.
 
     Args:
-        scene: the scene; what falls hangs above the board.
+        scene: the scene, with the falling objects above the board.
         station: table, pose of the board and obstacles.
-        falling: names of what falls; all else stays where it is.
+        falling: names of the falling objects; all others stay in place.
         shapes: of the library's objects.
-        margin: what falls is kept so far within the board's edge [m].
+        margin: distance by which falling objects are kept within the board's edge [m].
 
     Raises:
         RuntimeError, SystemExit: from Drake.
@@ -178,7 +178,7 @@ def _let_fall(
     time_limit: float,
 ) -> Scene:
     """The scene after a stage of falling."""
-    friction_share = 0.25  # Share of the friction that is left while something falls.
+    friction_share = 0.25  # Factor on friction while objects fall.
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     reduce_friction(built, friction_share)
     held = [index for name, index in built.free.items() if name not in falling]

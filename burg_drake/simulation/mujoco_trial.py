@@ -43,10 +43,10 @@ from burg_drake.station import (
 
 
 def check_objects(scene: Scene) -> None:
-    """Refuses what has no convex pieces to collide.
+    """Rejects objects without convex pieces for collisions.
 
     Raises:
-        InvalidInputError: an object has neither a primitive nor pieces, or a flat one.
+        InvalidInputError: an object has neither a primitive nor pieces, or a flat piece.
     """
     checked = set()
     for instance in {**scene.instances, **scene.background}.values():
@@ -79,14 +79,14 @@ def _check_object(library: ObjectLibrary, name: str) -> None:
 
 
 class WorldPicture:
-    """Shows worlds of one scene.
+    """Shows worlds of one scene in Meshcat.
 
     Args:
         scene, station: of the worlds.
-        meshcat: where they are shown.
+        meshcat: the viewer.
 
     Attributes:
-        diagram: the one that shows them.
+        diagram: the diagram that publishes to the viewer.
     """
 
     def __init__(self, scene: Scene, station: Station, meshcat: Meshcat) -> None:
@@ -95,7 +95,7 @@ class WorldPicture:
         self._context = self.diagram.diagram.CreateDefaultContext()
 
     def show(self, world: MujocoWorld) -> None:
-        """Publishes a world at its time."""
+        """Publishes the current state of a world."""
         plant = self.diagram.plant
         plant_context = plant.GetMyMutableContextFromRoot(self._context)
         self._hand.place(plant_context, world.X_WG())
@@ -112,18 +112,18 @@ class WorldPicture:
 
 
 class MujocoCarrier(FloatingCarrier[MujocoWorld]):
-    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`
-    and `LiftCarrier`. Here commands change at every step.
+    """Moves the floating hand to the grasp, if an approach is given, and away from it; see
+    `Carrier` and `LiftCarrier`. Here commands change at every step.
 
     Args:
         world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
     """
 
-    _length = 0.0  # Metres, of the present segment.
+    _length = 0.0  # Metres along the current segment.
     _step: int | None = None
 
     def approach(self) -> None:
-        """Begins the way to the grasp."""
+        """Starts the approach."""
         assert self._approach is not None
         self._is_approaching, self._length, self._step = True, self._approach.length, 0
 
@@ -135,8 +135,7 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
             self._world.close_hand()
 
     def lift(self, number: int, check: int) -> None:
-        """Commands one interval; where another segment follows, the hand comes to rest in one
-        more."""
+        """Commands one interval. Before another segment, the hand comes to rest in one more."""
         segment = self.segments[number]
         if self._begin_segment(number):
             self._world.turn_lift(segment.direction_W)
@@ -144,12 +143,12 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
         self._step = check * self.approach_steps
 
     def stop(self) -> None:
-        """Stands at the end of the last segment."""
+        """Holds the hand at the end of the last segment."""
         self._step = None
         self._world.command_lift(self.segments[self._number].length, 0.0, 0.0)
 
     def advance_to(self, time: float) -> None:
-        """Steps; on the way with commands for the end of each step."""
+        """Advances the simulation; on a segment, with a command for the end of each step."""
         world = self._world
         steps = round((time - world.time) / world.engine.time_step)
         if self._step is None:
@@ -167,8 +166,8 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
         return self._world.travelled()
 
     def _command(self, step: int) -> tuple[float, float]:
-        """Place [m] and speed [m/s] at the end of a step: half of the way accelerates, half of it
-        brakes."""
+        """Position [m] and speed [m/s] at the end of a step: the hand accelerates over half of the
+        path and brakes over the other half."""
         length = self._length
         steps = check_count(length, self._world.settings) * self.approach_steps
         share = min(1.0, step / steps)
@@ -184,10 +183,11 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
     Args:
         scene: the scene.
         station: table, board pose and hand.
-        engine: has the time step, or the name of a preset.
+        engine: engine with the time step, or the name of a preset.
         settings: phases of a trial.
-        motion: where the hand goes, if not as the settings or else the station say.
-        lock: run in worlds of the target alone, where that is the same.
+        motion: the hand's motion around the grasp; by default that of the settings, else the
+            station's.
+        lock: use single-target worlds, where the result is the same.
         meshcat: where to show the trials; recording is the caller's.
 
     Attributes:
@@ -225,7 +225,7 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
 
     @property
     def diagram(self) -> StationDiagram:
-        """Of Drake: scene and hand, which is shown where the trial is."""
+        """The Drake diagram of scene and hand that shows the trials."""
         return self._plain if self._picture is None else self._picture.diagram
 
     def run(
@@ -274,8 +274,8 @@ def hand_trial_of(
     """Builds the trial of an engine; see `HandTrial` and `MujocoTrial`.
 
     Args:
-        scene, station: as they have them.
-        engine: what steps it.
+        scene, station: the scene and the station.
+        engine: the engine, or the name of a preset.
         more: `settings`, `motion`, `lock`.
     """
     engine = as_engine(engine)

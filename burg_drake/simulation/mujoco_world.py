@@ -1,7 +1,6 @@
 """A scene under the hand in MuJoCo: its model, how a trial begins, its commands and its contacts.
 
-The model is compiled once. A trial sets its state, surfaces and pad stiffness, and nothing of an
-earlier one remains.
+The model is compiled once. Each trial resets its state, surfaces and pad stiffness.
 """
 
 from __future__ import annotations
@@ -43,10 +42,10 @@ from burg_drake.station import Engine, HandDescription, StationLike, as_station,
 
 
 def require_mujoco() -> None:
-    """Says how to install the package, if it is missing.
+    """Requires the package; the error says how to install it.
 
     Raises:
-        MissingDependencyError: it is.
+        MissingDependencyError: it is not installed.
     """
     if importlib.util.find_spec("mujoco") is None:
         raise MissingDependencyError(
@@ -56,7 +55,7 @@ def require_mujoco() -> None:
 
 
 def load_mujoco() -> Any:
-    """The module `mujoco`. What it warns of is read from its data: it writes no log file.
+    """Imports the module `mujoco`, without its log file; warnings are read from its data.
 
     Raises:
         MissingDependencyError: it is not installed.
@@ -71,22 +70,22 @@ class ModelIndex:
     """Numbers of bodies, geoms and joints in a model.
 
     Args:
-        model: MuJoCo's.
-        parts: of the hand.
+        model: the MuJoCo model.
+        parts: links and fingers of the hand.
 
     Attributes:
-        objects: bodies of what can move, by the names of instances.
-        fixed: bodies of what cannot, by name, the table too.
-        geoms: of both, by name.
-        pairs: with the table's plane, by name.
+        objects: movable bodies, by the names of instances.
+        fixed: fixed bodies by name, including the table.
+        geoms: geoms of both, by name.
+        pairs: contact pairs with the table's plane, by name.
         table: body of the table's box.
         carrier, hand, fingers: bodies.
         spheres: geoms of each finger's pad.
         finger_geoms: geoms of both fingers.
         palm: geoms of the hand's body.
         lift_joint, lift_qpos, lift_dof: of the carrier's joint.
-        lift_place, lift_speed: servos of the carrier.
-        finger_qpos, finger_dofs, finger_servos: of both fingers.
+        lift_place, lift_speed: position and velocity servos of the carrier.
+        finger_qpos, finger_dofs, finger_servos: positions, velocities and servos of both fingers.
     """
 
     def __init__(self, model: Any, parts: HandDescription) -> None:
@@ -129,17 +128,17 @@ def _name_bodies(bodies: dict[str, int], word: str) -> dict[str, int]:
 
 
 def _numbers_with_prefix(names: list[str], words: str) -> Indices:
-    """Numbers of the names that begin so."""
+    """Indices of the names that begin with a prefix."""
     return np.array([k for k, name in enumerate(names) if name.startswith(words)], dtype=np.intp)
 
 
 def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list[BodyContact]:
-    """What touches, one a pair of bodies.
+    """Contacts, one per pair of touching bodies.
 
     Args:
         model, data: MuJoCo's, after a step with elliptic cones.
-        shares: (geoms,) area that a geom stands for where it touches; 0 of those without [m^2].
-        table: body that the world's own geoms count as.
+        shares: (geoms,) contact area that each geom represents [m^2]; 0 for geoms without one.
+        table: the body to which the world's own geoms belong.
     """
     found = data.contact
     near = np.flatnonzero(found.dist < 0.0)
@@ -168,7 +167,7 @@ def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list
 
 
 def _forces(data: Any, contacts: Indices) -> Array:
-    """(N, 3) force of contacts on the second geom in the world; 0 where there is none."""
+    """Contact forces (N, 3) on the second geom in the world; 0 without contact."""
     address = np.asarray(data.contact.efc_address)[contacts]
     solved = address >= 0
     frame = np.asarray(data.contact.frame)[contacts[solved]].reshape(-1, 3, 3)
@@ -181,30 +180,30 @@ def _forces(data: Any, contacts: Indices) -> Array:
 class MujocoWorld:
     """The world of trials in one scene.
 
-    Bodies are called by their numbers in the model as Drake's are. What can move does so from the
-    start: all objects, or `alone` one of them.
+    Bodies are identified by their numbers in the model, as in Drake. Movable objects are never
+    locked: all objects, or only `alone`.
 
     Args:
-        scene, station: what stands where.
-        layout: the same in the world.
-        hand: the station's.
-        engine: has the time step.
+        scene, station: the scene and the station.
+        layout: poses of the bodies in the world.
+        hand: the station's hand.
+        engine: engine with the time step.
         settings: phases of a trial.
-        alone: the one object that can move, if not all can.
-        shown: called at each look.
+        alone: the only object that can move; None if all can.
+        shown: called at each contact check.
 
     Attributes:
         model, data: MuJoCo's.
         engine: as given.
         settings: as given, but `steady_time` is at least 0.1 s.
-        free, standing, fixed: bodies by name: what moves, what could but does not, and what never
-            does; the table is a fixed one.
+        free, standing, fixed: bodies by name: movable; movable only in another world; never
+            movable, including the table.
         table: its body.
         robot, robot_bodies: bodies of the hand.
-        fingers: of these the fingers.
-        body_names: what people call all of these.
-        hand_document: the hand.
-        robot_meets_hull: no hull is in the place of a target.
+        fingers: bodies of the two fingers.
+        body_names: display names of all bodies.
+        hand_document: the hand's document.
+        robot_meets_hull: False: no hull replaces a target.
 
     Raises:
         InvalidInputError: MuJoCo refuses the model.
@@ -228,7 +227,7 @@ class MujocoWorld:
         self._mj = mj = load_mujoco()
         self._scene, self._station, self._parts = scene, station, hand
         self._shown = shown
-        # Half of 0.1 s wrongly decides 1 of 60 grasps early.
+        # With 0.05 s, 1 of 60 grasps is decided early and wrongly.
         steady_time = max(settings.steady_time, 0.1)
         self.settings = replace(settings, steady_time=steady_time)
         self.engine, step = engine, engine.time_step
@@ -264,14 +263,14 @@ class MujocoWorld:
         self.body_names = {index: name for name, index in named.items()}
         self.body_names |= dict(zip(self.robot_bodies, links, strict=True))
         self._corners: dict[BodyIndex, Array] = {}
-        self._usable = not self.standing or not self._leans(moving[0])
+        self._usable = not self.standing or not self._may_lean(moving[0])
 
     def is_usable(self) -> bool:
-        """Whether trials can begin in it: not if the target may lean on what stands here."""
+        """Whether trials can begin here: False if the target may lean on a locked object."""
         return self._usable
 
     def invalidate(self) -> None:
-        """Every trial prepares it from scratch."""
+        """Does nothing, as every trial resets the whole world."""
 
     def prepare(
         self,
@@ -283,14 +282,14 @@ class MujocoWorld:
         friction: float | None,
         mass: float | None,
     ) -> None:
-        """Brings everything to the start of a trial: first the model, then the state.
+        """Resets model and state to the start of a trial.
 
         Args:
             instance: the target.
             X_WG: (4, 4) of the grasp frame in the world.
-            closed: how far the fingers are closed, from 0 (open) to 1 (pads together), and go on
-                closing; None if they are open and stay so.
-            direction_W: (3,) unit vector in which the hand will go at first.
+            closed: how far the fingers are closed at the start, from 0 (open) to 1 (pads together),
+                from where they close further; None if they stay open.
+            direction_W: (3,) unit vector of the hand's first motion.
             friction, mass: of the target, if not the library's.
         """
         model, data, hand = self.model, self.data, self._station.hand
@@ -301,7 +300,7 @@ class MujocoWorld:
             model.body_mass[target] = mass
         X_WH = hand.X_AH(X_WG)
         model.body_quat[self._index.hand] = quaternion_from_rotation(X_WH[:3, :3])
-        self._lay_lift(X_WH[:3, 3], direction_W)
+        self._place_lift(X_WH[:3, 3], direction_W)
         self._mj.mj_resetData(model, data)
         for at, finger in zip(self._index.finger_qpos, hand.fingers, strict=True):
             data.qpos[at] = finger.position(closed or 0.0)
@@ -318,18 +317,18 @@ class MujocoWorld:
         self._command_fingers(1.0)
 
     def turn_lift(self, direction_W: Array) -> None:
-        """Has the carrier's joint go in another direction (3,) from where the hand is, at rest
-        there; all else moves on."""
+        """Turns the carrier's joint to another direction (3,), at rest at the hand's current place;
+        all other bodies keep moving."""
         data, index = self.data, self._index
         self._mj.mj_kinematics(self.model, data)
         place = np.array(data.xpos[index.hand])
-        self._lay_lift(place, direction_W)
+        self._place_lift(place, direction_W)
         data.qpos[index.lift_qpos] = data.qvel[index.lift_dof] = 0.0
         self.command_lift(0.0, 0.0, 0.0)
 
     def command_lift(self, travelled: float, speed: float, acceleration: float) -> None:
-        """Where the carrier's joint shall be [m] and how fast it shall go [m/s] after the next
-        step, and how it gets there [m/s^2]."""
+        """Commands position [m] and speed [m/s] of the carrier's joint after the next step, and its
+        acceleration until then [m/s^2]."""
         index = self._index
         inertia = self.model.dof_armature[index.lift_dof]
         inertia += self.model.body_subtreemass[index.carrier]
@@ -338,19 +337,19 @@ class MujocoWorld:
         self.data.ctrl[self._index.lift_speed] = speed
 
     def advance(self, steps: int) -> None:
-        """Steps with the present commands."""
+        """Advances the simulation with the current commands."""
         self._mj.mj_step(self.model, self.data, nstep=steps)
 
     @property
     def time(self) -> float:
-        """Since the start of the trial [s]."""
+        """Time since the start of the trial [s]."""
         return float(self.data.time)
 
-    def look(self) -> list[BodyContact]:
-        """All that touch, by pairs of bodies; areas are those of the pads.
+    def read_contacts(self) -> list[BodyContact]:
+        """Current contacts, one per pair of bodies; areas are those of the pads.
 
         Raises:
-            OtherTouched: what moves meets what could, too: that is for the complete world.
+            OtherTouched: a moving body meets a body that only the complete world lets move.
         """
         contacts = summarize_contacts(self.model, self.data, self._shares, int(self.table))
         if any(c.body_A in self._standing or c.body_B in self._standing for c in contacts):
@@ -360,30 +359,30 @@ class MujocoWorld:
         return contacts
 
     def state(self) -> Array:
-        """What `go_back` goes back to."""
+        """The state that `restore_state` restores."""
         kind = self._mj.mjtState.mjSTATE_INTEGRATION
         state = np.zeros(self._mj.mj_stateSize(self.model, kind))
         self._mj.mj_getState(self.model, self.data, state, kind)
         return state
 
-    def go_back(self, time: float, state: Array) -> None:
-        """Is again as at a time [s], which the state has."""
+    def restore_state(self, time: float, state: Array) -> None:
+        """Restores a state and its time [s]."""
         self._mj.mj_setState(self.model, self.data, state, self._mj.mjtState.mjSTATE_INTEGRATION)
         self._mj.mj_forward(self.model, self.data)
 
-    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
-        """The bodies: all of them move anyway."""
+    def with_neighbours(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies themselves, as none is locked."""
         return set(bodies)
 
     def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
-        """Nothing is locked."""
+        """Does nothing, as no body is locked."""
 
     def finger_speed(self) -> float:
         """Speed of the faster finger [m/s]."""
         return float(np.abs(self.data.qvel[self._index.finger_dofs]).max())
 
     def robot_positions(self, model: str) -> Array | None:
-        """Of `hand` and `lift`, as a station diagram has them."""
+        """Positions of `hand` and `lift`, in the order of a station diagram."""
         if model == "lift":
             return np.array([self.travelled()])
         fingers = np.array(self.data.qpos[self._index.finger_qpos])
@@ -394,12 +393,12 @@ class MujocoWorld:
         return float(self.data.qpos[self._index.lift_qpos])
 
     def X_WG(self) -> Array:
-        """(4, 4) grasp frame."""
+        """Grasp frame (4, 4) in the world."""
         X_WG: Array = self.X_WB(self.robot_bodies[0]) @ self._station.hand.X_HG.matrix()
         return X_WG
 
     def X_WB(self, body: BodyIndex) -> Array:
-        """(4, 4) of a body."""
+        """Pose (4, 4) of a body in the world."""
         X_WB, k = np.eye(4), int(body)
         X_WB[:3, :3] = self.data.xmat[k].reshape(3, 3)
         X_WB[:3, 3] = self.data.xpos[k]
@@ -417,24 +416,25 @@ class MujocoWorld:
         return self._corners[body]
 
     def _command_fingers(self, closing: float) -> None:
-        """Closes (1), or opens (-1) and presses against the stops."""
+        """Commands the fingers to close (1), or to open (-1) against their stops."""
         hand = self._station.hand
         speeds = [np.sign(f.closed - f.open) * hand.closing_speed for f in hand.fingers]
         self.data.ctrl[self._index.finger_servos] = closing * np.array(speeds)
 
-    def _lay_lift(self, p_WH: Array, direction_W: Array) -> None:
-        """Places the carrier, with its joint along a direction."""
+    def _place_lift(self, p_WH: Array, direction_W: Array) -> None:
+        """Places the carrier, with its joint along a direction (3,)."""
         self.model.body_pos[self._index.carrier] = p_WH
         self.model.jnt_axis[self._index.lift_joint] = direction_W
         self._mj.mj_setConst(self.model, self._scratch)
 
     def _set_surfaces(self, instance: str, mu: float) -> None:
-        """Gives contacts Drake's coefficients 2ab/(a+b): all of target and hand, and those with the
-        table. What others have with each other is what they have with the target."""
-        # MuJoCo takes surfaces of the geom with the higher priority; the target has 0.
+        """Sets Drake's friction coefficients 2ab/(a+b) for contacts with the target, the hand or
+        the table. Other objects meet each other with the coefficient that they have with the
+        target."""
+        # MuJoCo uses the surface of the geom with the higher priority; the target has 0.
         hand_priority = 1
-        others_priority = 2  # Of free objects other than the target.
-        fixed_priority = 3  # Of bodies that do not move.
+        others_priority = 2  # Priority of free objects other than the target.
+        fixed_priority = 3  # Priority of bodies that do not move.
         model, index = self.model, self._index
         for geoms in (index.finger_geoms, index.palm):
             model.geom_priority[geoms] = hand_priority
@@ -454,7 +454,7 @@ class MujocoWorld:
                 model.pair_friction[index.pairs[name], :2] = combined_friction(own, table)
 
     def _set_pads(self, target: int) -> None:
-        """Gives the pads their stiffness, which in MuJoCo depends on what they touch."""
+        """Sets the stiffness of the pads, which in MuJoCo depends on the body that they touch."""
         model = self.model
         for finger, body, spheres in zip(
             self._parts.fingers, self._index.fingers, self._index.spheres, strict=True
@@ -464,8 +464,8 @@ class MujocoWorld:
             model.geom_solimp[spheres, :2] = impedance
             model.geom_solref[spheres] = solref
 
-    def _leans(self, instance: str) -> bool:
-        """Whether the target may lean on what could move, where it stands."""
+    def _may_lean(self, instance: str) -> bool:
+        """Whether the target is so close to a movable object that it may lean on it."""
         leaning_distance = 0.001  # Metres.
         model, data, mj = self.model, self._scratch, self._mj
         mj.mj_resetData(model, data)
@@ -481,5 +481,5 @@ class MujocoWorld:
 
 
 def combined_friction(a: float, b: float) -> float:
-    """Drake's coefficient for two surfaces."""
+    """Friction coefficient that Drake uses for two surfaces."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0

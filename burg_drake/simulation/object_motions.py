@@ -14,10 +14,10 @@ from burg_drake.simulation.settings import TrialSettings
 
 
 class PlacedBodies(Protocol):
-    """What a tracker has to know of a world."""
+    """Poses and shapes of bodies, as a motion tracker needs them."""
 
     def X_WB(self, body: BodyIndex) -> Array:
-        """(4, 4) of a body."""
+        """Pose (4, 4) of a body in the world."""
         ...
 
     def center(self, body: BodyIndex) -> Array:
@@ -30,13 +30,13 @@ class PlacedBodies(Protocol):
 
 
 class MotionTracker:
-    """Watches bodies: the point of each that has moved farthest, how far it has turned, and how its
-    centre of mass moves.
+    """Tracks bodies: the displacement of the farthest-moved point, the rotation, and the motion of
+    the centre of mass.
 
     Args:
-        world: with the bodies where they stand. No point of a body moves farther than the corner
-            of its hull that moves farthest.
-        bodies: which to watch.
+        world: with the bodies at their start. A body's farthest-moved point is a corner of its
+            convex hull.
+        bodies: bodies to track.
 
     Attributes:
         farthest: largest displacement of each body's farthest point since the start [m].
@@ -47,20 +47,20 @@ class MotionTracker:
         self._world = world
         self._start = {index: self._pose(index) for index in bodies}
         self._last = {index: self._world.center(index) for index in self._start}
-        self._height = {index: self._own_height(index) for index in self._start}
+        self._height = {index: self._center_height(index) for index in self._start}
         self._overturned: set[BodyIndex] = set()
         self.farthest = dict.fromkeys(self._start, 0.0)
         self.turned = dict.fromkeys(self._start, 0.0)
 
     def update(self, still: Collection[BodyIndex]) -> float:
-        """Measures; those in `still` are at rest.
+        """Measures all bodies, except those in `still`, which are at rest.
 
         Returns:
-            The largest motion of a centre of mass since the last look [m].
+            The largest motion of a centre of mass since the last update [m].
         """
         largest = 0.0
         for index in self._start.keys() - still:
-            moved, angle = self._since_start(index)
+            moved, angle = self._motion_since_start(index)
             self.farthest[index] = max(self.farthest[index], moved)
             self.turned[index] = max(self.turned[index], angle)
             if self._is_tilted(index) and self._is_higher_or_lower(index):
@@ -71,8 +71,8 @@ class MotionTracker:
         return largest
 
     def toppled(self, bodies: Mapping[str, BodyIndex]) -> list[str]:
-        """Names of those of the bodies that are tilted now, and went over an edge on the way or
-        rest at another height. What rolls does neither: a ball, or a can that lies."""
+        """Names of toppled bodies: they are tilted, and went over an edge or rest at another
+        height. Rolling bodies, such as a ball or a lying can, do neither."""
         return [
             name
             for name, index in bodies.items()
@@ -80,30 +80,32 @@ class MotionTracker:
         ]
 
     def _is_tilted(self, index: BodyIndex) -> bool:
-        """Whether the axis that was upright no longer is."""
+        """Whether the axis that was vertical at the start no longer is."""
         cosine = self._pose(index)[0][2] @ self._start[index][0][2]
         return bool(cosine < math.cos(math.radians(45.0)))
 
     def _is_higher_or_lower(self, index: BodyIndex) -> bool:
-        """Whether the centre of mass is at another height above the body's lowest point."""
-        min_height_change = 0.003  # Metres. What rolls keeps the height of its centre of mass.
+        """Whether the height of the centre of mass above the body's lowest point has changed."""
+        min_height_change = 0.003  # Metres. A rolling body keeps the height of its centre of mass.
         min_height_share = 0.1  # Share of the height.
         before = self._height[index]
-        return abs(self._own_height(index) - before) > max(
+        return abs(self._center_height(index) - before) > max(
             min_height_change, min_height_share * before
         )
 
-    def _own_height(self, index: BodyIndex) -> float:
-        """Of the centre of mass above the body's lowest point [m]; what is below does not count."""
+    def _center_height(self, index: BodyIndex) -> float:
+        """Height of the centre of mass above the body's lowest point [m], whatever lies below
+        it."""
         R_WB, p_WB = self._pose(index)
         lowest = (self._world.corners(index) @ R_WB[2]).min() + p_WB[2]
         return float(self._world.center(index)[2] - lowest)
 
-    def _since_start(self, index: BodyIndex) -> tuple[float, float]:
-        """How far the farthest point of a body is from where it was [m], and its rotation [rad].
+    def _motion_since_start(self, index: BodyIndex) -> tuple[float, float]:
+        """Displacement of a body's farthest-moved point [m], and its rotation [rad], since the
+        start.
 
-        The way of a point is linear in its place on the body, and its length convex: no point
-        within the hull has gone farther than every corner.
+        The displacement is linear in the point, and its norm convex, so its largest value is at a
+        corner of the hull.
         """
         (R_WB, p_WB), (R_WB_start, p_WB_start) = self._pose(index), self._start[index]
         p_PP_W = self._world.corners(index) @ (R_WB - R_WB_start).T + (p_WB - p_WB_start)
@@ -121,7 +123,7 @@ SLIP_LEVER = 0.01
 
 
 class GripMotion:
-    """Follows one target in the hand.
+    """Tracks the motion of one target in the hand.
 
     Args:
         settings: phases of the trial.
@@ -135,16 +137,16 @@ class GripMotion:
         self._motions: list[float] = []
 
     def grip(self) -> None:
-        """Both fingers hold the target, as it was at the last look."""
+        """Marks the target's last recorded pose as the start of the grip."""
         self._X_GO_grip = self._X_GO_last
 
     def record(self, X_GO: Array, *, others_rest: bool) -> None:
-        """Takes down where the target is.
+        """Records the target's pose.
 
         Args:
             X_GO: (4, 4) target in the grasp frame.
-            others_rest: whether all other objects are at rest; if not, what was before tells
-                nothing any more of what is to come.
+            others_rest: whether all other objects are at rest; if not, earlier records are no
+                longer used for predictions.
         """
         distance, angle = motion_in_hand(self._X_GO_last, X_GO)
         self._X_GO_last = X_GO
@@ -154,19 +156,19 @@ class GripMotion:
             self._motions.clear()
 
     def reset(self) -> None:
-        """From now on only later looks tell what is to come."""
+        """Discards earlier records for predictions."""
         self._motions.clear()
 
     @property
     def since_grip(self) -> tuple[float, float]:
-        """Slip [m] and tilt [rad]; NaN if both fingers never held the target."""
+        """Slip [m] and tilt [rad] since the grip; NaN if both fingers never held the target."""
         if self._X_GO_grip is None:
             return math.nan, math.nan
         return motion_in_hand(self._X_GO_grip, self._X_GO_last)
 
     @property
     def is_beyond_limits(self) -> bool:
-        """Whether the target has turned or slid so far that it does not count as lifted."""
+        """Whether tilt or slip exceeds the limits for a lifted target."""
         slip, tilt = self.since_grip
         return slip > self._settings.slip_limit or tilt > self._settings.tilt_limit
 
@@ -179,13 +181,13 @@ class GripMotion:
         return enough and max(recent) <= settings.creep_speed * settings.poll
 
     def is_coming_to_rest(self, time: float) -> bool:
-        """Whether the target moves in the hand no faster than before, and not far any more.
+        """Whether the target moves in the hand no faster than before, and will not creep far.
 
         Drake's friction is slightly viscous: below its limit a load does not slide but creeps, at a
-        constant speed that is the higher, the larger the time step.
+        constant speed that grows with the time step.
 
         Args:
-            time: that is left at most [s].
+            time: longest remaining time [s].
         """
         n = self._settings.steady_polls
         before, now = sum(self._motions[-2 * n : -n]), sum(self._motions[-n:])
@@ -194,15 +196,14 @@ class GripMotion:
         return self._further_creep(time) <= self._settings.creep_distance
 
     def is_verdict_stable(self, time: float) -> bool:
-        """Whether the target is beyond the limits for good, or will not come there, whatever creep
-        still adds.
+        """Whether further creep cannot change if tilt and slip are within the limits.
 
         Args:
-            time: that is left at most [s].
+            time: longest remaining time [s].
         """
         settings, creep = self._settings, self._further_creep(time)
         slip, tilt = self.since_grip
-        slid = creep * (1.0 + slip / SLIP_LEVER)  # turning moves what has slid by its distance
+        slid = creep * (1.0 + slip / SLIP_LEVER)  # turning also moves a slid target
         turned = creep / SLIP_LEVER
         if slip - slid > settings.slip_limit or tilt - turned > settings.tilt_limit:
             return True
@@ -210,12 +211,13 @@ class GripMotion:
         return slip + slid <= settings.slip_limit and max_tilt <= settings.tilt_limit
 
     def _further_creep(self, time: float) -> float:
-        """How far the target gets in a time [s] if it goes on as during the last looks [m]."""
+        """Motion of the target in a time [s], extrapolated from the last records [m]."""
         recent = self._motions[-self._settings.steady_polls :]
         return sum(recent) / len(recent) * (time / self._settings.poll)
 
 
 def motion_in_hand(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
-    """How a target has moved in the hand: of the point at the grasp [m], and its angle [rad]."""
+    """Motion of a target in the hand: of its point at the grasp [m], and its rotation angle
+    [rad]."""
     X_GG = X_GO_later @ inverse(X_GO)
     return float(np.linalg.norm(X_GG[:3, 3])), float(rotation_angle(X_GG[:3, :3]))

@@ -17,7 +17,7 @@ from burg_drake.simulation.settings import Noise
 
 @dataclass(frozen=True, eq=False)
 class PerturbedTrial:
-    """What a perturbed trial is executed with.
+    """Parameters of a perturbed trial.
 
     Attributes:
         X_OG: (4, 4) grasp in the target's frame.
@@ -31,10 +31,10 @@ class PerturbedTrial:
 
 @dataclass(frozen=True)
 class SuccessRate:
-    """What became of perturbed trials.
+    """Outcomes of perturbed trials.
 
     Attributes:
-        outcomes: number of trials by outcome. A hand that collides at the start fails, too.
+        outcomes: number of trials by outcome, including hand collisions at the start.
     """
 
     outcomes: Counter[Outcome]
@@ -46,7 +46,7 @@ class SuccessRate:
 
     @property
     def lifted(self) -> int:
-        """Number of those that succeeded."""
+        """Number of trials that succeeded."""
         return self.outcomes[Outcome.LIFTED]
 
     @property
@@ -56,7 +56,7 @@ class SuccessRate:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the probability, after Wilson."""
+        """Wilson 95 % interval of the probability."""
         return wilson_interval(self.lifted, self.trials)
 
 
@@ -65,14 +65,13 @@ def perturb(
 ) -> PerturbedTrial:
     """Draws one perturbed repeat of a trial.
 
-    The draw follows from seed, grasp and number of the repeat alone. The same ones with other
-    deviations are the same errors scaled.
+    The draw depends only on seed, grasp and number of the repeat; the standard deviations only
+    scale it.
 
     Args:
-        X_OG: (4, 4) grasp in the target's frame; it is moved and turned by normally distributed
-            errors along and about the axes of G.
-        mass, friction: of the target [kg, -]; they are multiplied by e to the power of a normally
-            distributed number, and never reach 0.
+        X_OG: (4, 4) grasp in the target's frame; it is displaced and rotated by normally
+            distributed errors along and about the axes of G.
+        mass, friction: of the target [kg, -]; they are multiplied by a log-normal factor.
         noise: standard deviations.
         seed: of the run.
         grasp: id of the grasp.

@@ -1,13 +1,13 @@
 """Brings objects that hardly move to rest, with the rolling resistance that Drake's contacts lack.
 
-Something slow may still have far to go: a banana rocks for seconds. Kinetic damping takes a body
-to its equilibrium directly: a body that has slowed down has passed its equilibrium, and is stopped
+A slow object may still move far: a banana rocks for seconds. Kinetic damping takes a body to its
+equilibrium directly: a body that has slowed down has passed its equilibrium, and is stopped
 (dynamic relaxation, P. Cundall 1976).
 
-Rolling resistance is a moment of at most c R N, for a radius R pressed on with N, so that balls
-and lying cylinders stay on slopes up to c. Below that limit the moment is that of a damped spring
-from where the body stopped: the elastic-plastic model (C) of Ai, Chen, Rotter and Ooi, "Assessment
-of rolling resistance models in discrete element simulations", Powder Technology 206, 2011.
+Rolling resistance is a moment of at most c R N, for a radius R pressed on with N, so that balls and
+lying cylinders stay on slopes up to c. Below that limit the moment is that of a damped spring from
+where the body stopped: the elastic-plastic model (C) of Ai, Chen, Rotter and Ooi, "Assessment of
+rolling resistance models in discrete element simulations", Powder Technology 206, 2011.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ ROLLING_RESISTANCE = 0.002
 
 
 def resist_rolling(built: StationDiagram, simulator: Simulator, share: float = 1.0) -> None:
-    """Lets rolling resistance act on the free balls and cylinders of a scene.
+    """Applies rolling resistance to the free balls and cylinders of a scene.
 
     Args:
         built: the diagram; nothing else applies forces to it.
-        simulator: of the diagram; its monitor is taken.
-        share: of the resistance that acts.
+        simulator: simulator of the diagram; its monitor is replaced.
+        share: factor on the resistance.
     """
     rolling = []
     for name in built.free:
@@ -59,13 +59,13 @@ def resist_rolling(built: StationDiagram, simulator: Simulator, share: float = 1
 
 
 class _RollingBody:
-    """A ball, or a cylinder, which rolls about its axis alone."""
+    """A ball, or a cylinder, which only rolls about its axis."""
 
     def __init__(
         self, built: StationDiagram, name: str, primitive: Primitive, share: float
     ) -> None:
-        spring_share = 0.2  # Stiffness over what would stop a rolling body within a time step.
-        damper_share = 0.5  # Damping over what would stop a rolling body within a time step.
+        spring_share = 0.2  # Relative to the stiffness that stops a rolling body in a time step.
+        damper_share = 0.5  # Relative to the damping that stops a rolling body in a time step.
         self._body = built.plant.get_body(built.free[name])
         axis = primitive.X_OP.matrix()[:3, 2]
         self._along = np.eye(3) if primitive.shape == "sphere" else np.outer(axis, axis)
@@ -79,7 +79,7 @@ class _RollingBody:
         self._turned = np.zeros(3)
 
     def force(self, context: Context) -> ExternallyAppliedSpatialForce:
-        """The moment against its rolling; asked for once a time step."""
+        """The moment against its rolling; called once per time step."""
         R_WO = self._body.EvalPoseInWorld(context).rotation().matrix()
         w_WO = self._body.EvalSpatialVelocityInWorld(context).rotational()
         rolling = R_WO @ self._along @ R_WO.T @ w_WO
@@ -93,7 +93,7 @@ class _RollingBody:
 
 
 def _limit_length(vector: Array, limit: float) -> Array:
-    """A vector (3,), of a length of at most `limit`."""
+    """A vector (3,), shortened to a length of at most `limit`."""
     length = float(np.linalg.norm(vector))
     return vector if length <= limit else vector * (limit / length)
 
@@ -109,17 +109,17 @@ WINDOW_DURATION = STEPS_PER_WINDOW * RELAXING_ENGINE.time_step
 CALM_SPEED = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """Mean speed over a window below which an object stays where it is."""
 GROUP_CALM_SPEED = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
-"""The same of objects that touch each other, which creep slower and slower."""
+"""The same for objects that touch each other, whose creep decays."""
 ZERO_VELOCITY = SpatialVelocity(np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
 class RelaxationResult:
-    """Where relaxing ended.
+    """Final state of a relaxation.
 
     Attributes:
-        X_WO: (4, 4) poses of what is still on the table, by name.
-        together: those that were not at rest, and touched others.
+        X_WO: (4, 4) poses of the objects that are still on the table, by name.
+        together: objects that were not at rest, and touched others.
     """
 
     X_WO: Mapping[str, Array]
@@ -134,14 +134,14 @@ def relax(
 ) -> RelaxationResult:
     """Steps objects of a scene, from where the documents place everything, until they are calm.
 
-    Objects that touch each other come to rest together; once they are, they are left alone.
+    Objects that touch each other come to rest together, and are then frozen.
 
     Args:
         built: the scene without a robot, with `RELAXING_ENGINE` steps.
         moving: objects that are to come to rest, with all that touches them; others stay.
-        time_limit: time that may be stepped [s].
+        time_limit: simulated time allowed [s].
         before_window: called every 0.1 s with the plant's Context, whose velocities it may change,
-            and what is awake.
+            and the moving bodies.
 
     Raises:
         RuntimeError, SystemExit: from Drake.
@@ -150,7 +150,7 @@ def relax(
     windows = max(1, round(time_limit / WINDOW_DURATION))
     for _ in range(windows):
         if before_window is not None:
-            before_window(relaxation.context, relaxation.awake)
+            before_window(relaxation.context, relaxation.moving_bodies)
         if not relaxation.window():
             break
     return relaxation.result()
@@ -158,7 +158,7 @@ def relax(
 
 @dataclass
 class _Island:
-    """Objects that touch each other, and for how many windows all of them have been calm."""
+    """Objects that touch each other, and the number of windows for which all have been calm."""
 
     bodies: list[BodyIndex]
     calm: int = 0
@@ -183,13 +183,13 @@ class _Relaxation:
         self._steps = 0
 
     @property
-    def awake(self) -> list[BodyIndex]:
+    def moving_bodies(self) -> list[BodyIndex]:
         """Bodies that are not calm yet."""
         return [index for island in self._islands for index in island.bodies]
 
     def window(self) -> int:
-        """Steps on; returns how many islands are not calm yet."""
-        awake = [self._plant.get_body(index) for index in self.awake]
+        """Simulates one window; returns the number of islands that are not calm yet."""
+        awake = [self._plant.get_body(index) for index in self.moving_bodies]
         before = {body.index(): body_place(body, self.context) for body in awake}
         for _ in range(STEPS_PER_WINDOW):
             self._steps += 1
@@ -204,7 +204,7 @@ class _Relaxation:
         return len(self._islands)
 
     def result(self) -> RelaxationResult:
-        """Where everything is now."""
+        """The current state as a result."""
         built, together = self._built, self._loose - self._alone
         X_WO = {}
         for name, index in built.free.items():
@@ -216,7 +216,7 @@ class _Relaxation:
         return RelaxationResult(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
 
     def _inspect(self, island: _Island) -> None:
-        """Takes what has fallen out of an island, and freezes it once it is calm."""
+        """Removes fallen objects from an island, and freezes the island once it is calm."""
         for index in [i for i in island.bodies if is_below(self._built, self.context, i)]:
             island.bodies.remove(index)
             self._fallen.add(index)
@@ -229,7 +229,7 @@ class _Relaxation:
             freeze_bodies(self._built, self._root, island.bodies)
 
     def _damp(self, body: RigidBody) -> None:
-        """Stops a body that has got slower."""
+        """Stops a body that has slowed down."""
         V_WO = self._plant.EvalBodySpatialVelocityInWorld(self.context, body)
         R_WO = self._plant.EvalBodyPoseInWorld(self.context, body).rotation()
         M_OO_W = body.default_spatial_inertia().ReExpress(R_WO)

@@ -1,4 +1,4 @@
-"""When objects count as at rest, and how far they are from where their document places them."""
+"""Criterion for objects at rest, and their displacement from the poses in the document."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class RestCriterion:
         speed: of its centre of mass, below this [m/s] ...
         turning: ... and of its rotation, below this [rad/s] ...
         duration: ... for this long [s]: something that rocks stands still twice a period.
-        poll: interval at which poses are looked at [s].
-        dying: what gets slower from poll to poll rests below so many times these speeds.
+        poll: interval between checks of the poses [s].
+        dying: factor on both speeds for a body that gets slower from poll to poll.
     """
 
     speed: float = 0.005
@@ -39,7 +39,7 @@ class RestCriterion:
     dying: float = 1.0
 
     def is_rest(self, now: BodySpeed, before: BodySpeed | None) -> bool:
-        """Whether a body is at rest that has this speed, and had another one a poll before."""
+        """Whether a body is at rest, by its speed now and at the previous poll."""
         slower = before is not None and now.speed < before.speed and now.turning < before.turning
         factor = self.dying if slower else 1.0
         return now.speed < factor * self.speed and now.turning < factor * self.turning
@@ -47,7 +47,7 @@ class RestCriterion:
 
 @dataclass(frozen=True)
 class BodySpeed:
-    """How fast a body moves.
+    """Linear and angular speed of a body.
 
     Attributes:
         speed: of its centre of mass [m/s].
@@ -60,12 +60,12 @@ class BodySpeed:
 
 @dataclass(frozen=True)
 class SettlingResult:
-    """How settling ended.
+    """Result of settling.
 
     Attributes:
-        duration: simulated time that it took [s].
-        moving: bodies that still moved shortly before the end, with their last speed; none if all
-            came to rest.
+        duration: simulated time [s].
+        moving: last speed of each body that still moved shortly before the end; empty if all came
+            to rest.
     """
 
     duration: float
@@ -73,7 +73,7 @@ class SettlingResult:
 
     @property
     def at_rest(self) -> bool:
-        """Everything came to rest within the time allowed."""
+        """Whether all bodies came to rest within the time limit."""
         return not self.moving
 
 
@@ -85,14 +85,14 @@ def settle(
     criterion: RestCriterion = RestCriterion(),
     before_poll: Callable[[], None] | None = None,
 ) -> SettlingResult:
-    """Advances a simulator until bodies are at rest, or time is up.
+    """Advances a simulator until bodies are at rest, or the time limit is reached.
 
     Args:
         simulator: of a diagram with `plant` in it; its context is advanced.
         plant: a finalized plant.
-        bodies: to be at rest, all of them.
+        bodies: bodies that have to come to rest.
         time_limit: simulated time allowed [s].
-        criterion: what counts as rest.
+        criterion: criterion for rest.
         before_poll: called at the beginning of each poll interval; may change the state.
 
     Raises:
@@ -126,7 +126,7 @@ def settle(
 
 
 def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
-    """Rotation (3, 3) and centre of mass (3,) in the world."""
+    """Rotation (3, 3) and centre of mass (3,) of a body in the world."""
     X_WO = body.EvalPoseInWorld(context)
     p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
     return X_WO.rotation().matrix(), p_WOcm
@@ -135,7 +135,7 @@ def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
 def mean_speed(
     before: tuple[Array, Array], after: tuple[Array, Array], interval: float
 ) -> BodySpeed:
-    """Between two places of a body an interval [s] apart."""
+    """Mean speed between two poses of a body, an interval [s] apart."""
     turn = before[0].T @ after[0]
     # chordal distance; exact for small turns, where the cosine is not
     angle = 2.0 * np.arcsin(min(1.0, np.linalg.norm(turn - np.eye(3)) / np.sqrt(8.0)))
@@ -145,7 +145,7 @@ def mean_speed(
 
 @dataclass(frozen=True)
 class Displacement:
-    """How far an object was moved.
+    """Displacement of an object.
 
     Attributes:
         distance: of its centre of mass [m].
@@ -157,12 +157,12 @@ class Displacement:
 
 
 def displacement_from_document(built: StationDiagram, name: str, X_WO: Array) -> Displacement:
-    """How far an instance is from its place in the document.
+    """Displacement of an instance from its pose in the document.
 
     Args:
         built: the diagram.
         name: of the instance.
-        X_WO: (4, 4) where it is.
+        X_WO: (4, 4) current pose.
     """
     X_OO = inverse(built.X_WO(name)) @ X_WO
     p_OOcm = np.array(built.scene.entry(name).mass_properties.center_of_mass)
@@ -171,11 +171,11 @@ def displacement_from_document(built: StationDiagram, name: str, X_WO: Array) ->
 
 
 def depth_in_table(scene: Scene, X_WO: Array, name: str) -> float:
-    """How far what an instance rests with, at `X_WO`, is below the table's top [m].
+    """Depth of an instance's contact geometry at `X_WO` below the table's top [m].
 
     Args:
         scene: the scene.
-        X_WO: (4, 4) where the instance is.
+        X_WO: (4, 4) pose of the instance.
         name: of the instance.
     """
     p_OC = support_vertices(scene.library, scene.instance(name).object)

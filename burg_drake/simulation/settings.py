@@ -21,23 +21,24 @@ class TrialSettings:
     """Phases of a trial.
 
     Attributes:
-        motion: where the hand goes; None if as the station says.
-        lift_time: duration of a straight segment of 0.30 m with the target [s]: half of it
-            accelerates and half of it brakes, as they do, as hard, on a shorter way.
-        hold_time: how long the target must be held at the end of the way [s].
+        motion: the hand's motion around the grasp; None for the station's.
+        lift_time: duration of a straight segment of 0.30 m with the target [s]: the hand
+            accelerates over one half and brakes over the other; shorter segments have the same
+            acceleration.
+        hold_time: how long the target must be held at the end of the lift [s].
         creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
         creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
             trials early, see `Engine.whole_trial`.
-        steady_time: how long that, and free air, and the rest of all others, must last [s].
-        poll: interval at which contacts are looked at [s].
+        steady_time: how long the target must stick, free of contact, with all others at rest [s].
+        poll: interval between contact checks [s].
         settled_speed: the fingers have closed when they are slower than this [m/s] ...
         settled_time: ... for this long [s].
-        close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
-            the time that it takes to close.
-        disturbance: others that are moved by more than this count as disturbed [m].
-        tilt_limit: a target that has turned in the hand by more than this since the grip does not
-            count as lifted, though it is held [rad]; pi: it may turn as it likes.
-        slip_limit: likewise of one that has slid [m]; infinite: it may slide as it likes.
+        close_timeout: longest time for closing [s]; for a slow hand, twice its closing time.
+        disturbance: other objects that move farther than this count as disturbed [m].
+        tilt_limit: a held target that has rotated farther than this in the hand since the grip does
+            not count as lifted [rad]; pi for no limit.
+        slip_limit: likewise for a target that has slid farther than this [m]; infinite for no
+            limit.
         approach: whether the hand alone begins at the pregrasp, and not at the grasp.
     """
 
@@ -55,7 +56,7 @@ class TrialSettings:
         "tilt_limit": (0.0, math.pi),
         "slip_limit": (0.0, math.inf),
     }
-    """Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
+    """Values for which a trial is meaningful, and ends within minutes at the shortest steps."""
 
     motion: GraspMotion | None = None
     lift_time: float = 1.25
@@ -77,7 +78,7 @@ class TrialSettings:
 
     @property
     def acceleration(self) -> float:
-        """Of the hand on its straight segments with the target [m/s^2]."""
+        """Acceleration of the hand on its straight segments with the target [m/s^2]."""
         return 4.0 * REFERENCE_LIFT_LENGTH / self.lift_time**2
 
     def time_of(self, length: float) -> float:
@@ -86,29 +87,30 @@ class TrialSettings:
 
     @property
     def steady_polls(self) -> int:
-        """Looks in `steady_time`."""
+        """Number of contact checks in `steady_time`."""
         return max(1, round(self.steady_time / self.poll))
 
 
 NO_GRIP_LIMITS = {"tilt_limit": math.pi, "slip_limit": math.inf}
-"""Settings with which a held target counts as lifted, however it lies in the hand."""
+"""Limits with which every held target counts as lifted, however it moved in the hand."""
 DEFAULT_TRIAL = TrialSettings()
 """Phases that `evaluate` and `replay` use."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadSettings:
-    """How a grip is loaded.
+    """Loads of a grip.
 
     Attributes:
-        smallest, largest: accelerations that are tried [g].
-        tolerance: relative distance between the largest that is borne and the next that is not.
-        slide: the target has left its place when its point at the grasp has moved in the hand by
-            more than this [m]; it has left, too, when a finger does not touch it.
-        tug_rise: a tug grows to its full force in this time [s], which it then keeps ...
-        tug_time: ... for this long [s]; less if the target is at rest under it.
+        smallest, largest: range of the tried accelerations [g].
+        tolerance: relative distance between the largest load withstood and the next load that
+            fails.
+        slide: a load fails when the target's point at the grasp moves farther than this in the hand
+            [m], or a finger loses contact.
+        tug_rise: time in which a tug grows to its full force [s], which is then constant ...
+        tug_time: ... for this long [s], or until the target is at rest.
         frequency: of shaking [Hz].
-        periods: of shaking; the amplitude grows during the first one.
+        periods: number of periods of shaking; the amplitude grows during the first one.
     """
 
     smallest: float = 0.05
@@ -133,11 +135,12 @@ class LoadSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionSettings:
-    """Which coefficients are tried.
+    """Search range of the friction coefficient.
 
     Attributes:
         smallest, largest: coefficients.
-        tolerance: relative distance between the smallest that lifts and the next that does not.
+        tolerance: relative distance between the smallest coefficient that lifts and the next that
+            fails.
     """
 
     smallest: float = 0.02
@@ -185,4 +188,4 @@ class Noise:
 SETTLING_TIME = 10.0
 """Seconds of simulated time in which a scene must come to rest."""
 SETTLING_ENGINE = "screening"
-"""Preset used while objects fall; they come to rest with time steps of their own."""
+"""Preset used while objects fall; `relax` has its own time step."""

@@ -39,15 +39,15 @@ from burg_drake.station import (
 
 @dataclass(frozen=True)
 class SettledScene:
-    """A scene after a while.
+    """A simulated scene at rest, or at the time limit.
 
     Attributes:
-        scene: the scene with all free objects where they are now, but without the fallen ones.
+        scene: the scene with the final poses of all free objects, without the fallen ones.
         duration: simulated time [s].
-        moving: objects that still move at the end, and how fast; none if all came to rest. Those
-            that creep by more than 0.5 mm or 0.1 degrees in 5 s are among them.
+        moving: speed of each object that still moves at the end; empty if all came to rest.
+            Includes objects that creep by more than 0.5 mm or 0.1 degrees in 5 s.
         fallen: objects that fell off the table, in the document's order.
-        displacements: of the objects that did not fall, by instance.
+        displacements: displacements of the objects that did not fall, by instance.
     """
 
     scene: Scene
@@ -58,7 +58,7 @@ class SettledScene:
 
     @property
     def at_rest(self) -> bool:
-        """All objects are on the table, at rest."""
+        """Whether all objects are at rest on the table."""
         return not self.moving and not self.fallen
 
 
@@ -72,9 +72,9 @@ def settle_scene(
 ) -> SettledScene:
     """Simulates the objects of a scene until they are at rest.
 
-    Background objects and the station's obstacles stay where they are. The robot is left out. What
-    has fallen below the table's top is taken out of the simulation. Turning is braked a little,
-    with a time constant of 0.1 s; what is at rest does not notice.
+    Background objects and the station's obstacles stay where they are. The robot is left out.
+    Objects that fall below the table's top are removed. Rotation is damped with a time constant of
+    0.1 s, which does not affect objects at rest.
 
     Example::
 
@@ -82,15 +82,15 @@ def settle_scene(
         burg.save_scene(settled.scene.document, "settled.yaml")
 
     Args:
-        scene: the scene; objects may be in the air, but not in one another.
+        scene: the scene; objects may be in the air, but must not overlap.
         station: table and pose of the board.
         engine: how time is stepped.
         time_limit: simulated time allowed [s].
-        progress: called now and then with the simulated time since the last call [s] and how many
-            objects still move.
+        progress: called regularly with the simulated time since the last call [s] and the number of
+            objects that still move.
 
     Returns:
-        The settled scene. Whatever has not moved keeps its pose to the last digit; other poses are
+        The settled scene. Objects that have not moved keep their exact pose; other poses are
         rounded to a micrometre and a ten thousandth of a degree.
 
     Raises:
@@ -136,7 +136,7 @@ def _bring_to_rest(
     engine: Engine,
     progress: Callable[[float, int], None] | None,
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
-    """The scene once it is at rest in the world of its own diagram, and what will not rest."""
+    """The scene at rest in its own diagram, and the speeds of objects that do not come to rest."""
     suspects: frozenset[str] | None = None
     pace = np.inf
     for rounds in itertools.count():
@@ -157,18 +157,18 @@ def _bring_to_rest(
             scene = placed_scene(built, predicted.X_WO, exact)
         suspects = predicted.doubtful & scene.instances.keys()
         # Objects that creep must get slower by 10 % in each round.
-        goes_on = rounds <= 1 or predicted.pace < 0.9 * pace
-        stays = rounds > 0 and scene.document == before.document  # the first look is a short one
+        goes_on = rounds <= 1 or predicted.relative_speed < 0.9 * pace
+        stays = rounds > 0 and scene.document == before.document  # the first check is short
         # Objects may touch others after each round, so the diagram is built again.
         if rounds == 4 or not goes_on or stays:
             break
-        pace = predicted.pace
+        pace = predicted.relative_speed
     return scene, predicted.moving
 
 
 def _undo_sinking(settled: Scene, before: StationDiagram) -> Scene:
-    """The scene with what stands alone on the table lifted out of it, if it has sunk in by more
-    than `SUNKEN_TOLERANCE`: a real table yields by less, and trials have objects stand on feet.
+    """Lifts objects that stand alone and have sunk into the table by more than `SUNKEN_TOLERANCE`:
+    a real table yields less, and in trials objects stand on feet.
     """
     built = build_station_diagram(settled, before.station, robot="none", engine=RELAXING_ENGINE)
     beside = touching_bodies(built, [*built.free.values(), *built.fixed.values()])
@@ -203,7 +203,7 @@ def _require_above_table(built: StationDiagram) -> None:
 def _require_no_overlap(built: StationDiagram) -> None:
     yielding = {"table", *built.station.document.background}
     for (a, b), depth in find_overlaps(built).items():
-        if b == "table":  # as `SceneCheck` has it: Drake's depths are off by up to a millimetre
+        if b == "table":  # as in `SceneCheck`: Drake's depths are off by up to a millimetre
             depth = min(depth, depth_in_table(built.scene, built.X_WO(a), a))
         if depth > (MAX_SINK_DEPTH if b in yielding else TOUCH_TOLERANCE):
             raise InvalidInputError(

@@ -1,8 +1,8 @@
-"""Confirms stable poses of an object: drops it on a table with small tilts and sees where it ends.
+"""Confirms stable poses of an object by dropping it on a table with small tilts.
 
-The quasi-static stable poses of `objects` know neither momentum nor the collision geometry. The
-object is dropped in each pose from just above the table, tilted to several sides, first to the one
-on which it topples most easily. All drops use one diagram with one object, one after the other.
+The quasi-static stable poses of `objects` ignore momentum and the collision geometry. The object is
+dropped in each pose from just above the table, tilted to several sides, first to the one on which
+it topples most easily. All drops use one diagram with one object, one after the other.
 
 Table, density and friction are constants: whether an object stands does not depend on its mass, so
 that a new mass or friction coefficient needs no new confirmation.
@@ -55,16 +55,16 @@ class DropSettings:
 
 
 DROP_TABLE = Table(size=(4.0, 4.0, 0.1), friction=DropSettings.friction)
-"""Large enough for what rolls; as thick as the default, which sets its stiffness."""
+"""Large enough for rolling objects; the default thickness, which sets the stiffness."""
 
 
 @dataclass(frozen=True)
 class DropResult:
-    """How a drop ended.
+    """Result of a drop.
 
     Attributes:
         down: (3,) unit vector of O that points down.
-        at_rest: it came to rest within the time allowed.
+        at_rest: whether the object came to rest within the time limit.
         duration: simulated time [s].
     """
 
@@ -109,7 +109,7 @@ class DropTest:
 
         Args:
             X_SO: (4, 4) resting pose.
-            side: azimuth in S towards which it is tilted from there [rad].
+            side: azimuth in S towards which the object is tilted [rad].
 
         Raises:
             RuntimeError, SystemExit: from Drake, or the object flew away.
@@ -124,7 +124,7 @@ class DropTest:
         return self.resume()
 
     def resume(self) -> DropResult:
-        """Goes on until it is at rest, for as long as is allowed once more.
+        """Continues until the object is at rest, for at most the time limit once more.
 
         Raises:
             RuntimeError, SystemExit: from Drake, or the object flew away.
@@ -146,8 +146,8 @@ class DropTest:
         return X_WO
 
     def _raise(self, plant_context: Context) -> None:
-        """Lifts the object where its contact geometry is in the table: it may exceed the support
-        points by the error of its fit."""
+        """Lifts the object if its contact geometry is in the table: the geometry may exceed the
+        support points by its fitting error."""
         graph = self.built.scene_graph
         query = graph.get_query_output_port().Eval(
             graph.GetMyContextFromRoot(self._simulator.get_context())
@@ -161,7 +161,7 @@ class DropTest:
 
 
 def _build_drop_diagram(library: ObjectLibrary, name: str) -> StationDiagram:
-    hand = load_hand("panda_hand")  # a station has one; here it stays out
+    hand = load_hand("panda_hand")  # a station needs a hand; it is left out of the diagram
     document = StationDocument(name="drop", table=DROP_TABLE)
     station = Station(document, hand, Path(hand.model), None, Path("drop"))
     scene = Scene(
@@ -175,11 +175,11 @@ def _build_drop_diagram(library: ObjectLibrary, name: str) -> StationDiagram:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What came of it.
+    """Result of `confirm_poses`.
 
     Attributes:
         poses: confirmed poses with their residuals, most probable first; probabilities sum to one.
-            Without simulation: the poses as they were.
+            The unchanged poses if the simulation failed.
         notes: sentences for the user.
     """
 
@@ -189,13 +189,13 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class _DropOutcome:
-    """Where the drops of a pose ended.
+    """Outcome of the drops of one pose.
 
     Attributes:
         residual: largest angle from the pose [rad].
-        ended: number of the pose that the first drop that toppled ended in; None if it is none of
-            the known, or nothing toppled.
-        confirmed: nothing toppled.
+        ended: index of the pose in which the first toppled drop ended; None if that pose is
+            unknown, or no drop toppled.
+        confirmed: whether no drop toppled.
     """
 
     residual: float
@@ -206,18 +206,17 @@ class _DropOutcome:
 def confirm_poses(
     library: ObjectLibrary, name: str, search: SymmetrySearch | None = None
 ) -> Confirmation:
-    """Drops an object on each of its stable poses, and keeps those that it stays in.
+    """Drops an object in each of its stable poses, and keeps the poses in which it stays.
 
     Args:
         library: the library; its folder holds the object's SDF, pieces and surface mesh.
         name: the object, with its quasi-static poses.
-        search: for the symmetries of its surface about its centre of mass, if there is one already;
-            else it is made where needed.
+        search: symmetry search on its surface about its centre of mass; made where needed if None.
 
     Returns:
-        The confirmed poses. The probability of a pose that topples goes to the one it ends in; if
-        that is not among the known, the others are scaled to a sum of one. If nothing is confirmed
-        the most probable is kept. A failure of the simulator is a note.
+        The confirmed poses. The probability of a pose that topples goes to the pose in which it
+        ends; if that pose is unknown, the others are scaled to a sum of one. If no pose is
+        confirmed, the most probable one is kept. A failure of the simulator is a note.
 
     Raises:
         UnknownNameError: no such object.
@@ -225,7 +224,7 @@ def confirm_poses(
     poses = library.entry(name).stable_poses
     try:
         return _update_probabilities(poses, _drop_all_poses(library, name, search))
-    except (BurgError, RuntimeError, SystemExit) as error:  # some of Drake's checks end so
+    except (BurgError, RuntimeError, SystemExit) as error:  # some Drake checks exit
         reason = " ".join(str(error).split())
         return Confirmation(poses, (f"stable poses are not confirmed by simulation: {reason}",))
 
@@ -266,10 +265,10 @@ def _drop_pose(drop: DropTest, classes: PoseClasses, k: int) -> _DropOutcome:
 
 
 def weakest_side(landscape: PotentialLandscape, R_SO: Array, tilt: float) -> float:
-    """Azimuth in S towards which a tilt lifts the centre of mass least, or lowers it [rad]."""
+    """Azimuth in S of the tilt that raises the centre of mass least, or lowers it most [rad]."""
     side_count = 72  # Sides among which the weakest is searched.
     azimuth = 2.0 * np.pi * np.arange(side_count) / side_count
-    # what points down in O after the tilt is this in the S that is not tilted
+    # the down direction after the tilt, in the untilted S
     down_S = np.stack(
         [
             np.sin(tilt) * np.cos(azimuth),
@@ -282,8 +281,8 @@ def weakest_side(landscape: PotentialLandscape, R_SO: Array, tilt: float) -> flo
 
 
 def support_points(library: ObjectLibrary, name: str) -> Array:
-    """Points (N, 3) of O whose hull rests on the table [m]: of the primitive, or of the pieces, or
-    else of the surface."""
+    """Points (N, 3) in O whose hull rests on the table [m]: from the primitive, else the pieces,
+    else the surface."""
     entry = library.entry(name)
     if entry.contact.primitive is not None:
         return np.asarray(primitive_mesh(entry.contact.primitive).vertices)
@@ -295,7 +294,7 @@ def support_points(library: ObjectLibrary, name: str) -> Array:
 def _update_probabilities(
     poses: Sequence[StablePose], outcomes: Sequence[_DropOutcome]
 ) -> Confirmation:
-    """Moves the probabilities of what toppled to where it ended."""
+    """Moves the probability of each toppled pose to the pose in which it ended."""
     confirmed = [k for k, outcome in enumerate(outcomes) if outcome.confirmed]
     if not confirmed:
         kept = replace(poses[0], probability=1.0, residual=_round_residual(outcomes[0].residual))

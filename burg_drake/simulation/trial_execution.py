@@ -35,7 +35,7 @@ class HandSegment:
     Attributes:
         direction_W: (3,) unit vector in the world.
         length: [m].
-        checks: at the contacts, up to its end.
+        checks: number of contact checks up to its end.
     """
 
     direction_W: Array
@@ -44,19 +44,18 @@ class HandSegment:
 
     @property
     def is_straight_up(self) -> bool:
-        """Whether nothing but its acceleration upwards loads a grip beside the weight."""
+        """Whether the segment goes straight up, so that its acceleration acts along the weight."""
         return bool(self.direction_W[2] > 1.0 - 1e-9)
 
 
 class Carrier(Protocol):
-    """Brings the hand to the grasp and away from it, and watches what is met on the way.
+    """Moves the hand to the grasp and away from it, and monitors its contacts.
 
     Attributes:
-        approach_checks: looks at the contacts on the way to the grasp; 0 if the hand starts there.
-        approach_steps: of the simulation from one of these looks to the next.
-        segments: of the way with the target, at least one: the retreat, if there is one, and the
-            lift.
-        lift_time: how long they take [s].
+        approach_checks: contact checks on the approach; 0 if the hand starts at the grasp.
+        approach_steps: time steps between these contact checks.
+        segments: segments with the target, at least one: the retreat, if any, and the lift.
+        lift_time: duration of the segments [s].
         tracking_error, tracking_distance: see `Margins`; NaN if not measured.
     """
 
@@ -73,7 +72,7 @@ class Carrier(Protocol):
         ...
 
     def approach(self) -> None:
-        """Commands the way to the grasp."""
+        """Starts the approach."""
         ...
 
     def close(self) -> None:
@@ -81,38 +80,38 @@ class Carrier(Protocol):
         ...
 
     def lift(self, number: int, check: int) -> None:
-        """Commands the way in one of the segments, counted from 0, from one look, counted from 0
-        where the segment begins, to the next."""
+        """Commands the motion from one contact check to the next, in one of the segments. Both are
+        counted from 0; the checks from the start of the segment."""
         ...
 
     def stop(self) -> None:
-        """Commands the hand to stand where the last segment ends."""
+        """Commands the hand to stay at the end of the last segment."""
         ...
 
     def advance_to(self, time: float) -> None:
-        """Steps the simulation; going back and forth again gives the same."""
+        """Advances the simulation; repeating it from a restored state gives the same result."""
         ...
 
     def watch(self, contacts: list[BodyContact]) -> str:
-        """Takes down what contacts and state say at a look.
+        """Evaluates contacts and state at a check.
 
         Returns:
-            Name of what is in the way, for `TrialResult.blocker`; "" if nothing is.
+            Name of the obstacle, for `TrialResult.blocker`; "" if there is none.
         """
         ...
 
     def travelled(self) -> float:
-        """How far the hand has gone in the present segment [m]."""
+        """Distance of the hand from the start of the current segment [m]."""
         ...
 
     def carries_full_load(self, check: int) -> bool:
-        """Whether the load on the grip was as large as it will ever be during the last looks, up to
-        the end of interval `check` of the last segment."""
+        """Whether the grip has carried its largest load during the last checks, up to the end of
+        interval `check` of the last segment."""
         ...
 
     def is_free_ahead(self) -> bool:
-        """Whether nothing would be met on the rest of the last segment, with the target as it is in
-        the hand: geometry, no time steps."""
+        """Whether the rest of the last segment is free of collisions for hand and held target; a
+        geometric check without time steps."""
         ...
 
 
@@ -121,22 +120,22 @@ MIN_LIFT_SHARE = 0.5
 
 
 class OtherTouched(Exception):
-    """In a world of the target alone, target or robot meet something else that could move."""
+    """Raised in a single-target world when target or robot touch another movable object."""
 
 
 class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
-    """A world in which trials run, of any engine.
+    """A world of any engine in which trials run.
 
     Attributes:
         settings: phases of a trial.
-        engine: how it is stepped.
-        free, standing, fixed: bodies by name: what can move, what could in another world, and what
-            never does, the table among it.
+        engine: time step and contact settings.
+        free, standing, fixed: bodies by name: movable; movable only in another world; never
+            movable, including the table.
         robot: all bodies of the robot.
-        fingers: of these the fingers.
-        hand_document: the hand.
-        robot_meets_hull: whether, in a world of the target alone, parts of the robot meet a hull in
-            its place.
+        fingers: bodies of the two fingers.
+        hand_document: the hand's document.
+        robot_meets_hull: whether, in a single-target world, parts of the robot meet the target's
+            hull.
     """
 
     settings: TrialSettings
@@ -158,7 +157,7 @@ class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
 
     @property
     def time(self) -> float:
-        """Since the start of the trial [s]."""
+        """Time since the start of the trial [s]."""
         ...
 
     def finger_speed(self) -> float:
@@ -166,60 +165,61 @@ class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
         ...
 
     def X_WG(self) -> Array:
-        """(4, 4) grasp frame."""
+        """Grasp frame (4, 4) in the world."""
         ...
 
     def robot_positions(self, model: str) -> Array | None:
-        """Of one of `ROBOT_MODELS`, in the order of a station diagram; None if there is none."""
+        """Positions of one of `ROBOT_MODELS`, in the order of a station diagram; None if
+        missing."""
         ...
 
     def is_usable(self) -> bool:
-        """Whether trials can begin in it."""
+        """Whether trials can begin in this world."""
         ...
 
     def invalidate(self) -> None:
-        """Has the next trial prepare it from scratch."""
+        """Makes the next trial prepare the world from scratch."""
         ...
 
-    def look(self) -> list[BodyContact]:
-        """All that touch.
+    def read_contacts(self) -> list[BodyContact]:
+        """Current contacts.
 
         Raises:
-            OtherTouched: what happens now is for the complete world to say.
+            OtherTouched: the trial has to run in the complete world.
         """
         ...
 
     def state(self) -> Any:
-        """What `go_back` goes back to."""
+        """The state that `restore_state` restores."""
         ...
 
-    def go_back(self, time: float, state: Any) -> None:
-        """Is again as at a time [s]."""
+    def restore_state(self, time: float, state: Any) -> None:
+        """Restores a state and its time [s]."""
         ...
 
-    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
-        """The bodies, and all that stand so close to one of them that they may lean on it."""
+    def with_neighbours(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies, and all bodies so close that they may lean on each other."""
         ...
 
     def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
-        """Lets locked objects move; those in `still` stay locked."""
+        """Unlocks the `released` objects; those in `still` stay locked."""
         ...
 
 
 class Execution:
-    """Runs a trial in a world that has been brought to its start.
+    """Runs a trial in a world that is prepared for its start.
 
-    Locked objects are released when something moving touches them, and with them those close to
-    them: the trial goes back to the look before, where they were apart, and goes on from there.
+    When something moving touches a locked object, the object and its neighbours are released: the
+    trial returns to the previous contact check, before the contact, and continues from there.
 
     Args:
-        world: in which the trial runs.
+        world: the world of the trial.
         target: the grasped body.
         moving: the free objects that are not locked.
-        carrier: what brings the hand to the grasp and away from it.
+        carrier: moves the hand to the grasp and away from it.
 
     Attributes:
-        contact: of the fingers with the target at the last look.
+        contact: contact of the fingers with the target at the last check.
     """
 
     def __init__(
@@ -253,7 +253,7 @@ class Execution:
 
         Raises:
             RuntimeError: the simulation failed.
-            OtherTouched: it has to run in the complete world.
+            OtherTouched: the trial has to run in the complete world.
         """
         for phase in (self.approach, self.close, self.lift, self.hold):
             outcome = phase()
@@ -262,7 +262,7 @@ class Execution:
         return self.result(self.outcome_if_held())
 
     def approach(self) -> Outcome | None:
-        """Brings the hand to the grasp; None if nothing fixed is in its way."""
+        """Moves the hand to the grasp; the outcome if a fixed body blocks it, else None."""
         carrier = self._carrier
         if not carrier.approach_checks:
             return None
@@ -274,12 +274,12 @@ class Execution:
             if self._blocker:
                 break
         name = next(name for name, index in self._world.free.items() if index == self._target)
-        self._pushed = self._by_name_of_others(self._others_motion.farthest)
+        self._pushed = self._motions_of_others(self._others_motion.farthest)
         self._pushed[name] = target.farthest[self._target]
         return Outcome.BLOCKED if self._blocker else None
 
     def close(self) -> Outcome | None:
-        """Closes until the fingers rest; None if both hold the target then."""
+        """Closes until the fingers rest; None if both then hold the target, else the outcome."""
         settings = self._settings
         self._grip_start = before = self._world.time
         self._carrier.close()
@@ -305,8 +305,8 @@ class Execution:
         return Outcome.CLOSED_EMPTY if self._touched else Outcome.NO_CONTACT
 
     def lift(self) -> Outcome | None:
-        """Takes the target away, along the retreat and the lift; None if it is held at the end of
-        the way and has to prove itself there."""
+        """Moves the target along the retreat and the lift; None if `hold` has to decide, else the
+        outcome."""
         carrier = self._carrier
         last = len(carrier.segments) - 1
         for number, segment in enumerate(carrier.segments):
@@ -330,9 +330,9 @@ class Execution:
         return Outcome.SLIPPED
 
     def hold(self) -> Outcome | None:
-        """Waits; None if the target is held at the end.
+        """Waits; None if the target is held at the end, else the outcome.
 
-        Unless the whole trial is asked for, the end is early when the grip is steady.
+        Unless the whole trial is requested, a steady grip ends it early.
         """
         settings = self._settings
         self._in_hand.reset()
@@ -349,31 +349,31 @@ class Execution:
         return None if self.contact.both else Outcome.DROPPED
 
     def outcome_if_held(self) -> Outcome:
-        """The outcome of a target that is held to the end."""
+        """The outcome if the target is held to the end."""
         if self._in_hand.is_beyond_limits:
             return Outcome.LIFTED_TURNED
         disturbed = _largest(self._others_motion.farthest) > self._settings.disturbance
         return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
 
     def _start_segment(self, segment: HandSegment) -> None:
-        """From now on the way of the target counts along a segment."""
+        """Measures the target's distance along a segment from now on."""
         if segment.direction_W is not self._direction:
             self._followed, self._center_start = self.distance_followed(), self._center()
             self._direction = segment.direction_W
 
     def _is_decided(self, last: HandSegment) -> bool:
-        """Whether the target will be held to the end, as nothing is left that could change it.
+        """Whether it is already certain that the target will be held to the end.
 
-        While the hand accelerates upwards, the load on the grip is largest. Friction that does not
-        carry it lets the target go ever faster; so what sticks to the pads then, or, where friction
-        is viscous, creeps and does not get faster, in free air and with all others at rest, is held
-        to the end, too.
+        While the hand accelerates upwards, the load on the grip is largest. If friction does not
+        carry it, the target slides ever faster. So a target that sticks to the pads then, or creeps
+        at constant speed where friction is viscous, is held to the end, if it is in free air and
+        all other objects are at rest.
         """
         if self._world.engine.whole_trial or self._path_is_blocked:
             return False
         time = self._carrier.lift_time + self._settings.hold_time
         in_hand = self._in_hand
-        creeps = self._world.engine.creeps and in_hand.is_coming_to_rest(time)
+        creeps = self._world.engine.friction_creeps and in_hand.is_coming_to_rest(time)
         if not self.contact.both or not (in_hand.is_steady or creeps):
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
@@ -389,10 +389,10 @@ class Execution:
         return not self._path_is_blocked
 
     def advance(self, steps: int | None = None) -> float:
-        """Steps to the next look at the contacts; returns the time [s].
+        """Advances to the next contact check; returns the time [s].
 
         Args:
-            steps: how many; by default those in `poll`.
+            steps: number of time steps; by default those in `poll`.
 
         Raises:
             RuntimeError: the simulation failed.
@@ -406,24 +406,25 @@ class Execution:
             self._carrier.advance_to(time)
             if not math.isfinite(self._center()[2]):
                 raise RuntimeError(f"the state is not finite at {time:.3f} s")
-            contacts = self._world.look()
+            contacts = self._world.read_contacts()
             moving = self._world.robot | (set(self._world.free.values()) - self._locked)
             found = touched_bodies(contacts, moving, self._locked)
             if not found:
                 break
-            self._world.go_back(before, state)
-            found = self._world.close_to(found) & self._locked
+            self._world.restore_state(before, state)
+            found = self._world.with_neighbours(found) & self._locked
             self._locked -= found
             self._world.release(found, self._locked)
         self._record_contacts(contacts)
         return time
 
     def _time(self) -> float:
-        """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
+        """Time of the last contact check [s]: whole time steps, rounded as Drake's own steps
+        are."""
         return self._steps * self._world.engine.time_step
 
     def _record_contacts(self, contacts: list[BodyContact]) -> None:
-        """Takes down what the contacts and poses say."""
+        """Evaluates contacts and poses."""
         settings, target = self._settings, self._target
         self.contact = finger_contact(contacts, self._world.fingers, target)
         self._touched = self._touched or self.contact.any
@@ -435,12 +436,12 @@ class Execution:
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
     def distance_followed(self) -> float:
-        """How far the target's centre of mass has gone along the segments of the hand's way, that
-        is, risen in a lift straight up [m]."""
+        """Distance of the target's centre of mass along the hand's segments [m]: its rise in a lift
+        straight up."""
         return self._followed + float((self._center() - self._center_start) @ self._direction)
 
     def X_GO(self) -> Array:
-        """(4, 4) target in the grasp frame."""
+        """Pose (4, 4) of the target in the grasp frame."""
         X_GO: Array = inverse(self._world.X_WG()) @ self._world.X_WB(self._target)
         return X_GO
 
@@ -448,13 +449,13 @@ class Execution:
         """The target's centre of mass (3,) in the world [m]."""
         return self._world.center(self._target)
 
-    def _by_name_of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
-        """Motions of the others by name; what can only stand has none."""
+    def _motions_of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
+        """Motions of the other objects by name; 0 for welded ones."""
         standing = dict.fromkeys(self._world.standing, 0.0)
         return standing | {name: values[index] for name, index in self._others.items()}
 
     def result(self, outcome: Outcome) -> TrialResult:
-        """The outcome with the margins at this moment."""
+        """The result of an outcome, with the current margins."""
         force = area = math.nan
         slip, tilt = self._in_hand.since_grip
         if not math.isnan(slip):
@@ -480,8 +481,8 @@ class Execution:
             grip_start=self._grip_start,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
-            displacements=self._by_name_of_others(self._others_motion.farthest),
-            turned=self._by_name_of_others(self._others_motion.turned),
+            displacements=self._motions_of_others(self._others_motion.farthest),
+            turned=self._motions_of_others(self._others_motion.turned),
             toppled=", ".join(self._others_motion.toppled(self._others)),
             pushed=self._pushed,
             touched=self._carrier.touched,

@@ -1,11 +1,11 @@
 """What a trial returns: its outcome, its margins, and the confidence in that outcome.
 
-The confidence comes from an additive logistic model of the margins and of the load on the grip.
+The confidence is an additive logistic model of the margins and the load on the grip.
 
 Confidence is the probability that trials with other friction, hand pose, object size or lift time,
-and an independent oracle, answer alike whether the target is held. Each engine has curves of its
-own for what it holds and for what it loses. `benchmarks/confidence.py` fits them on some objects,
-writes `calibration.json`, and tests them on the others.
+and an independent oracle, agree whether the target is held. Each engine has curves for held and for
+lost targets. `benchmarks/confidence.py` fits them on some objects, writes `calibration.json`, and
+tests them on the others.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ class TrialResult(TrialFindings):
 
     Attributes:
         outcome: why it ended.
-        margins: those that a trial measures, see `Margins.of_trial`.
-        grip_start: simulated time at the last look before the closing fingers met the target [s].
+        margins: margins that a trial measures, see `Margins.of_trial`.
+        grip_start: simulated time of the last contact check before the closing fingers met the
+            target [s].
     """
 
     outcome: Outcome
@@ -40,8 +41,8 @@ class TrialResult(TrialFindings):
 
 
 def collision_result(screen: Clearance) -> TrialResult:
-    """The result of a trial that did not start, as the open hand is not clear at the grasp,
-    or where its approach begins."""
+    """The result of a trial that did not start, as the open hand collides at the grasp or at the
+    start of its approach."""
     assert screen.outcome is not None
     margins = Margins(overlap=screen.overlap, clearance=screen.clearance, end_time=0.0)
     return TrialResult(outcome=screen.outcome, margins=margins, blocker=screen.blocker)
@@ -50,12 +51,12 @@ def collision_result(screen: Clearance) -> TrialResult:
 def simulation_failure_result(
     error: BaseException, screen: Clearance, end_time: float
 ) -> TrialResult:
-    """The result of a trial that the simulator could not step.
+    """The result of a trial in which the simulator failed.
 
     Args:
-        error: what it said.
-        screen: of the open hand at the grasp.
-        end_time: when that was [s].
+        error: the simulator's error.
+        screen: screen of the open hand at the grasp.
+        end_time: simulated time of the failure [s].
     """
     return TrialResult(
         outcome=Outcome.SIMULATION_FAILED,
@@ -67,12 +68,12 @@ def simulation_failure_result(
 PAD_FRICTION_LEVER = 0.0066
 """Metres. Lever of a pad's friction torque; the confidence curves are fitted with it."""
 MAX_LIMIT_DISTANCE = 0.4
-"""Largest distance from the friction limit, as a logarithm to base 10, that counts."""
+"""Upper bound of `GripLoad.limit`, as a logarithm to base 10."""
 
 
 @dataclass(frozen=True)
 class GripLoad:
-    """What a grip has to carry, and with what.
+    """Load on a grip, and its friction and force.
 
     Attributes:
         friction: coefficient between pads and target.
@@ -100,7 +101,7 @@ class GripLoad:
         mass: float,
         acceleration: float,
     ) -> GripLoad:
-        """Of a target where it stands.
+        """The load of a target at its pose in the scene.
 
         Args:
             X_WG: (4, 4) grasp in the world.
@@ -113,21 +114,21 @@ class GripLoad:
 
     @property
     def carried(self) -> float:
-        """The load over what the friction of two pads carries."""
+        """Ratio of the load to the friction limit of two pads."""
         return self._share(self.mass * (9.81 + self.acceleration))
 
     @property
     def turned(self) -> float:
-        """The moment of the load about the closing axis over what friction carries of it."""
+        """Ratio of the load's moment about the closing axis to its friction limit."""
         return self._share(self.mass * (9.81 + self.acceleration) * self.lever / PAD_FRICTION_LEVER)
 
     @property
     def limit(self) -> float:
-        """Distance of the load from the most that friction carries: absolute value of the logarithm
-        (base 10) of their ratio, at most `MAX_LIMIT_DISTANCE`.
+        """Distance of the load from the friction limit: absolute value of the logarithm (base 10)
+        of their ratio, at most `MAX_LIMIT_DISTANCE`.
 
-        At its limit a load straight below the pads slides down. A load that turns more than it
-        pulls comes to hang below the pads, and is held.
+        At its limit a load straight below the pads slides down. A load with a larger moment than
+        pull swings until it hangs below the pads, and is held.
         """
         if self.turned > self.carried:
             return MAX_LIMIT_DISTANCE
@@ -136,25 +137,25 @@ class GripLoad:
         )
 
     def _share(self, force: float) -> float:
-        max_share = 20.0  # Larger shares tell nothing more.
+        max_share = 20.0  # Larger ratios carry no more information.
         limit = 2.0 * self.friction * self.force
         return min(max_share, force / limit) if limit > 0.0 else max_share
 
 
 def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
-    """Signs of a verdict, by name; logarithms are to the base of 10.
+    """Inputs of the confidence model, by name; logarithms are to base 10.
 
     Args:
-        margins: of a trial, with its end counted from where the fingers met the target.
-        load: of its grip.
+        margins: margins of a trial, with the end time counted from the fingers' contact.
+        load: load on its grip.
 
     Returns:
-        `carried`, `turned`: logarithms of the load's shares in what friction carries; `limit`: see
+        `carried`, `turned`: logarithms of the ratios of load to friction limit; `limit`: see
         `GripLoad.limit`; `slip`, `tilt`: logarithms of the motion in the hand [m, rad];
         `pad_force`: share of the weaker pad's force in that of the hand; `patch_area`: square root
-        [m]; `lift`: how far the target went with the hand [m]; `end_time`: how long after the
-        fingers met the target it was decided [s]. What was not measured, as there was no grip, is
-        0.
+        [m]; `lift`: distance of the target along the hand's path [m]; `end_time`: time of the
+        decision after the fingers met the target [s]. Values that were not measured, for lack of a
+        grip, are 0.
     """
 
     min_slip = 1e-7  # Metres. Below this the target sticks.
@@ -179,7 +180,7 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 """Curves that `benchmarks/confidence.py` has fitted."""
 OUTCOMES_WITHOUT_VERDICT = (Outcome.SIMULATION_FAILED,)
-"""Outcomes that are no verdict of a trial, so that confidence has no meaning."""
+"""Outcomes without a verdict, for which confidence has no meaning."""
 
 
 @dataclass(frozen=True)
@@ -187,8 +188,8 @@ class Curve:
     """A piecewise linear term of the logit, constant beyond its ends.
 
     Attributes:
-        knots: values of the sign, rising.
-        logits: of the term there.
+        knots: values of the sign, ascending.
+        logits: value of the term at each knot.
     """
 
     knots: Sequence[float]
@@ -207,13 +208,13 @@ def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoa
     """Confidence in the verdict of a trial.
 
     Args:
-        engine: that has executed it.
-        outcome: how it ended.
-        margins: of the trial, with its end counted from where the fingers met it.
-        load: of its grip.
+        engine: engine of the trial.
+        outcome: outcome of the trial.
+        margins: margins of the trial, with the end time counted from the fingers' contact.
+        load: load on its grip.
 
     Returns:
-        Probability; None if no trial decided, or the engine is no preset that is calibrated.
+        Probability; None if no trial decided, or the engine is not a calibrated preset.
     """
     if ENGINES.get(engine.name) != engine:
         return None
@@ -223,12 +224,12 @@ def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoa
 def confidence_from_signs(
     engine: str, outcome: Outcome, signs: Mapping[str, float]
 ) -> float | None:
-    """Confidence in a verdict by its signs, see `grip_signs`; None where there is no calibration.
+    """Confidence in a verdict from the values of `grip_signs`; None without a calibration.
 
     Args:
-        engine: name of the preset that has executed it.
-        outcome: how it ended.
-        signs: by name.
+        engine: name of the preset.
+        outcome: outcome of the trial.
+        signs: values of `grip_signs`.
     """
     curves = calibration().get((engine, outcome.held))
     if curves is None or outcome in OUTCOMES_WITHOUT_VERDICT:
@@ -239,7 +240,7 @@ def confidence_from_signs(
 
 @cache
 def calibration() -> Mapping[tuple[str, bool], Curves]:
-    """The curves by name of the engine, and by whether it holds the target to the end."""
+    """The curves, by name of the engine and whether the target is held to the end."""
     content = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
     return {
         (engine, held == "held"): {

@@ -35,8 +35,8 @@ from burg_drake.station import (
 class TrialWorld:
     """A scene on a station with a robot, and a simulator that executes grasps in it.
 
-    In a world of one target alone the others only stand there (see `build_station_diagram`): what
-    happens in it is what happens, as long as neither target nor robot meets one of them.
+    In a single-target world the other objects are welded (see `build_station_diagram`). Its results
+    are valid as long as neither target nor robot touches one of them.
 
     Args:
         diagram: the station diagram.
@@ -45,15 +45,15 @@ class TrialWorld:
 
     Attributes:
         diagram, hand, settings: as given.
-        engine: how it is stepped.
-        free, standing: bodies by name: what can move, and what could in the complete world.
+        engine: time step and contact settings.
+        free, standing: bodies by name: movable, and movable only in the complete world.
         robot: bodies of the robot.
-        fingers: of these the fingers.
-        hand_document: the hand.
+        fingers: bodies of the two fingers.
+        hand_document: the hand's document.
         fixed, table, body_names, robot_bodies: those of the diagram.
         plant_context: the plant's part of `context`.
         contacts: reader of the diagram's contact results.
-        neighbours: which free objects stand close to each other.
+        neighbours: groups of free objects that are close to each other.
         simulator: the simulator that runs the trials.
     """
 
@@ -74,20 +74,20 @@ class TrialWorld:
         self.robot = frozenset(diagram.robot_bodies)
         self._corners: dict[BodyIndex, Array] = {}
         self._prepared: tuple[str, float | None, float | None] | None = None
-        """Target, friction and mass that the Context is prepared for; None if for nothing."""
+        """Target, friction and mass that the Context is prepared for; None if unprepared."""
 
     @property
     def context(self) -> Context:
-        """Context of the trial that runs or ran last."""
+        """Context of the current or last trial."""
         return self.simulator.get_mutable_context()
 
     @property
     def time(self) -> float:
-        """Since the start of the trial [s]."""
+        """Time since the start of the trial [s]."""
         return float(self.context.get_time())
 
     def robot_positions(self, model: str) -> Array | None:
-        """Of one of `ROBOT_MODELS`; None if there is none."""
+        """Positions of one of `ROBOT_MODELS`; None if missing."""
         plant = self.diagram.plant
         if not plant.HasModelInstanceNamed(model):
             return None
@@ -100,11 +100,11 @@ class TrialWorld:
         return self.hand.finger_speed(self.plant_context)
 
     def X_WG(self) -> Array:
-        """(4, 4) grasp frame."""
+        """Grasp frame (4, 4) in the world."""
         return self.hand.X_WG(self.plant_context)
 
     def X_WB(self, body: BodyIndex) -> Array:
-        """(4, 4) of a body."""
+        """Pose (4, 4) of a body in the world."""
         plant = self.diagram.plant
         X_WB = plant.EvalBodyPoseInWorld(self.plant_context, plant.get_body(body))
         return np.asarray(X_WB.GetAsMatrix4())
@@ -115,11 +115,11 @@ class TrialWorld:
         X_WB = self.diagram.plant.EvalBodyPoseInWorld(self.plant_context, found)
         return np.asarray(X_WB.multiply(found.default_com()))
 
-    def look(self) -> list[BodyContact]:
-        """All that touch.
+    def read_contacts(self) -> list[BodyContact]:
+        """Current contacts.
 
         Raises:
-            OtherTouched: what happens now is for the complete world to say.
+            OtherTouched: the trial has to run in the complete world.
         """
         results = self._results_port.Eval(self.plant_context)
         if self.meets_another(results):
@@ -127,17 +127,17 @@ class TrialWorld:
         return self.contacts.read(results)
 
     def state(self) -> DiscreteValues:
-        """What `go_back` goes back to."""
+        """The state that `restore_state` restores."""
         return self.context.get_discrete_state().Clone()
 
-    def go_back(self, time: float, state: DiscreteValues) -> None:
-        """Is again as at a time [s]."""
+    def restore_state(self, time: float, state: DiscreteValues) -> None:
+        """Restores a state and its time [s]."""
         self.context.SetTime(time)
         self.context.SetDiscreteState(state)
 
-    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
-        """The bodies, and all that stand so close to one of them that they may lean on it."""
-        return self.neighbours.close_to(bodies)
+    def with_neighbours(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies, and all bodies so close that they may lean on each other."""
+        return self.neighbours.with_neighbours(bodies)
 
     def corners(self, index: BodyIndex) -> Array:
         """(N, 3) corners of the convex hull of a free object in its frame O [m]; read once."""
@@ -148,8 +148,8 @@ class TrialWorld:
         return self._corners[index]
 
     def is_usable(self) -> bool:
-        """Whether trials can begin in it. In a world of a target alone that is so if there is
-        nothing but the table that the target may lean on where it stands."""
+        """Whether trials can begin in this world: in a single-target world, if the target can lean
+        on nothing but the table."""
         if not self._hulls:
             return True
         graph = self.diagram.scene_graph
@@ -159,14 +159,14 @@ class TrialWorld:
         return not any(pair.id_A in self._hulls or pair.id_B in self._hulls for pair in pairs)
 
     def meets_another(self, results: ContactResults) -> bool:
-        """Whether, in a world of a target alone, it or the robot meets what else could move, or it
-        meets something fixed: what happens then is for the complete world to say."""
+        """Whether, in a single-target world, target or robot touch another movable object, or the
+        target touches a fixed one, so that the trial has to run in the complete world."""
         return bool(self._hulls) and self.contacts.has_any(results, self._hulls)
 
     @property
     def robot_meets_hull(self) -> bool:
-        """Whether, in a world of a target alone, parts of the robot meet the target's hull and not
-        the target as it is: those that are not hydroelastic."""
+        """Whether, in a single-target world, parts of the robot that are not hydroelastic meet the
+        target's hull instead of its surface."""
         inspector = self.diagram.scene_graph.model_inspector()
         robot = self._geometries(set(self.robot))
         hulls = self.diagram.parts.hulls
@@ -175,13 +175,13 @@ class TrialWorld:
     def prepare(
         self, instance: str, moving: set[BodyIndex], friction: float | None, mass: float | None
     ) -> None:
-        """Brings objects and surfaces to the start of a trial; nothing of an earlier one remains.
+        """Resets objects and surfaces to the start of a trial.
 
         Args:
             instance: the target.
             moving: free objects that are not locked; the same for each trial of this target.
-            friction: of the target, if not the library's.
-            mass: of the target, if not the library's [kg].
+            friction: the target's coefficient, if not the library's.
+            mass: the target's mass, if not the library's [kg].
         """
         context = self.context
         if self._prepared != (instance, friction, mass):
@@ -195,20 +195,20 @@ class TrialWorld:
             context.SetDiscreteState(self._default.get_discrete_state())
 
     def invalidate(self) -> None:
-        """Has the next trial prepare the Context from scratch."""
+        """Makes the next trial prepare the Context from scratch."""
         self._prepared = None
 
     def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
         """Unlocks objects in the middle of a trial.
 
         Args:
-            released: to be unlocked.
-            still: those that stay locked.
+            released: objects to unlock.
+            still: objects that stay locked.
         """
         self._prepared = None
         for index in released:
             self.diagram.plant.get_body(index).Unlock(self.plant_context)
-        resting = GeometrySet(self._geometries(self._resting(still)))
+        resting = GeometrySet(self._geometries(self._immovable_bodies(still)))
         declaration = CollisionFilterDeclaration()
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
         declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
@@ -217,18 +217,19 @@ class TrialWorld:
         self.simulator.Initialize()
 
     def isolate(self, target: BodyIndex) -> None:
-        """Leaves hand and target alone with each other, in the middle of a trial: all other objects
-        are locked, and neither they nor what is fixed can be touched."""
+        """Isolates hand and target in the middle of a trial: locks all other objects, and excludes
+        contact with them and with fixed bodies."""
         self._prepared = None
         others = set(self.diagram.free.values()) - {target}
         self._set_still(others)
         carried = GeometrySet(self._geometries({target, *self.diagram.robot_bodies}))
-        resting = GeometrySet(self._geometries(self._resting(others)))
+        resting = GeometrySet(self._geometries(self._immovable_bodies(others)))
         self._filter(CollisionFilterDeclaration().ExcludeBetween(carried, resting))
         self.simulator.Initialize()
 
     def set_friction(self, instance: str, friction: float | None) -> None:
-        """Gives the fingers, and the target if `friction` is given, one coefficient.
+        """Sets the friction coefficient of the fingers, and of the target if `friction` is given.
+        Without it, the fingers get the target's coefficient in the library.
 
         Drake combines two coefficients a and b to 2ab/(a+b); of two equal ones that is the same.
         """
@@ -246,10 +247,10 @@ class TrialWorld:
         port.FixValue(self.context, desired_state)
 
     def _set_still(self, still: set[BodyIndex]) -> None:
-        """Locks free objects in place, and drops their contact with what never moves."""
+        """Locks free objects in place, and excludes their contacts with immovable bodies."""
         for index in still:
             self.diagram.plant.get_body(index).Lock(self.plant_context)
-        geometries = GeometrySet(self._geometries(self._resting(still)))
+        geometries = GeometrySet(self._geometries(self._immovable_bodies(still)))
         self._filter(CollisionFilterDeclaration().ExcludeWithin(geometries))
 
     def _filter(self, declaration: CollisionFilterDeclaration) -> None:
@@ -257,8 +258,8 @@ class TrialWorld:
         graph_context = graph.GetMyMutableContextFromRoot(self.context)
         graph.collision_filter_manager(graph_context).Apply(declaration)
 
-    def _resting(self, still: set[BodyIndex]) -> set[BodyIndex]:
-        """What does not move while these objects are locked."""
+    def _immovable_bodies(self, still: set[BodyIndex]) -> set[BodyIndex]:
+        """All bodies that cannot move while these objects are locked."""
         diagram = self.diagram
         return still | {diagram.table, *diagram.fixed.values(), *diagram.standing.values()}
 
@@ -275,7 +276,7 @@ class TrialWorld:
 
 
 def check_overrides(friction: float | None, mass: float | None) -> None:
-    """Refuses what is no friction coefficient or mass.
+    """Rejects an invalid friction coefficient or mass.
 
     Raises:
         InvalidInputError: friction is below 0, or the mass is not above 0.

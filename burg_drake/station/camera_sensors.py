@@ -37,7 +37,7 @@ from burg_drake.system_libraries import apt_command, missing_render_libraries
 
 
 def supersampled_camera(camera: Camera) -> Camera:
-    """The camera with `samples` times the pixels along each side, one ray each."""
+    """The camera with `samples` times as many pixels along each side, one ray per pixel."""
     n = camera.samples
     (fx, fy), (cx, cy) = camera.focal, camera.principal_point
     return replace(
@@ -51,12 +51,12 @@ def supersampled_camera(camera: Camera) -> Camera:
 
 
 class AreaCamera(LeafSystem):
-    """Renders finely and averages.
+    """Renders at a higher resolution and averages blocks of pixels.
 
     Ports:
         geometry_query: of the scene graph.
         X_WC: pose of the camera's optical frame in the world.
-        color_image: what it sees (output).
+        color_image: averaged image (output).
     """
 
     def __init__(self, rendered: ColorRenderCamera, samples: int, world: FrameId) -> None:
@@ -64,7 +64,7 @@ class AreaCamera(LeafSystem):
 
         Args:
             rendered: Drake's camera of `supersampled_camera(camera)`.
-            samples: of the camera.
+            samples: rays per pixel along each side.
             world: the scene graph's world frame.
         """
         super().__init__()
@@ -106,7 +106,8 @@ def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera
     """Drake's render cameras of a station camera.
 
     Raises:
-        InvalidInputError: its principal point lies outside of the image, which Drake does not take.
+        InvalidInputError: its principal point lies outside of the image, which Drake does not
+            support.
     """
     (fx, fy), (cx, cy) = camera.focal, camera.principal_point
     if not 0 < cx + HALF_PIXEL < camera.width or not 0 < cy + HALF_PIXEL < camera.height:
@@ -127,9 +128,9 @@ def add_cameras(
     """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
 
     Args:
-        builder: of the diagram.
-        station: has the cameras.
-        names: those to add; all if not given.
+        builder: builder of the diagram.
+        station: station with the cameras.
+        names: names of the cameras to add; all if not given.
 
     Raises:
         UnknownNameError: the station has no such camera.
@@ -176,12 +177,12 @@ def add_cameras(
 
 
 def add_renderer(scene_graph: SceneGraph, name: str, parameters: RenderEngineVtkParams) -> None:
-    """Adds Drake's renderer, of all that is there and will be.
+    """Adds Drake's renderer for all present and future geometries.
 
     Args:
-        scene_graph: to add it to.
-        name: of the renderer.
-        parameters: its lights, for example.
+        scene_graph: the scene graph.
+        name: name of the renderer.
+        parameters: parameters such as its lights.
 
     Raises:
         MissingDependencyError: a system library of the renderer is missing (it would crash).
@@ -202,9 +203,9 @@ def add_renderer(scene_graph: SceneGraph, name: str, parameters: RenderEngineVtk
 
 
 def _point_cloud(camera: Camera) -> DepthImageToPointCloud:
-    """Makes coloured points of the depth image. It takes pixels by their indices, which are
-    OpenCV's coordinates of their centres: with Drake's principal point all would be half a pixel
-    aside."""
+    """Converts the depth image to coloured points. It uses pixel indices, which are OpenCV's
+    coordinates of the pixel centres; with Drake's principal point all points would be off by half a
+    pixel."""
     info = CameraInfo(camera.width, camera.height, *camera.focal, *camera.principal_point)
     return DepthImageToPointCloud(
         info, PixelType.kDepth32F, fields=int(BaseField.kXYZs) | int(BaseField.kRGBs)

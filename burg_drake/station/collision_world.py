@@ -47,13 +47,13 @@ def read_object_shapes(library: ObjectLibrary, name: str, packages: Packages) ->
     """Shapes of an object in its own frame; those of a rigid mesh are its convex pieces.
 
     Args:
-        library: where the object is.
-        name: of the object.
-        packages: what the station says of packages.
+        library: library with the object.
+        name: name of the object.
+        packages: the station's package folders.
 
     Raises:
         UnknownNameError: no such object.
-        InvalidInputError: its model cannot be loaded, or does not weigh what the library says.
+        InvalidInputError: its model cannot be loaded, or its mass differs from the library's.
     """
     instance_name = "alone"  # Name of the only instance in the plant.
     instance = Instance(name=instance_name, object=name)
@@ -68,8 +68,8 @@ def read_object_shapes(library: ObjectLibrary, name: str, packages: Packages) ->
 
 
 def surrounding_shapes(station_diagram: StationDiagram) -> dict[str, PosedShapes]:
-    """Shapes in the world of all that is not an instance of the scene: the table, the station's
-    obstacles, and the links of the robot in its home posture, by their names."""
+    """Shapes of the station in the world by name: table, obstacles, and the robot's links in the
+    home posture."""
     plant, inspector = station_diagram.plant, station_diagram.scene_graph.model_inspector()
     obstacles = station_diagram.station.document.background
     bodies = {"table": station_diagram.table}
@@ -96,8 +96,8 @@ class MovableBody:
     """A movable body in the scene graph, in use or waiting.
 
     Attributes:
-        kind: what it is; all of a kind have the same shapes.
-        index: the place it takes.
+        kind: kind of body; all bodies of a kind have the same shapes.
+        index: index of its place.
         geometries: its convex shapes.
     """
 
@@ -114,11 +114,11 @@ class CollisionWorld:
 
     Args:
         fixed: shapes of fixed bodies in the world, by name.
-        shapes: gives those of a kind of body in the body's frame; asked once a kind.
-        places: bodies that there is room for before the scene graph is made anew.
+        shapes: returns the shapes of a kind of body in the body's frame; called once per kind.
+        places: number of bodies for which the scene graph has room before it is rebuilt.
 
     Attributes:
-        fixed: those shapes.
+        fixed: shapes of the fixed bodies.
         anchored: names of fixed bodies by geometry, in the order of their shapes.
     """
 
@@ -130,20 +130,21 @@ class CollisionWorld:
     ) -> None:
         self.fixed, self._shapes = fixed, shapes
         self._known: dict[str, PosedShapes] = {}
-        self._start(places)
+        self._build_scene_graph(places)
 
     def place(self, bodies: Mapping[str, tuple[str, RigidTransform]]) -> None:
-        """Puts bodies in the place of those that were there before.
+        """Replaces the movable bodies.
 
         Args:
-            bodies: kind and pose `X_WB` of each by name; names are none of the fixed ones.
+            bodies: kind and pose `X_WB` of each body by name; names must differ from those of fixed
+                bodies.
         """
         for name, body in list(self._used.items()):
             if name not in bodies or bodies[name][0] != body.kind:
                 self._waiting.setdefault(body.kind, []).append(self._used.pop(name))
                 self._frame_poses.set_value(self._frames[body.index], _parking_pose(body.index))
         if self._taken + len(bodies) - len(self._used) > len(self._frames):
-            self._start(max(len(self._frames), 2 * len(bodies)))
+            self._build_scene_graph(max(len(self._frames), 2 * len(bodies)))
         for name, (kind, X_WB) in bodies.items():
             if name not in self._used:
                 waiting = self._waiting.get(kind)
@@ -156,22 +157,22 @@ class CollisionWorld:
 
     @property
     def bodies(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        """Kind and pose `X_WB` of what is there, as it was placed."""
+        """Kind and pose `X_WB` of each movable body, as it was placed."""
         return self._bodies
 
     def geometries(self, name: str) -> tuple[GeometryId, ...]:
-        """Those of a movable body that is there, in the order of its shapes."""
+        """Geometries of a movable body, in the order of its shapes."""
         return self._used[name].geometries
 
     def shapes(self, name: str) -> PosedShapes:
-        """Those of a movable body that is there, in its frame."""
+        """Shapes of a movable body in its frame."""
         return self._known[self._used[name].kind]
 
     def overlaps(self) -> tuple[Depths, Depths]:
-        """Which bodies overlap.
+        """Overlaps of the movable bodies.
 
         Returns:
-            Depth of the deepest overlap [m] of each pair of movable bodies that overlap, in the
+            Depths of the deepest overlaps [m]: of each overlapping pair of movable bodies, in the
             order in which they were placed, and of each movable body with a fixed one.
         """
         order = {name: i for i, name in enumerate(self._bodies)}
@@ -190,7 +191,7 @@ class CollisionWorld:
         return among, fixed
 
     def touched(self, name: str, gap: float) -> set[str]:
-        """Bodies, fixed ones among them, that are closer to a movable one than `gap` [m]."""
+        """Movable and fixed bodies that are closer to a movable body than `gap` [m]."""
         own = set(self.geometries(name))
         owner = {**self.anchored, **self._owner}
         pairs = self.query().ComputeSignedDistancePairwiseClosestPoints(gap)
@@ -199,11 +200,11 @@ class CollisionWorld:
         return {owner[g] for g in others if g in owner}
 
     def query(self) -> QueryObject:
-        """Drake's answers about the bodies as they stand; good until they are moved."""
+        """Drake's geometry queries for the current poses; valid until bodies are moved."""
         return self._graph.get_query_output_port().Eval(self._context)
 
-    def _start(self, places: int) -> None:
-        """Makes the scene graph, with the fixed bodies alone."""
+    def _build_scene_graph(self, places: int) -> None:
+        """Creates the scene graph with only the fixed bodies."""
         graph = SceneGraph()
         source = graph.RegisterSource("bodies")
         frames = [graph.RegisterFrame(source, GeometryFrame(f"{i}")) for i in range(places)]
@@ -250,7 +251,7 @@ def _parking_pose(index: int) -> RigidTransform:
 
 
 class FreeTravel:
-    """Ways of the movable bodies of a collision world, whose shapes are read once.
+    """Free travel of the movable bodies of a collision world. Their shapes are read once.
 
     Args:
         world: the bodies.
@@ -264,16 +265,16 @@ class FreeTravel:
     def first_contact(
         self, names: Sequence[str], direction: Array, limit: float
     ) -> tuple[float, str]:
-        """How far bodies can be moved together, and what they meet there.
+        """How far bodies can be moved together, and the first body that they meet.
 
         Args:
-            names: of movable bodies, at least one.
+            names: names of movable bodies, at least one.
             direction: (3,) unit vector in the world.
-            limit: [m].
+            limit: longest distance [m].
 
         Returns:
-            The way [m], at most `limit`, and the name of the body that is met, movable or fixed;
-            none ("") where there is none within the limit.
+            The distance [m], at most `limit`, and the name of the movable or fixed body that is
+            met; "" if there is none within the limit.
         """
         start_gap = 5e-6  # Metres between touching shapes at the start.
         sliding_cosine = 1e-2  # Cosine between motion and contact normal up to which shapes slide.
@@ -299,7 +300,7 @@ class FreeTravel:
         return float(found[first]), str(owners[j[first]])
 
     def _shapes(self, name: str) -> ConvexShapes:
-        """Those of a movable body, in the world."""
+        """Shapes of a movable body in the world."""
         kind, X_WB = self._world.bodies[name]
         if kind not in self._known:
             self._known[kind] = _convex_shapes(self._world.shapes(name))
@@ -308,8 +309,8 @@ class FreeTravel:
     def _normals(
         self, names: Sequence[str], others: Sequence[str], pairs: tuple[Indices, Indices]
     ) -> Array:
-        """Unit vectors (K, 3) along which shapes of moving bodies come clear of others on the
-        shortest way."""
+        """Contact normals (K, 3): unit vectors along which shapes of moving bodies separate from
+        others by the shortest motion."""
         # Metres; Drake has no normals at distances that are rounding errors.
         offset = np.array([4.8e-7, 6e-7, 6.4e-7])
         moving = [g for name in names for g in self._world.geometries(name)]
@@ -334,7 +335,7 @@ class FreeTravel:
 
 
 def _boxes_near(a: ConvexShapes, b: ConvexShapes) -> NDArray[np.bool_]:
-    """(A, B) whether boxes around shapes are near each other."""
+    """Whether bounding boxes of shapes are near each other (A, B)."""
     near_distance = 1e-4  # Metres; Drake's distances of cylinders are wrong by up to 3e-5 m.
     (low_a, high_a), (low_b, high_b) = a.boxes(), b.boxes()
     near = (low_a[:, None] <= high_b + near_distance) & (low_b <= high_a[:, None] + near_distance)
@@ -342,14 +343,14 @@ def _boxes_near(a: ConvexShapes, b: ConvexShapes) -> NDArray[np.bool_]:
 
 
 def _convex_shapes(posed: PosedShapes) -> ConvexShapes:
-    """Drake's shapes, in the frame of their poses."""
+    """Converts Drake's shapes, in the frame of their poses."""
     return ConvexShapes.joined(
         [_convex_shape(shape).moved(X_FG.GetAsMatrix4()) for X_FG, shape in posed]
     )
 
 
 def _convex_shape(shape: Shape) -> ConvexShapes:
-    """One of Drake's shapes, in its own frame."""
+    """Converts one of Drake's shapes, in its own frame."""
     middle, flat = np.zeros((1, 3)), np.zeros((3, 3))
     if isinstance(shape, Box):
         corners = np.stack(np.meshgrid(*([-0.5, 0.5],) * 3), axis=-1).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Contact geometries of objects in trials: a surface for the pads, feet for the table.
+"""Contact geometries of objects in trials: surfaces for the hand, feet for the table.
 
 All other bodies meet the convex pieces.
 """
@@ -41,12 +41,13 @@ from burg_drake.station.station_document import Station
 
 @dataclass(frozen=True)
 class ContactParts:
-    """Geometries of bodies that only some others meet.
+    """Geometries of objects that only some bodies collide with.
 
     Attributes:
-        surfaces: own surfaces, which the hand meets in the place of the pieces.
-        feet: what stands on the table in the place of all else.
-        hulls: what meets all but the hand and the table in the place of the pieces.
+        surfaces: surface meshes, which collide with the hand instead of the pieces.
+        feet: feet, which collide with the table instead of all other geometries.
+        hulls: convex hulls, which collide with all but the hand and the table instead of the
+            pieces.
     """
 
     surfaces: tuple[GeometryId, ...] = ()
@@ -55,7 +56,7 @@ class ContactParts:
 
     @property
     def all(self) -> frozenset[GeometryId]:
-        """Of whatever kind."""
+        """Geometries of all kinds."""
         return frozenset((*self.surfaces, *self.feet, *self.hulls))
 
 
@@ -69,20 +70,20 @@ def add_contact_parts(
     own_surfaces: bool = True,
     hulls: bool = False,
 ) -> ContactParts:
-    """Adds the own surfaces of objects, and feet to those that can move.
+    """Adds surface meshes to objects, and feet to those that can move.
 
-    Where the documents let an object sink into the table, by the fraction of a millimetre that
-    settling leaves, its feet are drawn in, so that it stands as it is placed. Balls have no feet:
-    they roll at a point.
+    If an object is placed slightly in the table, as after settling, its feet are shortened, so that
+    it stands at its pose in the document. Balls have no feet: they roll on a point.
 
     Args:
-        plant: to add them to, with the robot in it, not finalized.
+        plant: the plant with the robot, not finalized.
         scene: the scene.
         station: the station.
         free: bodies of objects that can move, by name.
-        fixed: bodies of what cannot, by name; the station's obstacles are as they are.
-        own_surfaces: those of objects that have one; at points Drake would meet its convex hull.
-        hulls: have a hull of each free object meet what its pieces would.
+        fixed: bodies that cannot move, by name; the station's obstacles are not changed.
+        own_surfaces: add the surface meshes of objects; with point contact Drake would use their
+            convex hulls.
+        hulls: add hulls that replace the pieces of free objects.
     """
     surfaces, feet, around = [], [], []
     for name, body in {**free, **fixed}.items():
@@ -98,7 +99,7 @@ def add_contact_parts(
 
 
 def needs_no_pieces(scene: Scene, station: Station, name: str) -> bool:
-    """Whether surface, feet and hull of an object leave nothing for its pieces to meet."""
+    """Whether surface, feet and hull of an object replace its pieces in all contacts."""
     return scene.entry(name).contact.kind == "surface" and is_on_table(scene, station, name)
 
 
@@ -136,8 +137,8 @@ def is_on_table(scene: Scene, station: Station, name: str) -> bool:
 
 
 def _foot_shapes(scene: Scene, name: str, X_WO: Array) -> Iterator[tuple[str, Array, Shape]]:
-    """Names, poses (4, 4) in O and shapes of what an object stands on, placed at `X_WO`."""
-    disc_thickness = 1e-4  # Metres, of the rolling discs and of their distance from the ends.
+    """Names, poses (4, 4) in O and shapes of the feet of an object at `X_WO`."""
+    disc_thickness = 1e-4  # Metres: thickness of the rolling discs, and gap to the ends.
     entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
     primitive = entry.contact.primitive
     if primitive is None:
@@ -167,8 +168,8 @@ def _foot_shapes(scene: Scene, name: str, X_WO: Array) -> Iterator[tuple[str, Ar
 
 
 def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
-    """(F, 3) feet of an object of pieces or a surface, in O [m]."""
-    settled_tolerance = 1e-3  # Metres above the lowest corner that carry a settled object.
+    """Feet (F, 3) of an object of pieces or a surface, in O [m]."""
+    settled_tolerance = 1e-3  # Metres above the lowest corner, of corners that carry the object.
     entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
     corners = support_corners(scene.library, entry)
     ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
@@ -184,9 +185,9 @@ def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
 def _raise_to_table(
     points: Array, X_WO: Array, corners: Array, most: float = SUPPORT_HEIGHT_TOLERANCE
 ) -> Array:
-    """Points (N, 3) of O, those that are under the table's top or less than `most` above it moved
-    there, along the vertical: of its lower half, given its corners (M, 3), and no farther than to
-    its middle, so that something is left of what is thin."""
+    """Points (N, 3) in O, of which those below the table's top, or less than `most` above it, are
+    moved vertically to it. Only points in the lower half of the object with corners (M, 3) move,
+    and no farther than to its middle, so that thin objects keep some height."""
     up = np.round(X_WO[2, :3], 9)
     heights, reach = X_WO[2, 3] + points @ up, X_WO[2, 3] + corners @ up
     middle = (reach.min() + reach.max()) / 2
@@ -197,7 +198,7 @@ def _raise_to_table(
 
 
 def _rim_points(radius: float, length: float) -> Array:
-    """(N, 3) points on the two rims of a cylinder along z [m]."""
+    """Points (N, 3) on the two rims of a cylinder along z [m]."""
     foot_count = 8  # Feet on each rim of a cylinder.
     angle = 2.0 * np.pi * np.arange(foot_count) / foot_count
     x, y = radius * np.cos(angle), radius * np.sin(angle)

@@ -43,7 +43,7 @@ def build_station_diagram(
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
-    Objects are rigid, but those that touch other objects are compliant.
+    Objects are rigid, except those that touch other objects, which are compliant.
 
     Example::
 
@@ -52,32 +52,32 @@ def build_station_diagram(
         simulator.AdvanceTo(0.5)
 
     Args:
-        scene: what stands on the board.
+        scene: the scene.
         station: robot, table, board pose and cameras.
-        robot: `arm` mounts the hand on the station's arm. `hand` lets it hang on one prismatic
-            joint `lift` along world z between the frames `lift_base` (in the world) and
-            `lift_mount` (on the hand), which are set per grasp through the Context; before that
-            the hand is above the board, pointing down. `none` leaves the robot out.
+        robot: `arm` mounts the hand on the station's arm. `hand` attaches it to one prismatic joint
+            `lift` along world z between the frames `lift_base` (in the world) and `lift_mount` (on
+            the hand), which are set per grasp through the Context; before that the hand is above
+            the board, pointing down. `none` leaves the robot out.
         engine: time step and contact settings, or the name of a preset.
         meshcat: where to show the diagram live, if anywhere.
-        drivers: let positions, widths or a plan command the robot, and measure what it feels; see
+        drivers: add drivers that follow positions, widths or a plan, and force measurements; see
             the ports above. Needs an arm.
-        cameras: add the station's cameras, all or the named ones; needs the renderer's system
-            libraries. The board's markers are drawn with `meshcat`, or where names are given, also
-            none of them, `()`; it is plain where nobody looks.
-        weld_objects: for a plant of the robot alone that is not simulated: what would be free
-            stands where it is placed, and can be lifted off by a joint `rise` of its model along
-            world z, and moved sideways with its frame `place`; rigid meshes are replaced by pieces.
-        for_trials: have the hand meet the own surfaces of objects, and let these stand on the table
-            with feet (see `add_contact_parts`). The name of an instance: it alone can move, and a
-            hull of it meets all but the hand and the table; of the others there are only hulls.
+        cameras: add all or the named cameras of the station; needs the renderer's system libraries.
+            The board's markers are drawn with `meshcat`, or if names are given, even an empty
+            tuple; otherwise the board is plain.
+        weld_objects: for collision queries without simulation: free objects are fixed at their
+            poses, can be raised by a joint `rise` of their model along world z, and moved sideways
+            with their frame `place`; rigid meshes are replaced by pieces.
+        for_trials: add surface meshes for the hand, and feet for the table, to the objects (see
+            `add_contact_parts`). With the name of an instance only that instance can move, and its
+            hull meets all but the hand and the table; the other objects are only hulls.
 
     Returns:
-        The diagram. In its default context all stands as the documents say, the hand is open and
-        the arm is in its home posture.
+        The diagram. In its default context objects are at their poses in the documents, the hand is
+        open, and the arm is in its home posture.
 
     Raises:
-        UnknownNameError: no such `robot`, engine, camera, or instance that is to be alone.
+        UnknownNameError: no such `robot`, engine or camera, or no such instance in `for_trials`.
         InvalidInputError: options that contradict each other; an engine that is not Drake; an
             object's model cannot be loaded, `arm` without an arm in the station, a home posture
             that does not fit the arm, or two things of the same name.

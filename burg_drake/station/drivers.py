@@ -42,9 +42,9 @@ class SampledMotion(Protocol):
 
 @runtime_checkable
 class PlayablePlan(Protocol):
-    """Phases by name, one after the other; the distance between the pads of the open hand [m]; what
-    the plan is for, with the names of its `joints`, or None; and whether that is this scene and
-    station, which is not asked without an origin."""
+    """A plan: consecutive phases by name; `opening`, the distance between the pads of the open hand
+    [m]; its `origin` with the names of its `joints`, or None; and `require_for`, which checks the
+    origin, if there is one, against a scene and a station."""
 
     @property
     def phases(self) -> Mapping[str, SampledMotion]: ...
@@ -60,12 +60,12 @@ class PlayablePlan(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PlannedCommand:
-    """What a plan wants at some time.
+    """Command of a plan at one time.
 
     Attributes:
         q, v: (n,) positions and velocities of the arm [rad, rad/s].
         closed: whether the hand closes or holds.
-        opening: distance between the pads if not [m].
+        opening: distance between the pads otherwise [m].
     """
 
     q: Array
@@ -83,11 +83,11 @@ class _PlannedSamples:
 
 
 class PlanPlayer:
-    """Plays plans that were made for one arm in one scene.
+    """Samples plans that were made for one arm in one scene.
 
     Args:
         joints: names of the arm's n joints, in order.
-        scene, station: what plans have to be for.
+        scene, station: scene and station of the plans.
     """
 
     def __init__(self, joints: tuple[str, ...], scene: Scene, station: Station) -> None:
@@ -96,18 +96,18 @@ class PlanPlayer:
         self._samples: _PlannedSamples | None = None
 
     def command(self, plan: object, time: float) -> PlannedCommand | None:
-        """What arm and hand are to do.
+        """Command of a plan for arm and hand.
 
         Args:
             plan: a `PlayablePlan`, or None.
             time: since its start [s].
 
         Returns:
-            The command; None without a plan and before its start. After its end a plan stays where
-            it ends.
+            The command; None without a plan and before its start. After the end of the plan its
+            last positions are kept.
 
         Raises:
-            InvalidInputError: it is not a plan, or one for another arm, scene or station; or the
+            InvalidInputError: it is not a plan, or is for another arm, scene or station; or the
                 time is not a number.
         """
         if plan is None:
@@ -130,7 +130,7 @@ class PlanPlayer:
     def _check_plan(self, plan: object) -> _PlannedSamples:
         if not isinstance(plan, PlayablePlan):
             got = type(plan).__name__
-            if hasattr(plan, "outcome"):  # a planner's answer where it found no plan
+            if hasattr(plan, "outcome"):  # a planner's result if it found no plan
                 got += f" ({plan.outcome})"
             raise InvalidInputError(f"port 'plan' got a {got}; give a burg_drake Plan")
         if plan.origin is not None:
@@ -150,7 +150,7 @@ class PlanPlayer:
 def _sample_plan(
     phases: Mapping[str, SampledMotion], joints: int, opening: float
 ) -> _PlannedSamples:
-    """Joins phases to one trajectory, and notes when the hand closes and opens."""
+    """Joins phases into one trajectory, and records when the hand closes and opens."""
     max_gap = 1e-6  # Radians between the end of a phase and the start of the next.
     times, positions, velocities = [np.zeros(1)], list[Array](), list[Array]()
     switches, end, before = [], 0.0, ""
@@ -188,13 +188,13 @@ class _PlanFollower(LeafSystem):
     _desired_state: InputPort
 
     def _declare_plan_ports(self, player: PlanPlayer, ahead: float = 0.0) -> None:
-        """Declares the ports of the plan, which is commanded for `ahead` [s] later."""
+        """Declares the ports of the plan, which is sampled `ahead` [s] in advance."""
         self._player, self._ahead = player, ahead
         self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
         self._start = self.DeclareVectorInputPort("plan.start_time", 1)
 
     def _planned_command(self, context: Context) -> PlannedCommand | None:
-        """What the plan wants now; None without one, and before it starts."""
+        """The plan's current command; None without a plan and before its start."""
         if not self._plan.HasValue(context):
             return None
         start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
@@ -203,7 +203,7 @@ class _PlanFollower(LeafSystem):
         return self._player.command(self._plan.Eval(context), time + ahead)
 
     def _connected_inputs(self, context: Context, role: str) -> tuple[bool, bool]:
-        """Whether positions, or a desired state, are commanded."""
+        """Whether the port for positions, and that for a desired state, are connected."""
         position, desired_state = (
             port.HasValue(context) for port in (self._position, self._desired_state)
         )
@@ -216,8 +216,8 @@ class _PlanFollower(LeafSystem):
 
 
 class ArmDriver(_PlanFollower):
-    """Follows a plan that has begun, else a position or a desired state; without any of them it
-    holds what was commanded last.
+    """Follows a plan that has begun, else a position or a desired state, else holds the last
+    command.
 
     The velocity that goes with a position is its difference from that of one step before, and 0 in
     the first step. Drake's `StateInterpolatorWithDiscreteDerivative` does the same a step later.
@@ -226,7 +226,7 @@ class ArmDriver(_PlanFollower):
         position: (n) [rad].
         desired_state: (2 n) positions and velocities.
         plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
-        state: (2 n) where the arm is; read when a simulation begins.
+        state: (2 n) positions and velocities of the arm; read when a simulation begins.
         command: (2 n) positions and velocities (output).
     """
 
@@ -237,10 +237,10 @@ class ArmDriver(_PlanFollower):
 
         Args:
             joints: names of the n joints.
-            home: (n,) what is held before a simulation has begun [rad].
-            period: of the simulation's steps [s].
-            ahead: plans are commanded for so much later [s].
-            player: of plans for this arm.
+            home: (n,) positions that are held before a simulation begins [rad].
+            period: time step of the simulation [s].
+            ahead: time by which plans are sampled in advance [s].
+            player: player of plans for this arm.
         """
         super().__init__()
         n = len(joints)
@@ -266,7 +266,7 @@ class ArmDriver(_PlanFollower):
         values.set_value(self._last, np.append(q, 1.0))
 
     def _check_jump(self, jump: Array) -> None:
-        max_jump = 0.05  # Radians from the last command; the fastest arms move 0.015 in a step.
+        max_jump = 0.05  # Radians from the last command; the fastest arms move 0.015 rad in a step.
         worst = int(np.abs(jump).argmax())
         if abs(jump[worst]) > max_jump:
             raise InvalidInputError(
@@ -303,8 +303,8 @@ class Fingers:
 
     Attributes:
         hand: the document.
-        q, v: where they are in the hand's positions, and in its positions and velocities.
-        dofs: where they are among all velocities of the plant.
+        q, v: their indices in the hand's positions, and in its positions and velocities.
+        dofs: their indices among all velocities of the plant.
         closed, open: (2,) positions [m].
     """
 
@@ -317,7 +317,7 @@ class Fingers:
 
     @classmethod
     def of(cls, plant: MultibodyPlant, model: ModelInstanceIndex, hand: Hand) -> Fingers:
-        """Finds them in a finalized plant."""
+        """Finds the fingers of a hand in a finalized plant."""
         actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(model))
         joints = [actuator.joint() for actuator in actuators]
         by_name = {finger.joint: finger for finger in hand.fingers}
@@ -337,11 +337,11 @@ class Fingers:
 
     @property
     def towards_closed(self) -> Array:
-        """(2,) signs of the joints' velocities while the hand closes."""
+        """Signs (2,) of the joints' velocities while the hand closes."""
         return np.sign(self.closed - self.open)
 
     def at(self, distance: float) -> Array:
-        """(2,) positions with the pads at a distance [m]."""
+        """Joint positions (2,) for a distance between the pads [m]."""
         low, high = self.hand.opening
         return self.closed + (distance - low) / (high - low) * (self.open - self.closed)
 
@@ -353,28 +353,28 @@ class Fingers:
 
 
 class HandDriver(_PlanFollower):
-    """Follows a plan that has begun, else a distance between the pads or a desired state; without
-    any of them it holds what was commanded last.
+    """Follows a plan that has begun, else a distance between the pads or a desired state, else
+    holds the last command.
 
-    The fingers' servos follow a velocity with the document's force at most. A limit below that is
-    kept by a force against the motion that makes up the difference, and that the servos are told
-    of: free fingers are as fast as without it, and what they press on feels the limit.
+    The fingers' servos follow a velocity with at most the document's force. A lower limit is
+    enforced by a brake: a force against the motion that makes up the difference, for which the
+    servos compensate. So free fingers keep their speed, and the grip force obeys the limit.
 
     Ports:
         position: (1) distance between the pads [m].
         force_limit: (1) force of each pad [N], the document's if not connected.
-        desired_state: (4) as the servos take it; they follow its velocities.
+        desired_state: (4) input of the servos, which follow its velocities.
         plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
-        state: (2 k) of the hand's model.
-        command: (4) for the servos (output).
+        state: (2 k) state of the hand's model.
+        command: (4) command of the servos (output).
         brake: (v) generalized force on the whole plant that limits the fingers' (output).
-        braked: (2) what of it acted in the last step [N] (output).
+        braked: (2) brake force of the fingers in the last step [N] (output).
     """
 
     def __init__(
         self, plant: MultibodyPlant, model: ModelInstanceIndex, fingers: Fingers, player: PlanPlayer
     ) -> None:
-        """Declares ports, state and events; the arguments are those of the diagram."""
+        """Declares ports, state and events for a hand in a diagram."""
         super().__init__()
         hand = fingers.hand
         self._fingers, self._size = fingers, plant.num_velocities()
@@ -384,12 +384,12 @@ class HandDriver(_PlanFollower):
         self._desired_state = self.DeclareVectorInputPort("desired_state", 4)
         self._declare_plan_ports(player)
         self._state = self.DeclareVectorInputPort("state", plant.num_multibody_states(model))
-        # Where the fingers are held, and the brake of the last step.
+        # Positions at which the fingers are held, and the brake of the last step.
         self._held = self.DeclareDiscreteState(fingers.open)
         self._braked = self.DeclareDiscreteState(np.zeros(2))
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
-        # A discrete update would come after the plant's step, which is an unrestricted one, and
-        # would remember the brake of the step to come.
+        # A discrete update would come after the plant's unrestricted update, and would store the
+        # brake of the next step.
         self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._store_command)
         self.DeclareVectorOutputPort("command", 4, self._calc_command)
         self._brake = self.DeclareVectorOutputPort("brake", self._size, self._calc_brake)
@@ -415,7 +415,7 @@ class HandDriver(_PlanFollower):
         output.SetFromVector(brake)
 
     def _braking_force(self, context: Context, speed: Array) -> Array:
-        """(2,) force against the motion that is wanted [N]."""
+        """Force (2,) against the commanded motion [N]."""
         most = self._fingers.hand.force
         limit = most
         if self._force_limit.HasValue(context):
@@ -428,8 +428,8 @@ class HandDriver(_PlanFollower):
         return np.asarray(-np.sign(speed) * (most - limit))
 
     def _finger_command(self, context: Context) -> tuple[Array, Array]:
-        """Positions that the fingers go to, (2,) [m], and their velocities now, (2,) [m/s]."""
-        position_gain = 50.0  # Finger speed over distance from the goal, 1/s.
+        """Goal positions (2,) of the fingers [m], and their current velocities (2,) [m/s]."""
+        position_gain = 50.0  # Ratio of finger speed to distance from the goal, 1/s.
         position, desired_state = self._connected_inputs(context, "hand")
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
         q, planned = self._state.Eval(context)[self._fingers.q], self._planned_command(context)

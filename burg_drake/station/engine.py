@@ -19,9 +19,10 @@ from burg_drake.core import (
 class Engine:
     """How trials are simulated.
 
-    With `lagged` what slides over the table is braked 2 % too hard at 2 ms and 10 % at 5 ms. `sap`
-    is wrong on marginal grasps. Drake's own stiction tolerance of 1e-4 m/s lets a box that hangs 20
-    mm off its centre tilt by 0.9 degrees in a trial at 1 ms, 1e-5 by 0.2, at about the same cost.
+    With `lagged`, friction on sliding objects is 2 % too high at 2 ms and 10 % too high at 5 ms.
+    `sap` is wrong on marginal grasps. Drake's own stiction tolerance of 1e-4 m/s lets a box that
+    hangs 20 mm off its centre tilt by 0.9 degrees in a trial at 1 ms, 1e-5 by 0.2, at about the
+    same cost.
 
     Attributes:
         name: name of the preset.
@@ -56,15 +57,15 @@ class Engine:
         require_ranges(self, f"engine {quote_value(self.name)}")
 
     @property
-    def creeps(self) -> bool:
-        """Whether friction that holds a load lets it creep at a constant speed, as Drake's does,
-        which is viscous. Elsewhere what moves may be about to let go."""
+    def friction_creeps(self) -> bool:
+        """Whether a load held by friction creeps at a constant speed, as with Drake's viscous
+        friction. In other engines a moving load may be about to slip."""
         return self.simulator == "drake"
 
     @property
     def packages(self) -> dict[str, str]:
-        """Packages that decide about its results beside those that always do, as they are called in
-        files and installed."""
+        """Additional packages that affect its results: their names in files and their installed
+        names."""
         return {} if self.simulator == "drake" else {self.simulator: self.simulator}
 
 
@@ -86,7 +87,7 @@ DEFAULT_ENGINE = "standard"  # Name of the preset.
 
 
 def as_drake_engine(engine: Engine | str) -> Engine:
-    """As `as_engine`, for what only Drake can step.
+    """As `as_engine`, but accepts only Drake engines.
 
     Raises:
         UnknownNameError: no such preset.
@@ -103,7 +104,7 @@ def as_drake_engine(engine: Engine | str) -> Engine:
 
 
 def as_engine(engine: Engine | str) -> Engine:
-    """An engine as it is, or a preset by its name.
+    """Returns an engine unchanged, or a preset by its name.
 
     Raises:
         UnknownNameError: no such preset.

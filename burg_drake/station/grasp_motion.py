@@ -21,7 +21,7 @@ MOTION_LENGTH_RANGES = {
 
 
 def _length_setting(default: float | None, field: str, help: str, name: str = "") -> Any:
-    """The declaration of a length in its range."""
+    """Declares a length with its range."""
     low, high = (1000.0 * bound for bound in MOTION_LENGTH_RANGES[field])
     return setting(
         default,

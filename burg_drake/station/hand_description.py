@@ -19,15 +19,15 @@ from burg_drake.station.station_diagram import FloatingHand, StationDiagram
 
 @dataclass(frozen=True, eq=False)
 class PadFront:
-    """The front of a pad on a link B: a plane in which the pad is pressed upon.
+    """The front of a pad on a link B: the plane of contact with objects.
 
     Attributes:
-        X_BP: (4, 4) frame P in the middle of the smallest rectangle about the front, with the axes
-            x and y along its sides and z out of the pad.
+        X_BP: (4, 4) frame P in the middle of the smallest bounding rectangle of the front, with x
+            and y along its sides and z out of the pad.
         size: extents of the rectangle along x and y [m].
-        area: of the front [m^2].
+        area: area of the front [m^2].
         stiffness: pressure over depth [N/m^3].
-        thickness: of the pad, behind the front [m].
+        thickness: thickness of the pad behind the front [m].
         corners: (M, 3) of the whole pad's convex hull, in P [m].
     """
 
@@ -42,24 +42,24 @@ class PadFront:
 def find_pad_front(
     X_BC: Array, volume: VolumeMesh, modulus: float, closing_B: Array, side_B: Array
 ) -> PadFront:
-    """Finds the front of a pad, and how stiff the pad is there.
+    """Finds the front of a pad, and its stiffness.
 
-    The pressure of Drake's elastic volumes grows from 0 at the surface to the modulus at the
-    vertex farthest inside; behind a front it grows evenly up to the first vertices inside.
+    The pressure of Drake's elastic volumes grows from 0 at the surface to the modulus at the vertex
+    farthest inside; behind a front it grows evenly up to the first vertices inside.
 
     Args:
         X_BC: (4, 4) pose of the volume in the link.
-        volume: of the pad, in C.
+        volume: volume mesh of the pad, in C.
         modulus: hydroelastic modulus [Pa].
-        closing_B: (3,) unit vector, in which the finger closes.
+        closing_B: (3,) unit vector in which the finger closes.
         side_B: (3,) unit vector across it, for the order of the axes of P.
 
     Raises:
-        ValueError: there is no flat front, or the pad is not convex; tells in what way.
+        ValueError: there is no flat front, or the pad is not convex; with the reason.
     """
     flat_tolerance = 1e-5  # Metres behind the foremost point that belong to the front.
-    min_area_share = 0.5  # Share of the pad's outline; less is an edge, or curved.
-    max_hull_ratio = 1.01  # Volume of the pad's hull over that of the pad.
+    min_area_share = 0.5  # Share of the pad's outline; a smaller front is an edge, or curved.
+    max_hull_ratio = 1.01  # Largest ratio of the volumes of the pad's hull and the pad.
     vertices = [volume.vertex(i) for i in range(int(volume.num_vertices()))]
     p_BV = transform_points(X_BC, np.array(vertices))
     hull = ConvexHull(p_BV)
@@ -107,7 +107,7 @@ def find_pad_front(
 
 
 def _convex_outline(points: Array) -> Array | None:
-    """(N, 2) outline of points (M, 2), counter-clockwise; None if they lie on a line."""
+    """Convex outline (N, 2) of points (M, 2), counter-clockwise; None if they are collinear."""
     if len(points) < 3:
         return None
     try:
@@ -117,8 +117,8 @@ def _convex_outline(points: Array) -> Array | None:
 
 
 def _smallest_rectangle(outline: Array) -> tuple[Array, Array, Array]:
-    """Axes (2, 2, one a row) of the smallest rectangle about an outline, and its lower and upper
-    corners (2,) along them; of equal ones that which is turned least."""
+    """Axes (2, 2; rows) of the smallest bounding rectangle of an outline, and its lower and upper
+    corners (2,) along them; among equal ones the rectangle with the smallest rotation."""
     found = []
     for edge in np.roll(outline, -1, axis=0) - outline:
         angle = np.arctan2(edge[1], edge[0]) % (np.pi / 2)
@@ -138,11 +138,11 @@ class HandShape:
     """A convex collision shape of a link B.
 
     Attributes:
-        name: in the hand's model.
-        kind: what it is.
+        name: name in the hand's model.
+        kind: kind of shape.
         X_BC: (4, 4) pose of the shape.
         size: extents of a box, radius of a sphere, radius and length of a cylinder along z [m].
-        points: (N, 3) corners of a mesh in C [m]; none of other shapes.
+        points: (N, 3) corners of a mesh in C [m]; empty for other shapes.
         friction: Coulomb coefficient in the model.
     """
 
@@ -161,7 +161,7 @@ class HandLink:
     Attributes:
         name: of the link in the model.
         X_HB: (4, 4) pose in the hand's body, with the joint at 0.
-        shapes: collision shapes, of a finger without its pad.
+        shapes: collision shapes; for a finger, without its pad.
         mass: [kg].
         p_BCm: (3,) centre of mass [m].
         I_BCm: (3, 3) rotational inertia about it, in the axes of B [kg m^2].
@@ -180,7 +180,7 @@ class FingerLink(HandLink):
     """A finger.
 
     Attributes:
-        finger: its part of the document.
+        finger: the finger in the hand's document.
         axis_B: (3,) direction in which the joint moves it.
         pad: the collision shape that touches objects.
         front: of the pad, where it is soft.
@@ -194,14 +194,14 @@ class FingerLink(HandLink):
 
 @dataclass(frozen=True, eq=False)
 class HandDescription:
-    """A hand.
+    """Links, joints and shapes of a hand.
 
     Attributes:
         document: the hand's document.
-        body: what the arm carries; its frame is H.
+        body: link that the arm carries; its frame is H.
         fingers: both, in the document's order.
-        X_WH: (4, 4) where the diagram has the hand at first.
-        plant_order: numbers of the fingers in the order of the diagram's positions of the hand.
+        X_WH: (4, 4) pose of the hand in the diagram's default context.
+        plant_order: indices of the fingers in the order of the hand's positions in the diagram.
     """
 
     document: Hand
@@ -212,17 +212,17 @@ class HandDescription:
 
     @property
     def coupling(self) -> float:
-        """How far the second joint goes over how far the first one goes, where they are coupled."""
+        """Ratio of the second joint's travel to the first one's, for coupled fingers."""
         first, second = self.document.fingers
         return (second.open - second.closed) / (first.open - first.closed)
 
 
 def read_hand(station_diagram: StationDiagram) -> HandDescription:
-    """The hand of a diagram built with `robot="hand"`.
+    """Reads the hand of a diagram built with `robot="hand"`.
 
     Raises:
-        InvalidInputError: parts of the hand move otherwise than by its two fingers' joints, a shape
-            is not convex or unknown, or a pad's front is not flat.
+        InvalidInputError: the hand has other moving parts than its two fingers, a shape is unknown
+            or not convex, or a pad's front is not flat.
     """
     reader = _HandReader(station_diagram)
     starts = [joint.position_start() for joint in reader.hand.joints]
@@ -276,7 +276,7 @@ class _HandReader:
         )
 
     def _require_two_joints(self, robot: set[BodyIndex]) -> None:
-        """What is neither the hand's body nor a finger would need a joint of its own."""
+        """Rejects a hand with moving parts besides its two fingers."""
         left = robot.difference(*self._groups)
         chained = any(
             lead in self.plant.GetBodiesKinematicallyAffectedBy([joint.index()])
@@ -342,7 +342,7 @@ class _HandReader:
         )
 
     def _axis(self, index: int, lead: RigidBody) -> Array:
-        """Direction of a finger's joint, by moving it."""
+        """Direction of a finger's joint, measured by moving the joint."""
         places = []
         for q in (0.0, 1.0):
             self.hand.joints[index].set_translation(self.plant_context, q)

@@ -1,4 +1,4 @@
-"""The hand document: a parallel hand as data."""
+"""The hand document: description of a parallel hand."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def locate_hand(
     Args:
         reference: built-in name or path, relative to `base`.
         base: folder of the document that names it.
-        packages: what a station says of packages.
+        packages: the station's package folders.
 
     Returns:
         The hand, its model file, and the document's file.

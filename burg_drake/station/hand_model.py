@@ -76,15 +76,15 @@ def add_hand(
     """Adds a hand with its servos.
 
     Args:
-        builder: its plant is not finalized.
+        builder: builder whose plant is not finalized.
         hand: the document.
         path: the model file.
-        packages: what a station says of packages.
+        packages: the station's package folders.
         simulated: whether contact will be simulated.
 
     Raises:
-        InvalidInputError: the model cannot be loaded, is fixed in the world, lacks what the
-            document names, or is weaker or slower than the document says.
+        InvalidInputError: the model cannot be loaded, is fixed in the world, lacks a name from the
+            document, or is weaker or slower than the document says.
     """
     plant = builder.plant()
     constraints = plant.num_constraints()
@@ -120,7 +120,7 @@ def add_hand(
 def find_hand(
     plant: MultibodyPlant, inspector: SceneGraphInspector, hand: Hand, instance: ModelInstanceIndex
 ) -> HandModel:
-    """Looks up what a document names in a plant.
+    """Finds the links, joints and pads of a hand document in a plant.
 
     Raises:
         InvalidInputError: the model has no such link, joint or pad.
@@ -168,7 +168,7 @@ def _require_known_name(hand: Hand, key: str, name: str, known: Iterable[str]) -
 
 
 def _add_servo(plant: MultibodyPlant, hand: Hand, finger: Finger, joint: PrismaticJoint) -> None:
-    """Gives a finger its velocity servo, and an actuator where the model has none."""
+    """Adds a finger's velocity servo, and an actuator if the model has none."""
     own = (a for a in _all_actuators(plant) if a.joint().index() == joint.index())
     actuator = next(own, None) or plant.AddJointActuator(joint.name(), joint)
     if hand.force > actuator.effort_limit():
@@ -192,16 +192,16 @@ def _all_actuators(plant: MultibodyPlant) -> list[JointActuator]:
     return [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
 
 
-LENGTH_TOLERANCE = 5e-4  # Metres between lengths of document and model.
+LENGTH_TOLERANCE = 5e-4  # Metres: tolerance for lengths in document and model.
 TIME_STEP = 1e-3  # Seconds.
-COUPLING_STEPS = 20  # Steps in which released fingers show whether they are coupled.
-REST_TOLERANCE = 1e-6  # Metres that a finger at rest moves in these steps.
+COUPLING_STEPS = 20  # Time steps in which released fingers are checked for coupling.
+REST_TOLERANCE = 1e-6  # Metres that a finger at rest may move in these steps.
 FINGER_DISPLACEMENT = 2e-3  # Metres by which one finger is displaced.
 
 
 @dataclass(frozen=True)
 class HandFigures:
-    """What a hand measures.
+    """Dimensions of a hand, and stiffness of its pads.
 
     Attributes:
         opening: smallest and largest distance between the pads [m].
@@ -224,16 +224,16 @@ class HandFigures:
 def check_hand(
     hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
 ) -> HandFigures:
-    """Holds a hand document against its model file; a pair that was found right is remembered.
+    """Checks a hand document against its model file; valid pairs are cached.
 
     Args:
         hand: the document.
         path: the model file.
         document: the document's file, for messages.
-        packages: what a station says of packages.
+        packages: the station's package folders.
 
     Raises:
-        InvalidInputError: they do not fit; one line says where.
+        InvalidInputError: document and model differ; the message says where.
     """
     try:
         found = tuple(sorted(referenced_packages(path, packages).items()))
@@ -263,13 +263,13 @@ def _check_document(
 
 
 class _HandBench:
-    """The hand alone, its body held fast, without gravity."""
+    """Test plant with the hand alone, its body fixed, without gravity."""
 
     def __init__(self, hand: Hand, path: Path, packages: Packages) -> None:
         self._hand = hand
         builder = RobotDiagramBuilder(time_step=TIME_STEP)
         self._plant = plant = builder.plant()
-        with buffer_drake_log():  # dropped: it is said when the hand is added to a scene
+        with buffer_drake_log():  # discarded: `add_hand` logs them in scenes
             instance = add_hand(builder, hand, path, packages).instance
         body = plant.GetBodyByName(hand.body, instance)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform())
@@ -284,7 +284,7 @@ class _HandBench:
         )
 
     def check_limits(self) -> None:
-        """`closed` and `open` are within the joints' limits."""
+        """Requires `closed` and `open` within the joints' limits."""
         for i, (finger, joint) in enumerate(
             zip(self._hand.fingers, self._model.joints, strict=True)
         ):
@@ -298,7 +298,8 @@ class _HandBench:
                     )
 
     def check_pads(self) -> None:
-        """The pads have an elastic volume, without which rigid objects touch them in points."""
+        """Requires pads with an elastic volume, as others have only point contact with rigid
+        objects."""
         for i, pad in enumerate(self._model.pads):
             if not isinstance(self._inspector.maybe_get_hydroelastic_mesh(pad), VolumeMesh):
                 raise self._error(
@@ -308,10 +309,10 @@ class _HandBench:
                 )
 
     def check_closing_direction(self) -> None:
-        """The fingers move apart along x of G, in either order."""
+        """Requires fingers that move apart along x of G, in either order."""
         gaps = []
         for closed in (0.0, 1.0):
-            self._put(self._at(closed))
+            self._set_positions(self._joint_positions(closed))
             one, other = (self.bounds(i).mean(axis=0) for i in (0, 1))
             gaps.append(one - other)
         gap = gaps[0] - gaps[1]
@@ -323,10 +324,10 @@ class _HandBench:
             )
 
     def check_opening(self, end: Literal["open", "closed"]) -> float:
-        """With the fingers at one end of their ways the pads are to both sides of G, as far apart
-        as the document says; returns their distance [m]."""
+        """Requires pads on both sides of G, as far apart as the document says, with the fingers
+        open or closed; returns their distance [m]."""
         opening = self._hand.opening[1 if end == "open" else 0]
-        self._put(self._at(0.0 if end == "open" else 1.0))
+        self._set_positions(self._joint_positions(0.0 if end == "open" else 1.0))
         one, other = self.bounds(0), self.bounds(1)
         if one[:, 0].mean() < other[:, 0].mean() - LENGTH_TOLERANCE:
             raise self._error(
@@ -355,7 +356,7 @@ class _HandBench:
         return float(distance)
 
     def check_approach(self) -> None:
-        """The hand's body lies behind G, seen along its +z."""
+        """Requires the hand's body behind G along +z."""
         X_GH = inverse(self._hand.X_HG.matrix())
         geometries = self._plant.GetCollisionGeometriesForBody(self._model.body)
         heights = [self._points(X_GH, geometry)[:, 2].mean() for geometry in geometries]
@@ -365,13 +366,13 @@ class _HandBench:
             )
 
     def check_coupling(self) -> None:
-        """Fingers that the document places stay; of one that is put aside the other one follows,
-        if they are coupled."""
-        one, other = self._at(0.5)
+        """Requires that fingers stay at positions of the document, and that a coupled finger
+        follows when the other one is displaced."""
+        one, other = self._joint_positions(0.5)
         aside = one + FINGER_DISPLACEMENT * np.sign(
             self._hand.fingers[0].open - self._hand.fingers[0].closed
         )
-        follows = self._moves((aside, other))
+        follows = self._is_second_finger_moving((aside, other))
         if follows and not self._hand.coupled:
             raise self._error(
                 "coupled is false, but in the model one finger follows the other; write"
@@ -383,14 +384,15 @@ class _HandBench:
                 " coupled: false"
             )
         for closed in (0.25, 0.75):
-            if self._moves(self._at(closed)):
+            if self._is_second_finger_moving(self._joint_positions(closed)):
                 raise self._error(
                     "the mimic joint of the model moves the fingers in another"
                     " proportion than closed and open of the two fingers say"
                 )
 
     def bounds(self, index: int) -> Array:
-        """(2, 3) smallest and largest coordinates of a finger's pad in G [m], as it stands."""
+        """Smallest and largest coordinates (2, 3) of a finger's pad in G [m], at its current
+        position."""
         X_HB = self._plant.CalcRelativeTransform(
             self._plant_context,
             self._model.body.body_frame(),
@@ -406,8 +408,8 @@ class _HandBench:
         return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
 
     def _points(self, X_GB: Array, geometry: GeometryId) -> Array:
-        """(N, 3) corners of a geometry of body B in G [m]; those of the smallest box about it if it
-        is round."""
+        """Corners (N, 3) of a geometry of body B in G [m]; for a round one those of its bounding
+        box."""
         X_BC = self._inspector.GetPoseInFrame(geometry).GetAsMatrix4()
         shape = self._inspector.GetShape(geometry)
         if isinstance(shape, (Mesh, Convex)):
@@ -418,20 +420,20 @@ class _HandBench:
         corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * box.half_width()
         return transform_points(X_GB @ X_BC @ box.pose().GetAsMatrix4(), corners)
 
-    def _at(self, closed: float) -> tuple[float, float]:
-        """Joint positions of the document, from open (0) to closed (1) [m]."""
+    def _joint_positions(self, closed: float) -> tuple[float, float]:
+        """Joint positions [m] for a closing ratio from 0 (open) to 1 (closed)."""
         one, other = (finger.position(closed) for finger in self._hand.fingers)
         return one, other
 
-    def _put(self, positions: tuple[float, float]) -> None:
+    def _set_positions(self, positions: tuple[float, float]) -> None:
         for joint, position in zip(self._model.joints, positions, strict=True):
             joint.set_translation(self._plant_context, position)
             joint.set_translation_rate(self._plant_context, 0.0)
 
-    def _moves(self, positions: tuple[float, float]) -> bool:
-        """Whether the second finger leaves its place when both are let go."""
+    def _is_second_finger_moving(self, positions: tuple[float, float]) -> bool:
+        """Whether the second finger moves when both are released at positions."""
         self._simulator.get_mutable_context().SetTime(0.0)
-        self._put(positions)
+        self._set_positions(positions)
         self._simulator.Initialize()
         self._simulator.AdvanceTo(COUPLING_STEPS * TIME_STEP)
         q = self._model.joints[1].get_translation(self._plant_context)
@@ -448,13 +450,13 @@ def _format_mm(length: float) -> str:
 def gripper_of(
     hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
 ) -> Gripper:
-    """A hand as `formats` knows it; its tips are where the pads of its model end.
+    """Converts a hand to a `Gripper` of `formats`; its fingertips are the ends of the model's pads.
 
     Args:
         hand: the document.
         path: the model file.
         document: the document's file, for messages.
-        packages: what a station says of packages.
+        packages: the station's package folders.
 
     Raises:
         InvalidInputError: the document does not fit the model.
@@ -471,5 +473,5 @@ def gripper_of(
 
 
 def station_gripper(station: Station) -> Gripper:
-    """The hand of a station; see `gripper_of`."""
+    """The `Gripper` of a station's hand; see `gripper_of`."""
     return gripper_of(station.hand, station.hand_model, station.hand_path, station.packages)

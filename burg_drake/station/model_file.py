@@ -57,7 +57,8 @@ NUMBER_RULES: dict[str, tuple[Callable[[float], bool], tuple[str, ...]]] = {
         ("lower", "upper", "effort", "velocity"),
     ),
 }
-"""Tests of numbers and the elements and attributes (without `drake:`) they are for, by the rule."""
+"""Checks of numbers, each with the elements and attributes (without `drake:`) that it applies to,
+by rule."""
 SDF_NUMBER_RULES = {name: rule for rule, (_, names) in NUMBER_RULES.items() for name in names}
 URDF_NUMBER_RULES = SDF_NUMBER_RULES | dict.fromkeys(
     ("effort", "velocity"), "finite and at least 0"
@@ -76,19 +77,19 @@ class _XmlElement:
     text: str = ""
 
     def values(self) -> Iterator[tuple[str, str]]:
-        """Names and texts; the attribute `value` goes by the name of the element."""
+        """Names and texts of the values; the attribute `value` has the element's name."""
         if self.text.strip() and not self.children:
             yield self.name, self.text.strip()
         for key, text in self.attributes.items():
             yield self.name if key == "value" else key.removeprefix("drake:"), text
 
     def figures(self) -> dict[str, str]:
-        """The values of the element and of those in it, by name."""
+        """Values of the element and its children, by name."""
         return dict(value for element in (self, *self.children) for value in element.values())
 
     def walk(self, *outer: _XmlElement) -> Iterator[tuple[_XmlElement, tuple[_XmlElement, ...]]]:
-        """What is in the element, then the element, each with what it is in, outermost first."""
-        # Elements for other programs.
+        """Yields all descendants, then the element, each with its ancestors, outermost first."""
+        # Elements that other programs use.
         foreign_elements = ("gazebo", "light", "plugin", "ros2_control", "sensor")
         for child in self.children:
             if child.name not in foreign_elements:
@@ -97,8 +98,8 @@ class _XmlElement:
 
 
 def require_valid_numbers(path: Path) -> None:
-    """Refuses a model with a mass, inertia, limit, contact parameter, size or pose that is not a
-    number, or that no body has. What is not valid XML is left to Drake's own message.
+    """Rejects a model with an invalid mass, inertia, limit, contact parameter, size or pose.
+    Invalid XML is left to Drake's parser.
 
     Args:
         path: SDF or URDF file.
@@ -179,8 +180,8 @@ def _parse_model(text: bytes, path: Path) -> _XmlElement | None:
 
 
 def _massless_links(root: _XmlElement) -> set[str]:
-    """Names of links that need no mass, as they may be mere frames: those at fixed joints, and,
-    where there are joints, those that are no joint's child, which the station welds."""
+    """Names of links that need no mass, as they may be mere frames: links at fixed joints, and, in
+    models with joints, root links, which the station welds."""
     links, fixed, children = set(), set(), set()
     for element, outer in root.walk():
         if element.name == "link":
@@ -217,13 +218,13 @@ def _require_ordered_limits(limit: dict[str, str]) -> None:
 
 
 def _require_link_inertia(inertial: _XmlElement, massless: bool) -> None:
-    """Checks that a link has a mass, and moments of inertia that some distribution of it has.
+    """Requires that a link has a mass, and physically valid moments of inertia.
 
     Args:
-        inertial: of the link.
+        inertial: the link's element.
         massless: whether mass and moments may be 0.
     """
-    if inertial.attributes.get("auto") == "true":  # of SDF: by density
+    if inertial.attributes.get("auto") == "true":  # SDF: computed from density
         return
     figures = {k: v for e in inertial.children for k, v in e.figures().items()}
     mass = float(figures.get("mass", "1"))
@@ -245,7 +246,7 @@ def _require_link_inertia(inertial: _XmlElement, massless: bool) -> None:
 
 
 RELATIVE_URI = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
-"""A file that is named by its path; relative ones start at the model's folder."""
+"""URI that is a file path; relative paths start at the model's folder."""
 HYDROELASTIC_TAG = re.compile(r"<drake:(?:rigid|compliant)_hydroelastic\s*/>")
 """Tag of hydroelastic contact."""
 COLLISION_ELEMENT = re.compile(r"<collision\b.*?</collision>", re.DOTALL)
@@ -259,20 +260,20 @@ def add_models(
     *,
     edit: Callable[[str], str] | None = None,
 ) -> list[ModelInstanceIndex]:
-    """As `parser.AddModels(path)`, sooner, and with the packages that `core.paths` finds.
+    """As `parser.AddModels(path)`, but faster, and with the packages that `core.paths` finds.
 
     Args:
-        parser: from now on it knows the packages that this model names, in place of others of the
-            same names, and no model that would be fetched from the network.
+        parser: afterwards it has the packages that this model names, replacing packages of the same
+            names, and no models from the network.
         path: SDF or URDF file.
-        packages: what a station says of packages.
-        edit: of an SDF's text, such as `without_hydroelastic`.
+        packages: the station's package folders.
+        edit: edits an SDF's text, such as `without_hydroelastic`.
 
     Raises:
-        InvalidInputError: it cannot be read, is too large, or has a mass, an inertia or another
-            number that no body has.
-        UnknownNameError: it names a package that is nowhere.
-        RuntimeError, ValueError: those of `AddModels`.
+        InvalidInputError: it cannot be read, is too large, or has an invalid mass, inertia or other
+            number.
+        UnknownNameError: it names a package that is not found.
+        RuntimeError, ValueError: from `AddModels`.
     """
     set_packages(parser, referenced_packages(path, packages))
     try:
@@ -297,20 +298,21 @@ def add_models(
 
 
 def without_hydroelastic(text: str) -> str:
-    """A model (SDF) for point queries alone: Drake makes no meshes for hydroelastic contact then,
-    which it would copy into each context; a collision checker is there in two thirds of the time.
+    """Removes hydroelastic contact from a model (SDF), for point queries: Drake then builds no
+    meshes that it would copy into each context, and a collision checker is built in two thirds of
+    the time.
     """
     return HYDROELASTIC_TAG.sub("", text)
 
 
 def without_collisions(text: str) -> str:
-    """A model (SDF) that nothing touches."""
+    """Removes the collision geometries from a model (SDF)."""
     return COLLISION_ELEMENT.sub("", text)
 
 
 def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
-    """Lets a parser know packages by their folders, and that of the installed data; it forgets
-    Drake's own models, which it would fetch from the network."""
+    """Adds packages by their folders, and the installed data, to a parser. Removes Drake's own
+    models, which it would fetch from the network."""
     known = parser.package_map()
     for name in {"drake_models", *found}:
         if known.Contains(name):
@@ -320,16 +322,15 @@ def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
 
 
 def require_free_model(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) -> None:
-    """Refuses a model that a joint of its own connects to the world, as in URDFs with a link
-    `world`.
+    """Rejects a model with a joint to the world, as in URDFs with a link `world`.
 
     Args:
-        plant: not finalized.
-        model: of one file.
+        plant: plant, not finalized.
+        model: model from one file.
         path: the file.
 
     Raises:
-        InvalidInputError: it is; the message names joint and link.
+        InvalidInputError: it has one; the message names joint and link.
     """
     for joint in map(plant.get_joint, plant.GetJointIndices(model)):
         if joint.parent_body().index() == plant.world_body().index():
@@ -341,10 +342,10 @@ def require_free_model(plant: MultibodyPlant, model: ModelInstanceIndex, path: P
 
 @contextmanager
 def buffer_drake_log() -> Iterator[list[logging.LogRecord]]:
-    """Keeps back what Drake logs, such as its doubts about a model.
+    """Buffers Drake's log records, such as warnings about a model.
 
     Yields:
-        What is kept back, and grows meanwhile; hand on with `logging.getLogger("drake").handle`.
+        The growing list of records; forward them with `logging.getLogger("drake").handle`.
     """
     logger, buffered = logging.getLogger("drake"), list[logging.LogRecord]()
 
@@ -360,5 +361,5 @@ def buffer_drake_log() -> Iterator[list[logging.LogRecord]]:
 
 
 def file_uri(path: Path) -> str:
-    """The URI of a file as Drake reads it: it does not decode `%20`."""
+    """The URI of a file for Drake, which does not decode `%20`."""
     return f"file://{path.resolve()}"

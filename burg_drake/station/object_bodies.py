@@ -51,7 +51,7 @@ def is_ball(scene: Scene, name: str) -> bool:
 def add_rolling_sphere(
     builder: RobotDiagramBuilder, scene: Scene, name: str, body: RigidBody
 ) -> None:
-    """Adds the sphere by which a ball rolls; `filter_contact_pairs` says what it meets."""
+    """Adds the sphere on which a ball rolls; `filter_contact_pairs` sets its contacts."""
     primitive = scene.entry(name).contact.primitive
     assert primitive is not None
     plant = builder.plant()
@@ -70,7 +70,7 @@ def add_rolling_sphere(
 
 
 def sdf_by_pieces(scene: Scene, name: str) -> str:
-    """The model of an instance with pieces, for a diagram that is never simulated."""
+    """SDF of an instance with convex pieces, for a diagram that is never simulated."""
     library, entry = scene.library, scene.entry(name)
     pieces = [file_uri(library.path(path)) for path in entry.pieces]
     visual = file_uri(library.path(entry.mesh))
@@ -83,7 +83,7 @@ def has_mesh_contact(scene: Scene, name: str) -> bool:
     return name in instances and scene.entry(name).contact.kind == "mesh"
 
 
-VERTICAL_JOINT_NAME = "rise"  # Name of the vertical joint of an object that does not turn.
+VERTICAL_JOINT_NAME = "rise"  # Name of the vertical joint of a welded object.
 PLACEMENT_FRAME_NAME = "place"  # Name of the frame in the world on which a vertical joint stands.
 
 
@@ -96,15 +96,15 @@ def add_instance(
     by_pieces: bool = False,
     bare: bool = False,
 ) -> RigidBody:
-    """Parses the object's SDF; the model instance goes by the name of the scene's instance.
+    """Adds the object's SDF; the model instance has the name of the scene's instance.
 
     Args:
-        builder: to add it to.
+        builder: the builder.
         scene: the scene.
-        packages: what the station says of packages.
+        packages: the station's package folders.
         name: the instance.
-        by_pieces: for point queries alone, with pieces in the place of rigid meshes.
-        bare: without its contact geometry.
+        by_pieces: use pieces instead of rigid meshes, for point queries only.
+        bare: leave out the contact geometry.
     """
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
@@ -134,20 +134,20 @@ def add_instance(
 
 
 def name_taken_error(scene: Scene, name: str) -> InvalidInputError:
-    """The error of an instance whose name is one of the station's."""
+    """The error for an instance with the name of a part of the station."""
     return InvalidInputError(
         f"{scene.path}: the station has something called {name!r} already; rename this instance"
     )
 
 
 def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
-    """Checks that a body weighs what the library says: where no body can have the mass or inertia
-    of an SDF, Drake's parser warns, and takes others.
+    """Checks a body's mass and inertia against the library: if those of an SDF are invalid, Drake's
+    parser warns and replaces them.
 
     Raises:
-        ValueError: it does not.
+        ValueError: they differ.
     """
-    tolerance = 1e-6  # Share; Drake shifts moments to the origin and back.
+    tolerance = 1e-6  # Relative; Drake shifts moments to the origin and back.
     inertia = body.default_spatial_inertia()
     about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
     moments = [*about_com.get_moments(), *about_com.get_products()]
@@ -158,7 +158,7 @@ def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
 
 
 def add_vertical_joint(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
-    """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
+    """Attaches a body to a joint along world z, with position 0 at the body's pose."""
     model = body.model_instance()
     place = plant.AddFrame(FixedOffsetFrame(PLACEMENT_FRAME_NAME, plant.world_frame(), X_WO, model))
     up_O = X_WO.rotation().matrix()[2]
@@ -166,7 +166,7 @@ def add_vertical_joint(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransf
 
 
 def add_fixed_instance(plant: MultibodyPlant, scene: Scene, name: str, X_WO: Array) -> RigidBody:
-    """Adds an instance as a hull and a mesh to look at, welded where it stands."""
+    """Adds an instance as a collision hull and a visual mesh, welded at its pose."""
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
         raise name_taken_error(scene, name)
     entry, model = scene.entry(name), plant.AddModelInstance(name)
@@ -182,7 +182,7 @@ def add_fixed_instance(plant: MultibodyPlant, scene: Scene, name: str, X_WO: Arr
 
 
 def add_hull(plant: MultibodyPlant, scene: Scene, name: str, body: RigidBody) -> GeometryId:
-    """Adds the convex hull of all that touches others of an instance."""
+    """Adds the convex hull of an instance's contact geometry."""
     shape = Convex(hull_corners(scene.library, scene.entry(name)).T, name)
     X = RigidTransform()
     return plant.RegisterCollisionGeometry(body, X, shape, "hull", ProximityProperties())

@@ -29,16 +29,15 @@ from burg_drake.station.surroundings import SurroundingsProperties
 
 
 def filter_contact_pairs(station_diagram: StationDiagram, context: Context | None = None) -> None:
-    """Has each geometry of an object meet what it is for, and nothing else.
+    """Restricts each geometry of an object to its intended contacts.
 
-    The hand meets the patches of balls and the own surfaces of objects; the table meets the spheres
-    that balls roll by and the feet of objects; all others meet these spheres, and the pieces, or
-    the hull where there is one.
+    The hand meets the patches of balls and the surface meshes of objects; the table meets the
+    rolling spheres of balls and the feet of objects; all other bodies meet the rolling spheres, and
+    the pieces or, if there is one, the hull of an object.
 
     Args:
         station_diagram: a built diagram.
-        context: in this Context of the diagram alone; by default in all that are created from now
-            on.
+        context: Context to change; by default all Contexts that are created from now on.
     """
     graph = station_diagram.diagram.mutable_scene_graph()
     objects = {**station_diagram.free, **station_diagram.standing, **station_diagram.fixed}
@@ -95,7 +94,7 @@ def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> 
 def _ball_geometries(
     station_diagram: StationDiagram, geometries: dict[str, list[GeometryId]]
 ) -> tuple[list[GeometryId], list[GeometryId]]:
-    """Patches of balls, and the spheres that they roll by."""
+    """Patches and rolling spheres of balls."""
     inspector = station_diagram.scene_graph.model_inspector()
     patches: list[GeometryId] = []
     rolling: list[GeometryId] = []
@@ -124,10 +123,10 @@ def touching_bodies(
 
     Args:
         station_diagram: a built diagram.
-        bodies: among these.
+        bodies: bodies to check.
 
     Returns:
-        The others that touch it, of each body that touches any.
+        The touching bodies of each body that touches another one.
     """
     plant, graph = station_diagram.plant, station_diagram.scene_graph
     body_of: dict[GeometryId, BodyIndex] = {
@@ -159,8 +158,8 @@ def make_touching_compliant(station_diagram: StationDiagram) -> None:
 
 
 def make_compliant(station_diagram: StationDiagram, names: Iterable[str]) -> None:
-    """Makes free objects compliant, in all Contexts that are created from now on. Rigid meshes and
-    balls stay as they are: those cannot be, and these meet everything at a point."""
+    """Makes free objects compliant, in all Contexts that are created from now on. Rigid meshes
+    cannot be compliant, and balls have point contact with everything; both are unchanged."""
     plant, scene = station_diagram.plant, station_diagram.scene
     for name in names:
         if not has_mesh_contact(scene, name) and not is_ball(scene, name):
@@ -172,7 +171,7 @@ def make_compliant(station_diagram: StationDiagram, names: Iterable[str]) -> Non
 
 
 def _make_geometry_compliant(station_diagram: StationDiagram, geometry: GeometryId) -> None:
-    modulus = 5e7  # Pascal; at 1e7 an edge sinks into another object by more than 1 mm.
+    modulus = 5e7  # Pascal; with 1e7 an edge sinks into another object by more than 1 mm.
     graph = station_diagram.diagram.mutable_scene_graph()
     inspector = graph.model_inspector()
     rigid = inspector.GetProximityProperties(geometry)
@@ -190,11 +189,11 @@ def _make_geometry_compliant(station_diagram: StationDiagram, geometry: Geometry
 
 
 def replace_meshes_by_pieces(station_diagram: StationDiagram, context: Context) -> None:
-    """In a Context, puts pieces in the place of the objects' meshes; all else stays.
+    """Replaces the objects' meshes by convex pieces in a Context.
 
     Args:
         station_diagram: the diagram.
-        context: of the whole diagram; not to be simulated with afterwards.
+        context: Context of the whole diagram; must not be simulated afterwards.
     """
     plant, graph = station_diagram.plant, station_diagram.scene_graph
     source = plant.get_source_id()

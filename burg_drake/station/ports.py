@@ -31,11 +31,11 @@ from burg_drake.station.station_document import Station
 
 
 class ExternalTorque(LeafSystem):
-    """What the world does to a model's joints: contacts and applied forces on it and all that it
-    carries, as generalized forces. Positive pushes a joint forward.
+    """External torques on a model's joints: generalized forces of contacts and applied forces on
+    the model and everything that it carries. Positive in the joint's direction.
 
     Ports:
-        state: of the whole plant.
+        state: state of the whole plant.
         contact: (n) generalized contact forces of the model.
         applied_forces: list of ExternallyAppliedSpatialForce; none if not connected.
         torque: (n) [Nm] (output).
@@ -77,10 +77,10 @@ class ExternalTorque(LeafSystem):
 
 
 class WristForce(LeafSystem):
-    """The force that the hand, with all that it holds and touches, exerts on the arm.
+    """The force that the hand, including its contacts and held objects, exerts on the arm.
 
     Ports:
-        reaction_forces: of the plant.
+        reaction_forces: reaction forces of the plant.
         force_torque: (6) torque [Nm], then force [N], about the hand's origin, in its frame H, as
             Drake orders a spatial force (output).
     """
@@ -103,9 +103,9 @@ class HandMeasurement(LeafSystem):
     """Distance between the pads and force of the fingers.
 
     Ports:
-        state: (2 k) of the hand's model.
+        state: (2 k) state of the hand's model.
         servos: (2) net actuation of the fingers [N].
-        braked: (2) what `HandDriver` added to it [N].
+        braked: (2) brake force of `HandDriver` on the fingers [N].
         state_measured: (2) distance between the pads [m] and its rate [m/s] (output).
         force_measured: (1) mean force of the fingers, positive as they close [N] (output).
         actuation: (2) sum of servos and brake [N] (output).
@@ -137,16 +137,16 @@ class HandMeasurement(LeafSystem):
 
 
 class InverseDynamicsControl(LeafSystem):
-    """Computes torques from a model of the arm: M(q) a + C(q, v) v - g(q), with the acceleration
-    a = kp (q_d - q) + kd (v_d - v); adds a feedforward, and keeps within limits.
+    """Computes torques from a model of the arm: M(q) a + C(q, v) v - g(q), with the acceleration a
+    = kp (q_d - q) + kd (v_d - v); adds a feedforward, and saturates at the limits.
 
-    That is Drake's `InverseDynamicsController` without an integral: it has no state, so that a
-    simulation can go back to an earlier moment.
+    Equals Drake's `InverseDynamicsController` without an integral: it has no state, so a simulation
+    can return to an earlier time.
 
     Ports:
         desired_state: (2 n) positions and velocities.
-        state: (2 n) where the arm is.
-        feedforward: (n) torques in addition; nothing if not connected.
+        state: (2 n) positions and velocities of the arm.
+        feedforward: (n) additional torques; 0 if not connected.
         torque: (n) [Nm] (output).
     """
 
@@ -156,7 +156,7 @@ class InverseDynamicsControl(LeafSystem):
         Args:
             model: the arm, finalized.
             kp, kd: (n,) gains [1/s^2, 1/s].
-            limits: (n,) of the torques, in both directions [Nm]; infinite without one.
+            limits: (n,) torque limits in both directions [Nm]; infinite for none.
         """
         super().__init__()
         n = len(limits)
@@ -189,12 +189,12 @@ def make_inverse_dynamics(
 
     Args:
         plant: finalized, with arm and hand.
-        station: its arm has the gains.
+        station: station whose arm has the gains.
         models: arm and hand.
-        actuators: of the arm's joints, in their order.
+        actuators: actuators of the arm's joints, in order.
 
     Raises:
-        InvalidInputError: gains that do not fit the arm, or are too stiff for the time step.
+        InvalidInputError: the gains do not fit the arm, or are too stiff for the time step.
     """
     arm = station.document.arm
     assert arm is not None
@@ -222,7 +222,7 @@ def make_controller_plant(
 
     Args:
         plant: finalized, with arm and hand.
-        station: where they are from.
+        station: their station.
         models: arm and hand.
     """
     arm = station.document.arm
@@ -249,8 +249,8 @@ Models = dict[str, ModelInstanceIndex]
 
 @dataclass(frozen=True, eq=False)
 class _Servo:
-    """Where an arm takes positions and velocities (2 n) and torques in addition (n), and the
-    torques that it makes of them (n)."""
+    """Ports of an arm's servo: desired positions and velocities (2 n), feedforward torques (n), and
+    commanded torques (n)."""
 
     desired_state: InputPort
     feedforward: InputPort
@@ -260,13 +260,13 @@ class _Servo:
 def export_ports(
     builder: RobotDiagramBuilder, station: Station, models: Models, *, controlled: bool
 ) -> None:
-    """Exports what the servos take and the plant tells.
+    """Exports the servos' inputs and the plant's outputs.
 
     Args:
-        builder: of the diagram; its plant is finalized.
-        station: has the arm's control.
-        models: of the robot.
-        controlled: add the arm's controller, if it has one beside the plant.
+        builder: builder of the diagram; its plant is finalized.
+        station: station with the arm's control.
+        models: models of the robot.
+        controlled: add the arm's controller, if it is not part of the plant.
     """
     plant, system = builder.plant(), builder.builder()
     for role, model in models.items():
@@ -286,11 +286,11 @@ def export_ports(
 def export_driven_ports(
     builder: RobotDiagramBuilder, scene: Scene, station: Station, models: Models
 ) -> None:
-    """Adds drivers of arm and hand, and exports what they take, and what the robot measures.
+    """Adds drivers of arm and hand, and exports their inputs and the robot's measurements.
 
     Args:
-        builder: of the diagram; its plant is finalized.
-        scene, station: what plans have to be for.
+        builder: builder of the diagram; its plant is finalized.
+        scene, station: scene and station of the plans.
         models: arm and hand.
 
     Raises:
@@ -302,7 +302,7 @@ def export_driven_ports(
     joints = _arm_joints(plant, station, models["arm"])
     player = PlanPlayer(joints, scene, station)
     servo = _arm_servo(builder, station, models)
-    # Joint servos are part of a step, so that they are told what is wanted at its end.
+    # Joint servos are part of a step, so their command is the state desired at its end.
     step = plant.time_step()
     ahead = 0.0 if has_inverse_dynamics(station) else step
     arm_driver = system.AddNamedSystem(
@@ -349,7 +349,7 @@ def export_driven_ports(
 def _arm_joints(
     plant: MultibodyPlant, station: Station, model: ModelInstanceIndex
 ) -> tuple[str, ...]:
-    """Names of the arm's joints, which states and commands have in the same order."""
+    """Names of the arm's joints; requires the same order in states and commands."""
     commanded = [plant.get_joint_actuator(i).joint() for i in plant.GetJointActuatorIndices(model)]
     names = [joint.name() for joint in commanded]
     measured = [joint.name() for joint in sorted(commanded, key=lambda j: j.position_start())]

@@ -38,17 +38,17 @@ def add_robot(
     see `ArmControl`.
 
     Args:
-        builder: its plant is not finalized.
-        station: hand and arm.
-        robot: what of it.
-        simulated: whether contact will be simulated; point queries do without some of its models.
+        builder: builder whose plant is not finalized.
+        station: station with hand and arm.
+        robot: part of the robot to add.
+        simulated: whether contact will be simulated; some models are not needed for point queries.
 
     Returns:
         Model instances by role: `hand`, and `arm` or `lift`.
 
     Raises:
         InvalidInputError: the hand's document does not fit its model, the station has no arm, its
-            model cannot be loaded, or its home posture is not one of this arm.
+            model cannot be loaded, or its home posture does not fit the arm.
         UnknownNameError: the arm has no such base or flange.
     """
     if robot == "none":
@@ -146,10 +146,10 @@ def _add_arm(
 def _find_arm_frame(
     plant: MultibodyPlant, arm: ModelInstanceIndex, station: Station, key: str, name: str
 ) -> Frame:
-    """The frame of the arm that a key of the station names."""
+    """The arm's frame whose name is at a key of the station."""
     if not plant.HasFrameNamed(name, arm):
         frames = [plant.get_frame(index).name() for index in plant.GetFrameIndices(arm)]
-        # Drake's parser adds frames for each joint, which end so.
+        # Suffixes of the frames that Drake's parser adds for each joint.
         frames = [f for f in frames if not f.startswith("__")]
         frames = [f for f in frames if not f.endswith(("_parent", "_child"))]
         raise UnknownNameError(

@@ -63,20 +63,19 @@ def table_force(shapes: PosedShapes, X_WO: RigidTransform, thickness: float) -> 
     """The force of the table on an object at rest [N].
 
     Args:
-        shapes: of the object, in its frame.
-        X_WO: its pose.
-        thickness: of the table [m].
+        shapes: shapes of the object in its frame.
+        X_WO: pose of the object.
+        thickness: thickness of the table [m].
 
     Returns:
-        The force; infinite if the volume of a shape is not looked at: that of a sphere, which
-        meets the table at a point.
+        The force; infinite for a sphere, which has point contact with the table.
     """
     volume = sum(_volume_below(shape, X_WO @ X_OG) for X_OG, shape in shapes)
     return volume * SurroundingsProperties.hydroelastic_modulus / (thickness / 2)
 
 
 def _volume_below(shape: Shape, X_WG: RigidTransform) -> float:
-    """Of the part of a convex shape that is below z = 0 [m^3]."""
+    """Volume of the part of a convex shape below z = 0 [m^3]."""
     if isinstance(shape, Box):
         corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
         p_GV = corners * shape.size()
@@ -95,7 +94,7 @@ def _volume_below(shape: Shape, X_WG: RigidTransform) -> float:
 
 
 def _cylinder_corners(radius: float, length: float) -> Array:
-    """(N, 3) corners of the prism that Drake presses into the table for a cylinder along z [m]."""
+    """Corners (N, 3) of the prism with which Drake approximates a cylinder along z [m]."""
     primitive = Primitive(shape="cylinder", size=(radius, length))
     sides = round(2.0 * np.pi * radius / resolution_hint(primitive, DEFAULT_CONTACT.faceting))
     angle = 2.0 * np.pi * np.arange(sides) / sides
@@ -104,7 +103,7 @@ def _cylinder_corners(radius: float, length: float) -> Array:
 
 
 def _hull_volume(points: Array) -> float:
-    """Of the convex hull of points (N, 3); 0 if they are flat or too few."""
+    """Volume of the convex hull of points (N, 3); 0 if they are coplanar or too few."""
     try:
         return float(ConvexHull(points).volume) if len(points) > 3 else 0.0
     except QhullError:
@@ -112,19 +111,19 @@ def _hull_volume(points: Array) -> float:
 
 
 MAX_SINK_DEPTH = 0.006
-"""Metres that a tip may be in the table, if the table supports it there."""
+"""Metres that a tip may penetrate the table, if the table supports it there."""
 
 
 @dataclass(frozen=True, eq=False)
 class _PlacedInstance:
-    """An instance as it was last looked at.
+    """An instance at its last checked pose.
 
     Attributes:
-        instance: of the document.
+        instance: the instance in the document.
         X_WO: pose in the world.
-        extent: the box around its surface, along the axes of the board.
-        surface, support: heights over the table's top of the lowest point of its surface, and of
-            what it rests with [m].
+        extent: bounding box of its surface, along the axes of the board.
+        surface, support: heights of the lowest points of its surface and of its contact geometry
+            over the table's top [m].
     """
 
     instance: Instance
@@ -135,14 +134,13 @@ class _PlacedInstance:
 
 
 class SceneCheck:
-    """Says of scenes of one library what is wrong with them on a station.
+    """Finds problems of scenes of one library on a station.
 
-    Verdicts are those of `check_scene`, which looks at the
-    objects' true surfaces as well. Overlaps are those of the convex shapes that objects touch
-    others with; the arm is in its home posture. To be used from one thread at a time.
+    Results are those of `check_scene`, which also checks the objects' true surfaces. Overlaps are
+    those of the objects' convex contact geometry; the arm is in its home posture. Not thread-safe.
 
     Args:
-        station: where the scenes stand.
+        station: the station.
         library: the objects of the scenes.
 
     Raises:
@@ -165,27 +163,27 @@ class SceneCheck:
         self._placed: dict[str, _PlacedInstance] = {}
 
     def issues(self, scene: SceneLike) -> tuple[SceneIssue, ...]:
-        """What is wrong with a scene: objects out of bounds, in the ground, hovering, beside the
-        table, or overlapping.
+        """Problems of a scene: objects out of bounds, in the ground, hovering, beside the table, or
+        overlapping.
 
         Args:
-            scene: of this library.
+            scene: a scene of this library.
 
         Returns:
-            What was found, in the order of the document; nothing if all is well.
+            The issues in the order of the document; empty if there are none.
 
         Raises:
             UnknownNameError: an object is not in the library, or one of its files is missing.
             MeshError: the surface of an object is damaged.
             InvalidInputError: the scene is of another library, a pose is not of finite numbers, a
-                name is taken by the station, or a model cannot be loaded.
+                name is used by the station, or a model cannot be loaded.
         """
         scene = as_scene(scene)
-        self._place(scene)
+        self._update_poses(scene)
         placed = self._placed
         issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
         issues = [i for i in issues if i.kind != "in_ground" or not self._may_sink_in(i, scene)]
-        issues = [i for i in issues if i.kind != "hovering"]  # of which boxes say too little
+        issues = [i for i in issues if i.kind != "hovering"]  # boxes are too coarse for these
         issues += filter(None, map(self._hovering_issue, scene.instances))
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
         issues += filter(None, map(self._table_issue, scene.instances))
@@ -208,22 +206,22 @@ class SceneCheck:
         """How far instances can be moved together along a straight line until they touch something
         else: another object, the table, an obstacle, or the arm in its home posture.
 
-        It is exact for the convex shapes that objects touch others with. What touches or overlaps
-        already is in the way only where the motion would drive it in deeper: objects slide on the
-        table that they stand on.
+        Exact for the objects' convex contact geometry. Bodies that touch or overlap at the start
+        block the motion only if it would increase their penetration: objects slide on the table
+        that they stand on.
 
         Args:
-            scene: of this library.
-            names: of instances, background included.
+            scene: a scene of this library.
+            names: names of instances, including background.
             direction_S: (3,) direction in the scene frame, of any length above 0.
-            limit: longest way [m].
+            limit: longest distance [m].
 
         Returns:
-            The way [m], at most `limit`; 0 if something is in the way.
+            The distance [m], at most `limit`; 0 if the motion is blocked at the start.
 
         Raises:
             UnknownNameError: the scene has no such instance.
-            InvalidInputError: no names, no direction, or a limit that is negative or no number;
+            InvalidInputError: no names, no direction, or a limit that is negative or not a number;
                 and see `issues`.
         """
         scene = as_scene(scene)
@@ -241,17 +239,17 @@ class SceneCheck:
             )
         if not limit >= 0.0:
             raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")
-        self._place(scene)
+        self._update_poses(scene)
         direction_W = self._X_WS[:3, :3] @ direction / length
         return self._travel.first_contact(chosen, direction_W, limit)[0]
 
     @cached_property
     def _travel(self) -> FreeTravel:
-        """Ways in the world; most scenes need none."""
+        """Free travel in the world, created on first use."""
         return FreeTravel(self._world)
 
     def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
-        """Instances, what they overlap, and how deep [m], in the order of the document."""
+        """Overlaps: instance, other body and depth [m], in the order of the document."""
         among, fixed = self._world.overlaps()
         rank = {name: i for i, name in enumerate(self._world.bodies)}
         of_fixed = {name: len(rank) + i for i, name in enumerate(self._world.fixed)}
@@ -271,8 +269,8 @@ class SceneCheck:
         ]
 
     def _may_touch_table(self, name: str, depth: float, scene: Scene) -> bool:
-        """Whether what an instance rests with may be so deep in the table [m]: its surface stands
-        on it, or the table bears it there."""
+        """Whether an instance's contact geometry may be at a depth in the table [m]: its surface
+        stands on the table, or the table supports the object at this depth."""
         stands = not reaches_into_ground(self._placed[name].surface)
         return stands or (depth < MAX_SINK_DEPTH and self._is_supported(name, scene))
 
@@ -280,18 +278,18 @@ class SceneCheck:
         return issue.amount < MAX_SINK_DEPTH and self._is_supported(issue.instance, scene)
 
     def _is_supported(self, name: str, scene: Scene) -> bool:
-        """Whether what an instance is below the table's top is no more than what it sinks in by
-        under its own weight and that of what may lie on it: all free objects at most."""
+        """Whether an instance is in the table no deeper than it sinks under its own weight and that
+        of all other free objects, which may lie on it."""
         gravity = 9.81  # Metres per second squared.
-        max_force_ratio = 1.05  # Table force over weight; the force is known to 2 %.
+        max_force_ratio = 1.05  # Ratio of table force to weight; the force is known to 2 %.
         weight = gravity * sum(scene.entry(n).mass_properties.mass for n in scene.instances)
         _, X_WO = self._world.bodies[name]
         thickness = self._station.document.table.size[2]
         push = table_force(self._world.shapes(name), X_WO, thickness)
         return 0.0 < push <= max_force_ratio * weight
 
-    def _place(self, scene: Scene) -> None:
-        """Takes over where the instances of a scene stand."""
+    def _update_poses(self, scene: Scene) -> None:
+        """Updates the poses of the instances of a scene."""
         if scene.library is not self._library and scene.library != self._library:
             raise InvalidInputError(
                 f"{scene.path}: the scene's library is {scene.library.root}, but the"
@@ -331,7 +329,7 @@ class SceneCheck:
                 raise name_taken_error(scene, name)
 
     def _hovering_issue(self, name: str) -> SceneIssue | None:
-        """Whether an object would fall: onto what, and how far."""
+        """The issue of an object that would fall: onto which body, and how far."""
         down_direction = np.array([0.0, 0.0, -1.0])  # Unit vector in the world.
         placed = self._placed[name]
         height = min(placed.surface, placed.support)
@@ -345,14 +343,14 @@ class SceneCheck:
         return hovering_issue(name, fall, below)
 
     def _gap_to_surface(self, name: str) -> float:
-        """How far a body's surface may stand out of what it touches others with, at most [m]: by
-        so much, objects whose surfaces meet are apart."""
+        """Largest distance by which a body's surface may protrude from its contact geometry [m], so
+        that the contact geometries of touching objects are apart."""
         placed = self._placed.get(name)
         return self._library.entry(placed.instance.object).contact.excess if placed else 0.0
 
     def _sunken_issue(self, name: str) -> SceneIssue | None:
-        """Whether an object alone stands in the table, as deep as the table bears it in simulation.
-        What touches others cannot be lifted without them."""
+        """The issue of an isolated object that has sunk into the table in simulation. Objects that
+        touch others cannot be lifted without them."""
         placed = self._placed[name]
         depth = -max(placed.surface, placed.support)
         if depth <= SUNKEN_TOLERANCE or self._world.touched(name, LEANING_DISTANCE) - {"table"}:
@@ -368,7 +366,7 @@ class SceneCheck:
         )
 
     def _table_issue(self, name: str) -> SceneIssue | None:
-        """Whether the centre of mass is beside the table, so that the object cannot stay."""
+        """The issue of an object whose centre of mass is beside the table."""
         table, placed = self._station.document.table, self._placed[name]
         entry = self._library.entry(placed.instance.object)
         p_WOcm = placed.X_WO @ np.array(entry.mass_properties.center_of_mass)
@@ -386,8 +384,8 @@ class SceneCheck:
 
 
 def _describe_robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
-    """Of each body of the robot, by name: what to say of it, and what of the station puts it
-    there."""
+    """Description of each body of the robot, and the part of the station that places it, by
+    name."""
     arm, plant = station_diagram.station.document.arm, station_diagram.plant
     if arm is None:
         return {}
@@ -404,7 +402,7 @@ def _describe_robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[st
 def _overlap_issue(
     a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path
 ) -> str:
-    """One line about two bodies that overlap; a is an instance."""
+    """The message for two bodies that overlap; `a` is an instance."""
     by = f"by {depth * 1e3:.1f} mm"
     if b not in parts:
         return f"{a!r} and {b!r} overlap {by}; move them apart"
@@ -413,10 +411,10 @@ def _overlap_issue(
 
 
 def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...]:
-    """Finds what is wrong with a scene on a station.
+    """Finds problems of a scene on a station.
 
-    That is what `validate_scene` checks, overlaps with other objects and with the
-    station, and overlaps of the objects' true surfaces.
+    They are those of `validate_scene`, overlaps with other objects and with the station, and
+    overlaps of the objects' true surfaces.
 
     Example::
 
@@ -425,10 +423,10 @@ def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...
 
     Args:
         scene: the scene.
-        station: where it stands; the arm is in its home posture.
+        station: the station; the arm is in its home posture.
 
     Returns:
-        What was found; nothing if all is well.
+        The issues; empty if there are none.
     """
     scene, station = as_scene(scene), as_station(station)
     issues = SceneCheck(station, scene.library).issues(scene)
@@ -438,15 +436,15 @@ def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...
 def surface_issues(scene: Scene, known: Iterable[SceneIssue] = ()) -> tuple[SceneIssue, ...]:
     """Objects whose true surfaces are more than `TOUCH_TOLERANCE` deep in each other.
 
-    What objects touch others with in simulation can be apart there, as convex pieces and
-    primitives are smaller than the surface in places.
+    Their contact geometry in simulation may still be apart, as convex pieces and primitives are
+    smaller than the surface in places.
 
     Args:
         scene: the scene.
-        known: issues found before; pairs that overlap by these are left out.
+        known: issues found before; their overlapping pairs are left out.
 
     Returns:
-        One warning a pair, in the order of the document.
+        One warning per pair, in the order of the document.
 
     Raises:
         MeshError: the surface of an object is damaged.
@@ -479,11 +477,11 @@ def surface_issues(scene: Scene, known: Iterable[SceneIssue] = ()) -> tuple[Scen
 
 
 def find_overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:
-    """Penetrating pairs of bodies in the default context, at least one of them a scene's instance.
+    """Overlaps in the default context between instances and other bodies.
 
     Returns:
         Depth of the deepest overlap [m] by the pair's names: instances in the document's order
-        before everything else; robot links go by their own names.
+        before other bodies; robot links have their own names.
     """
     plant = station_diagram.plant
     names = station_diagram.body_names

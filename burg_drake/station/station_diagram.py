@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StationDiagram:
-    """A built diagram and the names to find things in it.
+    """A built diagram, with its bodies by name.
 
     Attributes:
         diagram: the Drake diagram; keep it alive while its plant is used.
-        scene, station, robot, engine: what it was built from.
+        scene, station, robot, engine: arguments of `build_station_diagram`.
         free: body of each instance that is not background, by name.
-        standing: bodies of instances that could be free, but are welded where they stand, by name.
+        standing: bodies of instances that could be free, but are welded at their poses, by name.
         fixed: bodies of background instances and obstacles, by name.
-        parts: geometries of objects that only some bodies meet.
+        parts: geometries of objects that only some bodies collide with.
         table: the table's body.
         robot_bodies: all bodies of hand and arm.
     """
@@ -71,19 +71,19 @@ class StationDiagram:
 
     @property
     def body_names(self) -> dict[BodyIndex, str]:
-        """What people call a body: the names of instances and obstacles, `table`, robot links."""
+        """Display names of bodies: instances, obstacles, `table`, and robot links."""
         objects = {**self.free, **self.standing, **self.fixed}
         names = {index: name for name, index in objects.items()}
         links = {i: self.plant.get_body(i).name() for i in self.robot_bodies}
         return names | links | {self.table: "table"}
 
     def X_WO(self, instance: str) -> Array:
-        """(4, 4) pose at which the document places an instance."""
+        """Pose (4, 4) of an instance in the document."""
         return instance_pose(self.scene, self.station, instance)
 
 
 def instance_pose(scene: Scene, station: Station, instance: str) -> Array:
-    """`X_WO` (4, 4) of an instance as the documents place it."""
+    """Pose `X_WO` (4, 4) of an instance in the documents."""
     return station.document.X_WS.matrix() @ scene.X_SO(instance)
 
 
@@ -114,18 +114,18 @@ class HandHandle:
         self._X_GH = inverse(self._X_HG)
 
     def set_fingers(self, plant_context: Context, closed: float) -> None:
-        """Puts the fingers somewhere, at rest.
+        """Sets the positions of the fingers, at rest.
 
         Args:
             plant_context: the plant's part of the Context.
-            closed: how far they are closed, from 0 (open) to 1 (pads together).
+            closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
         """
         for joint, finger in zip(self.joints, self.document.fingers, strict=True):
             joint.set_translation(plant_context, finger.position(closed))
             joint.set_translation_rate(plant_context, 0.0)
 
     def closing_command(self) -> Array:
-        """(4,) desired state that closes the hand: positions of the two fingers and velocities, in
+        """Desired state (4,) that closes the hand: positions and velocities of the two fingers, in
         the order of the model's actuators."""
         fingers = [self.document.fingers[i] for i in self._order]
         speed = self.document.closing_speed
@@ -133,7 +133,7 @@ class HandHandle:
         return np.array([f.closed for f in fingers] + [speed * d for d in direction])
 
     def opening_command(self) -> Array:
-        """(4,) desired state that opens the hand and presses the fingers against their stops, in
+        """Desired state (4,) that opens the hand and presses the fingers against their stops, in
         the order of `closing_command`."""
         fingers = [self.document.fingers[i] for i in self._order]
         return np.array([f.open for f in fingers] + list(-self.closing_command()[2:]))
@@ -144,11 +144,11 @@ class HandHandle:
         return speed
 
     def X_WG(self, plant_context: Context) -> Array:
-        """(4, 4) current grasp frame."""
+        """Current grasp frame (4, 4) in the world."""
         return self.X_WH(plant_context) @ self._X_HG
 
     def X_WH(self, plant_context: Context) -> Array:
-        """(4, 4) current hand body."""
+        """Current pose (4, 4) of the hand's body in the world."""
         X_WH: Array = self._plant.EvalBodyPoseInWorld(plant_context, self.body).GetAsMatrix4()
         return X_WH
 
@@ -188,29 +188,29 @@ class FloatingHand(HandHandle):
         closed: float = 0.0,
         direction_W: Array = UP_DIRECTION,
     ) -> None:
-        """Puts the grasp frame at `X_WG` (4, 4), lift at 0, all at rest.
+        """Places the grasp frame at `X_WG` (4, 4), with the lift at 0 and all at rest.
 
         Args:
             plant_context: the plant's part of the Context.
             X_WG: grasp in the world.
             closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
-            direction_W: (3,) unit vector, in which the lift goes from there.
+            direction_W: (3,) unit vector of the lift's direction.
         """
         self._set_mount(plant_context, X_WG @ self._X_GH, direction_W)
         self.set_fingers(plant_context, closed)
 
     def set_lift_direction(self, plant_context: Context, direction_W: Array) -> None:
-        """Has the lift go in another direction (3,) from where the hand is, at rest there; the
-        fingers stay as they are, and move on as they do."""
+        """Sets another direction (3,) of the lift from the hand's current pose, with the hand at
+        rest; the state of the fingers is kept."""
         self._set_mount(plant_context, self.X_WH(plant_context), direction_W)
 
     def travelled(self, plant_context: Context) -> float:
-        """How far the hand has gone along the lift [m]."""
+        """Distance of the hand along the lift [m]."""
         return float(self.lift.get_translation(plant_context))
 
     def _set_mount(self, plant_context: Context, X_WH: Array, direction_W: Array) -> None:
-        # The lift joint goes along z of its frames L: the base has the hand's position, and the
-        # mount takes up the hand's orientation.
+        # The lift joint moves along z of its frames L: the base has the hand's position, and the
+        # mount compensates the hand's orientation.
         R_WL = RotationMatrix(_rotation_from_z(direction_W))
         R_WH = RotationMatrix(X_WH[:3, :3])
         self._base.SetPoseInParentFrame(plant_context, RigidTransform(R_WL, X_WH[:3, 3]))
@@ -221,7 +221,7 @@ class FloatingHand(HandHandle):
 
 
 def _rotation_from_z(u: Array) -> Array:
-    """A rotation (3, 3) that takes z to a unit vector (3,); none for z itself."""
+    """A rotation (3, 3) that maps z to a unit vector (3,); the identity for z itself."""
     if u[2] < 0.0:
         return _rotation_from_z(-u) @ np.diag([1.0, -1.0, -1.0])
     v = np.array((-u[1], u[0], 0.0))
@@ -257,7 +257,7 @@ class MountedHand(HandHandle):
         self._velocities = [joint.velocity_start() for joint in station_diagram.arm_joints]
 
     def place(self, plant_context: Context, q: Array, closed: float = 0.0) -> None:
-        """Puts the arm at `q` (n,), all at rest.
+        """Sets the arm's positions to `q` (n,), with all at rest.
 
         Args:
             plant_context: the plant's part of the Context.
@@ -271,12 +271,12 @@ class MountedHand(HandHandle):
         self.set_fingers(plant_context, closed)
 
     def set_arm(self, plant_context: Context, q: Array) -> None:
-        """Puts the arm at `q` (n,) [rad]; nothing else changes."""
+        """Sets only the arm's positions to `q` (n,) [rad]."""
         positions = self._plant.GetPositions(plant_context)
         positions[self._positions] = q
         self._plant.SetPositions(plant_context, positions)
 
     def q(self, plant_context: Context) -> Array:
-        """(n,) current joint positions [rad]."""
+        """Current joint positions (n,) [rad]."""
         positions: Array = self._plant.GetPositions(plant_context)[self._positions]
         return positions

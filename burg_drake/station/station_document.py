@@ -1,6 +1,6 @@
 """The station document: robot, table, board, cameras and obstacles around a scene.
 
-Also has what follows from the document alone: the part of the board that cameras see, and the
+Also computes values that need only the document: the part of the board that cameras see, and the
 corners of the obstacles.
 """
 
@@ -56,21 +56,21 @@ DEFAULT_ACCELERATION_GAIN = 2000.0
 class ArmControl:
     """How the joints of an arm follow their commands in simulation.
 
-    With `impedance` every joint has a spring and a damper of its own, which Drake's solver computes
-    as part of a step. Gravity does not pull the robot then: a real one compensates its own weight.
-    With `has_inverse_dynamics` gravity does pull it, and the torque is what a model of arm and hand
-    needs for the acceleration `kp` (q_d - q) + `kd` (v_d - v). That model knows nothing of what the
-    hand holds. Either way no joint gets more than its effort limit.
+    With `impedance` every joint has its own spring and damper, which Drake's solver computes as
+    part of a step. Gravity does not pull the robot then: a real one compensates its own weight.
+    With `inverse_dynamics` gravity does pull it, and the torque follows from a model of arm and
+    hand for the acceleration `kp` (q_d - q) + `kd` (v_d - v). That model does not include held
+    objects. Either way torques are limited to the effort limits.
 
     Attributes:
         kind: `impedance`: a spring and a damper for each joint; gravity does not pull the robot.
             `inverse_dynamics`: torques from a model of arm and hand, which knows nothing of what
             the hand holds.
         kp: position gains, one for all joints or one for each: [Nm/rad] with `impedance`, [1/s^2]
-            with `has_inverse_dynamics`.
+            with `inverse_dynamics`.
         kd: velocity gains, one for all joints or one for each: [Nm s/rad] with `impedance`, [1/s]
-            with `has_inverse_dynamics`. If left out, `kp` times 0.05 s with `impedance`, critical
-            damping with `has_inverse_dynamics`.
+            with `inverse_dynamics`. If left out, `kp` times 0.05 s with `impedance`, critical
+            damping with `inverse_dynamics`.
     """
 
     kind: Literal["impedance", "inverse_dynamics"] = "impedance"
@@ -78,7 +78,7 @@ class ArmControl:
     kd: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        gain_range = (1e-3, 1e6)  # No drive is stiffer.
+        gain_range = (1e-3, 1e6)  # Stiffer than any drive.
         for name in ("kp", "kd"):
             values = getattr(self, name)
             low, high = gain_range
@@ -93,13 +93,13 @@ class ArmControl:
         """`kp` and `kd`, (n,) each, of an arm with n joints.
 
         Args:
-            joints: how many.
+            joints: number of joints.
             where: the document's key, for messages.
 
         Raises:
-            InvalidInputError: there are neither one nor n numbers.
+            InvalidInputError: the document has neither one nor n numbers.
         """
-        damping_time = 0.05  # Seconds, velocity gain over position gain.
+        damping_time = 0.05  # Seconds: velocity gain over position gain.
         kp = _joint_values(self.kp, joints, f"{where}.kp")
         kd = _joint_values(self.kd, joints, f"{where}.kd")
         if self.kind == "impedance":
@@ -120,7 +120,7 @@ def _joint_values(values: tuple[float, ...] | None, joints: int, where: str) -> 
 
 
 MODEL_NAMES = ("table", "board", "hand", "arm", "lift")
-"""Names of a station's own models, which no instance of a scene may have."""
+"""Names of a station's own models, which instances of a scene must not have."""
 
 HALF_PIXEL = 0.5
 """Pixels from OpenCV's image coordinates to those of Drake's cameras."""
@@ -131,10 +131,10 @@ FOCAL_RANGE = (1.0, 1e6)
 
 
 def require_image_size(width: int, height: int) -> None:
-    """Refuses a camera's image with a side above `MAX_IMAGE_SIDE`.
+    """Rejects a camera's image with a side above `MAX_IMAGE_SIDE`.
 
     Raises:
-        FieldError: of the field `width` or `height`.
+        FieldError: the field `width` or `height` is too large.
     """
     if max(width, height) > MAX_IMAGE_SIDE:
         raise FieldError(
@@ -322,7 +322,7 @@ class StationDocument:
 
 @dataclass(frozen=True, eq=False)
 class Station:
-    """A station with its hand at hand.
+    """A station with its hand document and the robot's model files.
 
     Example::
 
@@ -336,7 +336,7 @@ class Station:
         arm_model: the arm's model file, if there is an arm.
         path: the station file.
         hand_path: the hand's document, for messages; None if it is not from a file.
-        packages: where packages that models name are looked for.
+        packages: folders of the packages that models name.
     """
 
     document: StationDocument
@@ -372,9 +372,9 @@ class Station:
 
     @cached_property
     def content(self) -> str:
-        """Hash of the station, its hand document and the robot's model files with their meshes;
-        names, file locations and the usual motion do not count, as who asks says how the hand shall
-        move."""
+        """Hash of the station, its hand document and the robot's model files with their meshes.
+        Names and file locations are left out, and the default motion, which callers hash
+        themselves."""
         arm = self.document.arm and replace(self.document.arm, model="")
         placed = plain_data(replace(self.document, description="", hand="", arm=arm))
         for name in ("motion", "packages"):
@@ -398,8 +398,8 @@ def load_station(reference: str | Path) -> Station:
         reference: path of a station file, or the bare name of a built-in station.
 
     Raises:
-        UnknownNameError: no such station, hand or model, or no such package; the message tells
-            where it was looked for.
+        UnknownNameError: no such station, hand, model or package; the message lists the searched
+            places.
         DocumentError: the file does not fit the schema.
     """
     path = resolve_reference(reference, "stations")
@@ -416,7 +416,7 @@ def load_station(reference: str | Path) -> Station:
 
 
 StationLike = Station | str | Path
-"""A station, loaded or by what `load_station` takes: a path, or the name of a built-in one."""
+"""A loaded station, or an argument of `load_station`: a path, or the name of a built-in one."""
 
 
 def as_station(station: StationLike) -> Station:
@@ -429,7 +429,7 @@ def as_station(station: StationLike) -> Station:
 
 
 def _stated_packages(document: StationDocument, path: Path) -> dict[str, Path]:
-    """The folders that a station states, by the names of packages."""
+    """Folders of the packages in a station document, by name."""
     found = {}
     for name, reference in document.packages.items():
         with _name_station_key(path, f"packages.{name}"):
@@ -444,7 +444,7 @@ def _stated_packages(document: StationDocument, path: Path) -> dict[str, Path]:
 
 @contextlib.contextmanager
 def _name_station_key(path: Path, key: str) -> Iterator[None]:
-    """Says which key of the station names something that is not there."""
+    """Adds the station's key to errors about unknown names."""
     try:
         yield
     except UnknownNameError as error:
@@ -452,8 +452,8 @@ def _name_station_key(path: Path, key: str) -> Iterator[None]:
 
 
 def obstacle_corners(station: Station) -> list[Array]:
-    """(8, 3) corners of each of a station's fixed boxes, in the scene frame [m]."""
-    # Corners of a box with extents of 1.
+    """Corners (8, 3) of each of a station's fixed boxes, in the scene frame [m]."""
+    # Corners of a unit box.
     unit_corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
     X_SW = inverse(station.document.X_WS.matrix())
     return [
@@ -463,8 +463,8 @@ def obstacle_corners(station: Station) -> list[Array]:
 
 
 def visible_board_share(camera: Camera, station: Station, board: Board) -> float:
-    """Share of the board that a camera sees past the station's obstacles; neither the robot nor
-    objects count."""
+    """Share of the board that a camera sees past the station's obstacles, without robot and
+    objects."""
     p_WQ = board_points(station, board)
     seen = are_points_in_view(camera, p_WQ)
     p_WC = np.array(camera.X_WC.translation)
@@ -474,7 +474,7 @@ def visible_board_share(camera: Camera, station: Station, board: Board) -> float
 
 
 def board_points(station: Station, board: Board) -> Array:
-    """(N, 3) points all over the board, edges included, in the world [m]."""
+    """Points (N, 3) on a grid over the board, including edges, in the world [m]."""
     point_count = 61  # Points along each side of the board.
     x, y = (np.linspace(0.0, extent, point_count) for extent in board.size)
     p_SQ = np.stack([*np.meshgrid(x, y), np.zeros((point_count, point_count))], axis=-1).reshape(
@@ -484,7 +484,7 @@ def board_points(station: Station, board: Board) -> Array:
 
 
 def are_points_in_view(camera: Camera, p_WQ: Array) -> NDArray[np.bool_]:
-    """(N,) whether points (N, 3) are in a camera's image and range of depths."""
+    """Whether points (N, 3) are in a camera's image and depth range (N,)."""
     p_CQ = transform_points(inverse(camera.X_WC.matrix()), p_WQ)
     near, far = camera.depth_range
     depth = p_CQ[:, 2]
@@ -497,16 +497,16 @@ def are_points_in_view(camera: Camera, p_WQ: Array) -> NDArray[np.bool_]:
 
 
 def lines_through_box(box: Obstacle, p_WA: Array, p_WQ: Array) -> NDArray[np.bool_]:
-    """(N,) whether the straight lines from a point A (3,) to points (N, 3) go through a box, by
-    where they are between each pair of its faces (Kay and Kajiya, SIGGRAPH 1986)."""
-    end_share = 1e-6  # Share of the ray at its end that obstacles do not hide.
+    """Whether the line segments from a point A (3,) to points (N, 3) pass through a box (N,), by
+    the slab method (Kay and Kajiya, SIGGRAPH 1986)."""
+    end_share = 1e-6  # Share of the ray at its end in which obstacles are ignored.
     X_BW = inverse(box.X_WB.matrix())
     p_BA = transform_points(X_BW, p_WA[None])[0]
     ray = transform_points(X_BW, p_WQ) - p_BA
     half = np.array(box.size) / 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([(-half - p_BA) / ray, (half - p_BA) / ray])
-    # Along a face there is no crossing: the line is between the two all the way, or never.
+    # A line parallel to two faces never crosses them: it is always or never between them.
     level = ray == 0.0
     ends = np.where(level, np.where(np.abs(p_BA) < half, [[[-np.inf]], [[np.inf]]], np.inf), ends)
     enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
@@ -514,8 +514,8 @@ def lines_through_box(box: Obstacle, p_WA: Array, p_WQ: Array) -> NDArray[np.boo
 
 
 def frustum(camera: Camera, depth: float) -> Array:
-    """(4, 3) corners of a camera's image, seen at a depth [m], in the world, around the image from
-    its upper left."""
+    """Corners (4, 3) of a camera's image at a depth [m], in the world, around the image from the
+    upper left."""
     w, h = camera.width - 0.5, camera.height - 0.5
     corners = np.array([[-0.5, -0.5], [w, -0.5], [w, h], [-0.5, h]])
     rays = (corners - camera.principal_point) / camera.focal

@@ -35,9 +35,9 @@ LINE_TOLERANCE = 1e-7
 
 @lru_cache(maxsize=16)
 def board_meshes(board: Board) -> dict[str, Mesh]:
-    """The sheet's parts, `paper` and `markers`, in the scene frame.
+    """Meshes of the sheet, `paper` and `markers`, in the scene frame.
 
-    A board that its markers do not fit on has paper only.
+    A board that is too small for its markers has only paper.
     """
     try:
         x, y, black = marker_grid(board)
@@ -48,13 +48,13 @@ def board_meshes(board: Board) -> dict[str, Mesh]:
 
 
 def marker_grid(board: Board) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Lines across the whole sheet wherever a cell of a marker begins or ends.
+    """Grid lines across the whole sheet at all edges of marker cells.
 
-    Meshes of this one grid have all their vertices in common, so that no seam shows what is below.
+    Meshes of this grid share all vertices, so that there are no visible seams.
 
     Returns:
-        x (X + 1,) and y (Y + 1,) of the lines [m], ascending; (X, Y) which squares between them
-        are black.
+        x (X + 1,) and y (Y + 1,) of the lines [m], ascending; which squares (X, Y) between them are
+        black.
 
     Raises:
         InvalidInputError: the markers do not fit.
@@ -83,7 +83,7 @@ def _distinct_values(values: Array) -> Array:
 
 
 def _squares_as_obj(x: Array, y: Array, chosen: NDArray[np.bool_]) -> Mesh:
-    """Chosen squares of a grid, facing up, as an OBJ."""
+    """Mesh (OBJ) of chosen squares of a grid, facing up."""
     i, j = np.nonzero(chosen)
     around = [i, i + 1, i + 1, i], [j, j, j + 1, j + 1]  # counter-clockwise
     corners = np.ravel_multi_index(around, (len(x), len(y))).T  # (N, 4)
@@ -112,7 +112,7 @@ class SurroundingsProperties:
 
 @dataclass(frozen=True, eq=False)
 class FixedBox:
-    """A box of the station that does not move.
+    """A fixed box of the station.
 
     Attributes:
         X_WB: (4, 4) pose of its centre in the world.
@@ -144,20 +144,20 @@ def obstacle_boxes(station: Station) -> dict[str, FixedBox]:
 
 
 def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
-    """Adds the table. At a point it is as stiff as what meets it."""
+    """Adds the table. In point contact it is as stiff as the other body."""
     return _add_box(plant, "table", table_box(station), SurroundingsProperties.point_stiffness)
 
 
 def add_board(plant: MultibodyPlant, board: Board, station: Station, markers: bool) -> None:
-    """Adds the printed sheet, to look at only.
+    """Adds the printed sheet as a visual mesh.
 
     Args:
-        plant: to add it to.
+        plant: the plant.
         board: the sheet.
-        station: where it lies.
-        markers: draw them; otherwise, and if they do not fit, it is white.
+        station: station with the sheet's pose.
+        markers: draw the markers; otherwise, and if they do not fit, the sheet is white.
     """
-    # For people: objects and drawings stand out on a pale board.
+    # In the viewer, objects and drawings stand out on a pale board.
     pale_colors = PRINTED_BOARD_COLORS | {"markers": (0.8, 0.8, 0.78, 1.0)}
     size = np.array([*board.size, SurroundingsProperties.paper_thickness])
     instance = plant.AddModelInstance("board")
@@ -182,7 +182,7 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
     """Adds the station's fixed boxes.
 
     Raises:
-        InvalidInputError: a name is taken by the scene or the robot.
+        InvalidInputError: a name is used by the scene or the robot.
     """
     bodies = {}
     for name, box in obstacle_boxes(station).items():
@@ -193,7 +193,7 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
 
 
 def obstacle_name_error(station: Station, name: str) -> InvalidInputError:
-    """The error of an obstacle whose name the scene or the robot has, too."""
+    """The error for an obstacle with a name from the scene or the robot."""
     return InvalidInputError(
         f"{station.path}: background.{name}: the scene or the robot has something called"
         " that already; choose another name"
@@ -203,7 +203,7 @@ def obstacle_name_error(station: Station, name: str) -> InvalidInputError:
 def _add_box(
     plant: MultibodyPlant, name: str, fixed: FixedBox, point_stiffness: float | None = None
 ) -> RigidBody:
-    """A box welded to the world as a body of its own: with collision geometry on the world body
+    """Adds a box as a separate body welded to the world: with collision geometry on the world body
     itself, locking a joint crashes (drake#24773)."""
     size = np.array(fixed.size)
     instance = plant.AddModelInstance(name)
@@ -219,7 +219,7 @@ def _add_box(
         properties=properties,
     )
     plant.RegisterCollisionGeometry(body, RigidTransform(), Box(*size), "collision", properties)
-    # thin ones, too, remain
+    # keep thin boxes visible
     drawn = Box(*np.maximum(size - 2 * SurroundingsProperties.paper_thickness, size / 2))
     plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(fixed.color))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(fixed.X_WB))

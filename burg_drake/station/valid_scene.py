@@ -15,7 +15,7 @@ from burg_drake.station.station_document import Station
 
 
 def world_content(scene: Scene, station: Station) -> str:
-    """Hash of scene and station with all files of the scene's objects that are there."""
+    """Hash of scene and station, with all existing files of the scene's objects."""
     library = scene.library
     files: list[list[str | Path]] = []
     for name in sorted({i.object for i in (*scene.instances.values(), *scene.background.values())}):
@@ -29,10 +29,11 @@ def world_content(scene: Scene, station: Station) -> str:
 
 
 def require_valid_scene(scene: Scene, station: Station) -> tuple[str, ...]:
-    """Refuses a scene whose grasps would be judged in a world other than the document's.
+    """Rejects a scene with errors, such as overlaps, with which simulation would not match the
+    document.
 
     Returns:
-        Warnings, such as of objects that hover, a sentence each.
+        Warnings, one sentence each, such as about hovering objects.
 
     Raises:
         InvalidInputError: one line with the first error found.

@@ -1,4 +1,4 @@
-"""Triangles of all shapes that renderers see, for ray casting."""
+"""Triangles of all visual shapes, for ray casting."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ Triangles = tuple[Array, Indices]
 
 @dataclass(frozen=True, eq=False)
 class VisibleSurface:
-    """A shape that renderers see.
+    """A visual shape of a body.
 
     Attributes:
-        body: that it belongs to.
+        body: the body.
         vertices: (V, 3) in the body's frame [m].
         faces: (F, 3).
     """
@@ -45,9 +45,9 @@ class VisibleSurface:
 
 
 def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[VisibleSurface]:
-    """All that renderers see, in the order in which it was registered.
+    """All visual shapes, in order of registration.
 
-    Balls and cylinders are as fine as those of Drake's renderer, not round.
+    Balls and cylinders are meshed as in Drake's renderer.
 
     Raises:
         InvalidInputError: a mesh file cannot be read, or has no faces.
@@ -66,7 +66,7 @@ def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Vis
 
 
 def shape_triangles(shape: Shape) -> Triangles:
-    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface.
+    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; empty if it has no surface.
 
     Raises:
         InvalidInputError: a mesh file cannot be read, or has no faces.
@@ -114,8 +114,8 @@ def _mesh_shape_trimesh(shape: Mesh) -> trimesh.Trimesh:
 
 @lru_cache(maxsize=64)
 def _read_mesh(path: Path | None, content: bytes | None, kind: str, age: int) -> trimesh.Trimesh:
-    """A mesh file, or what would be in it; `age` tells a file from a later one. The objects of many
-    scenes are the same few."""
+    """Reads a mesh from a file, or from its content; `age` invalidates the cache when the file
+    changes. Cached, as scenes share objects."""
     source = str(path) if content is None else io.BytesIO(content)
     return trimesh.load(
         source, file_type=kind.lstrip("."), force="mesh", process=False, skip_materials=True

@@ -1,4 +1,4 @@
-"""Pages in the browser, on viser; whatever they do is a command of a session in `compose`.
+"""Pages in the browser, on viser; each action is a command of a session in `compose`.
 
 Read `setup_page` first: it puts the panels (`*_panels`) beside the `scene_view`. `page_server`
 opens the page, and `admission` decides which browsers may use it.

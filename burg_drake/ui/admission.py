@@ -15,24 +15,24 @@ from websockets.http11 import Request, Response
 from burg_drake.core import SECURITY_HEADERS, BrowserToken, RequestError, require_local_host
 
 MAX_UPLOAD_BYTES = 32 << 20
-"""Bytes of a file; a photo of a board has a few million."""
+"""Maximum bytes of a file; a photo of a board has a few million."""
 MAX_ALL_UPLOADS_BYTES = 64 << 20
-"""Bytes of all uploads in progress."""
+"""Maximum bytes of all uploads in progress."""
 
 
 class RefusedError(Exception):
-    """A browser sent what no page sends; its connection is closed with this reason."""
+    """A browser sent a message that no page sends; its connection is closed with this reason."""
 
 
 @dataclass
 class _Upload:
-    """A file on its way.
+    """An upload in progress.
 
     Attributes:
-        owner: the connection that it comes by.
-        size: that was announced [bytes].
-        bytes_left: likewise, that are still to come.
-        parts_left: likewise.
+        owner: the connection.
+        size: announced size [bytes].
+        bytes_left: announced bytes that are still to come.
+        parts_left: announced parts that are still to come.
     """
 
     owner: object
@@ -42,26 +42,26 @@ class _Upload:
 
 
 class Uploads:
-    """Keeps count of all files on their way to a server; used in the server's thread alone."""
+    """Tracks and limits all uploads to a server; used in the server's thread only."""
 
     def __init__(self) -> None:
         self._transfers: dict[str, _Upload] = {}
 
     def start(self, owner: object, key: str, name: str, *, size: int, parts: int) -> None:
-        """A file is announced.
+        """Registers an announced upload.
 
         Args:
             owner: the connection.
             key: of the transfer, chosen by the browser.
             name: of the file.
-            size: of it [bytes].
-            parts: in how many parts it comes.
+            size: of the file [bytes].
+            parts: number of parts.
 
         Raises:
-            RefusedError: it is too large, or no page announces files like that.
+            RefusedError: the file is too large, or the announcement is not from our page.
         """
         max_uploads = 16  # Uploads in progress.
-        min_part_bytes = 64 << 10  # Bytes of all parts but the last; viser's page sends 512 KiB.
+        min_part_bytes = 64 << 10  # Except for the last part; viser's page sends 512 KiB.
         max_name_length = 255  # Characters.
         if not 0 <= size <= MAX_UPLOAD_BYTES:
             raise RefusedError(
@@ -80,13 +80,13 @@ class Uploads:
             self._transfers[key] = _Upload(owner, size, size, parts)
 
     def receive_part(self, owner: object, key: str, size: int) -> bool:
-        """A part of a file comes.
+        """Counts a received part of a file.
 
         Returns:
-            False if this connection announced no such file, as after it was refused.
+            False if this connection has no such upload, for example after it was refused.
 
         Raises:
-            RefusedError: there is more than was announced.
+            RefusedError: the file is larger than announced.
         """
         transfer = self._transfers.get(key)
         if transfer is None or transfer.owner is not owner:
@@ -100,7 +100,7 @@ class Uploads:
         return True
 
     def forget(self, owner: object) -> None:
-        """A connection is gone, and what it was sending with it."""
+        """Drops the uploads of a closed connection."""
         self._transfers = {
             key: transfer
             for key, transfer in self._transfers.items()
@@ -114,12 +114,12 @@ CONTENT_SECURITY_POLICY = (
     " style-src 'unsafe-inline'; font-src data:; base-uri 'none'; form-action 'none';"
     " frame-ancestors 'none'"
 )
-"""The page may load nothing and connect only to this server, whatever `?websocket=` says."""
+"""The page may load nothing, and may connect to this server only, whatever `?websocket=` says."""
 
 
 def initial_page(title: str) -> str:
-    """viser's page under another title, with a script before its own and a style sheet after its
-    own, which counts whether panels are open or folded.
+    """viser's page with another title, our script before its own, and our style sheet after its
+    own.
 
     Args:
         title: of the page.
@@ -129,7 +129,7 @@ def initial_page(title: str) -> str:
         " address and reload."
     )
     script = _read_resource("burg_drake", "ui/first_page.js")
-    script = script.replace("LARGEST_UPLOAD = 0;", f"LARGEST_UPLOAD = {MAX_UPLOAD_BYTES};")
+    script = script.replace("MAX_UPLOAD_BYTES = 0;", f"MAX_UPLOAD_BYTES = {MAX_UPLOAD_BYTES};")
     style = _read_resource("burg_drake", "ui/page.css")
     page = _read_resource("viser", "client/build/index.html")
     for old, new in (
@@ -146,21 +146,21 @@ def _read_resource(package: str, path: str) -> str:
 
 
 MAX_CONNECTIONS = 32
-"""Connections of browsers; each costs memory for unsent messages."""
+"""Maximum number of browser connections; each costs memory for unsent messages."""
 
 
 class Admission:
-    """Judges requests.
+    """Decides which requests are accepted.
 
     Args:
-        host: the address that is listened on.
-        port: likewise.
+        host: address that the server listens on.
+        port: that the server listens on.
         title: of the page.
-        by_token: whether browsers need one.
+        by_token: whether browsers need a token.
 
     Attributes:
-        on_admitted: called, in the server's thread, when a browser has used up the token, with
-            that browser's address.
+        on_admitted: called, in the server's thread, when a browser has used the token, with that
+            browser's address.
     """
 
     def __init__(self, host: str, port: int, *, title: str, by_token: bool) -> None:
@@ -171,14 +171,14 @@ class Admission:
 
     @property
     def token(self) -> str | None:
-        """What the next browser has to bring; None if none is asked for."""
+        """The token for the next browser; None if no token is needed."""
         return None if self._token is None else self._token.token
 
     def process_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answers a request, as websockets asks for it.
+        """Answers a request; a callback for `websockets`.
 
         Returns:
-            The page, a refusal, or None to go on with a websocket's handshake.
+            The page, a refusal, or None to continue with the websocket handshake.
         """
         try:
             return self._answer(connection, request)
@@ -229,7 +229,7 @@ class Admission:
         self.on_admitted(str(peer[0]) if peer else "")
 
     def _has_cookie(self, request: Request) -> bool:
-        """Whether this browser was admitted; without a token all are."""
+        """Whether this browser was admitted; always true without a token."""
         return self._token is None or self._token.admits(request.headers.get("Cookie", ""))
 
     def _response(

@@ -1,4 +1,4 @@
-"""Pictures that worker processes compute: of objects, and of the area that the arm reaches."""
+"""Pictures computed in worker processes: of objects, and of the area that the arm reaches."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ if TYPE_CHECKING:
 
 PICTURE_SIZE = (176, 132)
 """Width and height in pixels; shown at half of that on fine screens."""
-Wanted = tuple[str, int | None]
-"""An object, and in which stable pose; None: as it looks best."""
+PictureKey = tuple[str, int | None]
+"""An object and its stable pose; None for the best view."""
 
 _log = logging.getLogger("burg_drake")
 
 
 class ObjectPictures:
-    """Pictures of one library.
+    """Pictures of the objects of a library.
 
     Args:
-        library: where the objects are.
-        on_ready: called in a thread of this class's when a picture is there.
+        library: of the objects.
+        on_ready: called with the key of each finished picture, in a thread of this class.
 
     Attributes:
-        missing: why there are no pictures, in one line; empty if there are.
+        missing: why there are no pictures, in one line; empty if there are some.
     """
 
-    def __init__(self, library: ObjectLibrary, on_ready: Callable[[Wanted], None]) -> None:
+    def __init__(self, library: ObjectLibrary, on_ready: Callable[[PictureKey], None]) -> None:
         self.library = library
         self.missing = ""
         self._on_ready = on_ready
-        self._known: dict[Wanted, bytes | None] = {}
-        self._wanted: list[Wanted] = []
+        self._pictures: dict[PictureKey, bytes | None] = {}
+        self._queue: list[PictureKey] = []
         self._condition = threading.Condition()
         self._closed = False
         self._worker = WorkerPool(1, retries=0)
@@ -58,19 +58,19 @@ class ObjectPictures:
         self._thread.start()
 
     def get(self, name: str, stable_pose: int | None = None) -> bytes | None:
-        """A PNG, if it is there; else it is made, the newest wish first."""
-        wanted = (name, stable_pose)
+        """The PNG if it is finished; else None, and it is queued, the newest request first."""
+        key = (name, stable_pose)
         with self._condition:
-            if wanted in self._known:
-                return self._known[wanted]
-            if wanted in self._wanted:
-                self._wanted.remove(wanted)
-            self._wanted.append(wanted)
+            if key in self._pictures:
+                return self._pictures[key]
+            if key in self._queue:
+                self._queue.remove(key)
+            self._queue.append(key)
             self._condition.notify()
         return None
 
     def close(self) -> None:
-        """Ends thread and process."""
+        """Ends the thread and the worker process."""
         with self._condition:
             self._closed = True
             self._condition.notify()
@@ -80,25 +80,25 @@ class ObjectPictures:
     def _run(self) -> None:
         while True:
             with self._condition:
-                self._condition.wait_for(lambda: bool(self._wanted) or self._closed)
+                self._condition.wait_for(lambda: bool(self._queue) or self._closed)
                 if self._closed:
                     return
-                wanted = self._wanted[-1]
-            png = self._picture(wanted)
+                key = self._queue[-1]
+            png = self._load_or_render(key)
             with self._condition:
-                self._known[wanted] = png
-                self._wanted.remove(wanted)
+                self._pictures[key] = png
+                self._queue.remove(key)
                 if self._closed:
                     return
-            self._on_ready(wanted)
+            self._on_ready(key)
 
-    def _picture(self, wanted: Wanted) -> bytes | None:
-        name, stable_pose = wanted
+    def _load_or_render(self, key: PictureKey) -> bytes | None:
+        name, stable_pose = key
         if self.missing:
             return None
         try:
             content = content_hash(self.library.content[name], str(stable_pose), list(PICTURE_SIZE))
-            arrays = cached("picture", content, lambda: {"png": self._render(wanted)})
+            arrays = cached("picture", content, lambda: {"png": self._render(key)})
             return bytes(np.asarray(arrays["png"], dtype=np.uint8))
         except MissingDependencyError as error:
             self.missing = f"no pictures: {error}"
@@ -106,12 +106,12 @@ class ObjectPictures:
             _log.debug("no picture of %s: %s", name, error)
         return None
 
-    def _render(self, wanted: Wanted) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    def _render(self, key: PictureKey) -> np.ndarray[Any, np.dtype[np.uint8]]:
         if missing := missing_render_libraries():
             raise MissingDependencyError(describe_missing(missing))
         try:
             png = self._worker.submit(
-                render_picture, str(self.library.root), *wanted, PICTURE_SIZE
+                render_picture, str(self.library.root), *key, PICTURE_SIZE
             ).result()
         except Exception as error:
             if self._closed:
@@ -128,11 +128,11 @@ def render_picture(root: str, name: str, stable_pose: int | None, size: tuple[in
     Args:
         root: folder of the library.
         name: of the object.
-        stable_pose: in which it stands; None: as it looks best.
+        stable_pose: number of its stable pose; None for the best view.
         size: width and height [pixel].
 
     Raises:
-        BurgError: it cannot be rendered.
+        BurgError: the object cannot be rendered.
     """
     from burg_drake.objects import load_library
     from burg_drake.visualization import ObjectRenderer
@@ -143,7 +143,7 @@ def render_picture(root: str, name: str, stable_pose: int | None, size: tuple[in
 
 @dataclass(frozen=True)
 class ReachTask:
-    """Asks for a layer.
+    """Computes a layer of the arm's reach in a worker process.
 
     Attributes:
         station: with an arm.

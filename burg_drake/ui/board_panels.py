@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from burg_drake.cameras import BoardPicture, Image
     from burg_drake.scene import Board
 
-CUSTOM_SIZE = "own size"  # Choice for a size that no paper has.
+CUSTOM_SIZE = "own size"  # Choice for a size that is not a paper size.
 LANDSCAPE_CHOICE = "across"  # Choice for a board whose long side lies along x.
 PORTRAIT_CHOICE = "upright"  # Choice for a board whose long side lies along y.
 
@@ -31,55 +31,55 @@ class BoardPanel:
     """Chooses the board.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         self._actions = actions
-        self._own = False
+        self._is_custom = False
         with gui.add_folder("Board"):
             self._size = actions.on_choice(
-                gui.add_dropdown("Size", (*BOARD_SIZES, CUSTOM_SIZE)), self._choose
+                gui.add_dropdown("Size", (*BOARD_SIZES, CUSTOM_SIZE)), self._set_paper
             )
             self._orientation = actions.on_choice(
-                gui.add_dropdown("Lies", (LANDSCAPE_CHOICE, PORTRAIT_CHOICE)), self._turn
+                gui.add_dropdown("Lies", (LANDSCAPE_CHOICE, PORTRAIT_CHOICE)), self._set_orientation
             )
             self._extents = actions.typed_field(
                 gui.add_vector2(
                     "Width, depth [mm]", (594.0, 420.0), min=(1.0, 1.0), max=(1e5, 1e5), step=0.1
                 ),
-                self._resize,
+                self._set_extents,
             )
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         size = view.document.board.size
         name = board_size_name(size)
-        self._own = self._own or name is None
-        self._size.value = CUSTOM_SIZE if self._own or name is None else name
+        self._is_custom = self._is_custom or name is None
+        self._size.value = CUSTOM_SIZE if self._is_custom or name is None else name
         self._orientation.value = PORTRAIT_CHOICE if size[1] > size[0] else LANDSCAPE_CHOICE
-        self._orientation.visible = not self._own
-        self._extents.handle.visible = self._own
+        self._orientation.visible = not self._is_custom
+        self._extents.handle.visible = self._is_custom
         self._extents.show(tuple(round(1e3 * side, 3) for side in size))
 
-    def _choose(self, name: str) -> None:
-        self._own = name == CUSTOM_SIZE
-        if self._own:
+    def _set_paper(self, name: str) -> None:
+        self._is_custom = name == CUSTOM_SIZE
+        if self._is_custom:
             self.show(self._actions.session.view)
             return
         width, depth = self._actions.session.view.document.board.size
-        self._set(board_size(name, upright=depth > width))
+        self._set_board_size(board_size(name, upright=depth > width))
 
-    def _turn(self, orientation: str) -> None:
+    def _set_orientation(self, orientation: str) -> None:
         short, long = sorted(self._actions.session.view.document.board.size)
-        self._set((short, long) if orientation == PORTRAIT_CHOICE else (long, short))
+        self._set_board_size((short, long) if orientation == PORTRAIT_CHOICE else (long, short))
 
-    def _resize(self, extents_mm: tuple[float, float]) -> None:
+    def _set_extents(self, extents_mm: tuple[float, float]) -> None:
         width, depth = (round(1e-3 * side, 6) for side in extents_mm)
-        self._set((width, depth), field="board")
+        self._set_board_size((width, depth), field="board")
 
-    def _set(self, size: tuple[float, float], field: str = "") -> None:
+    def _set_board_size(self, size: tuple[float, float], field: str = "") -> None:
         session = self._actions.session
         session.do(SetBoard(replace(session.view.document.board, size=size)), field=field)
 
@@ -89,13 +89,13 @@ CAMERA_RELEASE_TIMEOUT = 10.0
 
 
 class LivePicture:
-    """Looks at a board in a thread of its own until it is closed.
+    """Takes pictures of a board with a camera, in its own thread, until it is closed.
 
     Args:
-        camera: as of `cameras.open_source`.
-        board: that it sees.
-        show: gets each picture, or one line that says why there is none.
-        after: another one that is closed, and may have the camera yet; it is waited for.
+        camera: argument of `cameras.open_source`.
+        board: in front of the camera.
+        show: called with each picture, or with one line that says why there is none.
+        after: closed live picture that may still hold the camera; waits for its end.
 
     Attributes:
         camera, board: as given.
@@ -106,67 +106,67 @@ class LivePicture:
         camera: str,
         board: Board,
         show: Callable[[BoardPicture | str], None],
-        after: LivePicture | None = None,
+        previous: LivePicture | None = None,
     ) -> None:
         self.camera, self.board = camera, board
         self._show = show
-        self._over = threading.Event()
+        self._closed = threading.Event()
         self._thread = threading.Thread(
-            target=self._run, args=(after,), name="live-picture", daemon=True
+            target=self._run, args=(previous,), name="live-picture", daemon=True
         )
         self._thread.start()
 
     def close(self) -> None:
-        """Ends it; the camera is free for others soon afterwards."""
-        self._over.set()
+        """Stops taking pictures; the camera is released soon afterwards."""
+        self._closed.set()
 
     def wait(self, timeout: float) -> None:
-        """Waits for the last picture of a source that has an end [s]."""
+        """Waits for the last picture of a finite source, at most `timeout` [s]."""
         self._thread.join(timeout)
 
-    def _run(self, after: LivePicture | None) -> None:
+    def _run(self, previous: LivePicture | None) -> None:
         interval = 0.5  # Seconds between pictures; each sends some hundred kilobytes to every page.
         from burg_drake.cameras import BoardRectifier, open_source
 
-        if after is not None:
-            after.wait(CAMERA_RELEASE_TIMEOUT)
+        if previous is not None:
+            previous.wait(CAMERA_RELEASE_TIMEOUT)
         try:
             rectifier = BoardRectifier(self.board)
             with open_source(self.camera) as source:
-                while not self._over.is_set():
+                while not self._closed.is_set():
                     try:
                         frame = source.read()
                         if frame is None:
                             return
                         self._report(rectifier.picture(frame.image))
-                    except BurgError as error:  # the board is hidden, or the camera unplugged
+                    except BurgError as error:  # the board is hidden, or the camera was unplugged
                         self._report(str(error))
-                    self._over.wait(interval)
+                    self._closed.wait(interval)
         except BurgError as error:
             self._report(str(error))
 
-    def _report(self, what: BoardPicture | str) -> None:
-        if not self._over.is_set():
-            self._show(what)
+    def _report(self, picture: BoardPicture | str) -> None:
+        if not self._closed.is_set():
+            self._show(picture)
 
 
 CAMERA_NUMBERS = ("0", "1", "2", "3")
-"""Cameras of this machine that the page may open; it can name no other device."""
+"""Cameras of this machine that the page may open."""
 
 
 class BackdropPanel(SidePanel):
-    """Lays a picture of the real board under the objects.
+    """Shows a picture of the real board under the objects.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
         layers: of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
         super().__init__(gui, actions)
         self._layers = layers
-        self._sheet: BoardOverlay | None = None
+        self._overlay: BoardOverlay | None = None
         self._live: LivePicture | None = None
         icon = viser.Icon
         with gui.add_folder("Real board"):
@@ -175,32 +175,32 @@ class BackdropPanel(SidePanel):
             upload.on_upload(self._uploaded)
             self._camera = gui.add_dropdown("Camera", CAMERA_NUMBERS)
             self._button("Take a picture", self._take_picture, icon=icon.CAMERA)
-            self._on = actions.on_choice(
+            self._live_checkbox = actions.on_choice(
                 gui.add_checkbox("Live", False, hint="Show what the camera sees, again and again"),
-                self._watch,
+                self._set_live,
             )
             self._opacity = actions.on_choice(
                 gui.add_slider("Opacity", 0.0, 1.0, 0.05, 0.8), self._set_opacity, key="backdrop"
             )
             self._remove = self._button("Remove the picture", self._clear, icon=icon.X)
-            self._show_sheet(None, "")
+            self._show_overlay(None, "")
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view; a picture stays as it is."""
+        """Updates the panel from a view; a picture stays unchanged."""
         if self._live is not None and self._live.board != view.document.board:
-            self._watch(True)
-        self._remove.visible = self._opacity.visible = self._sheet is not None
+            self._set_live(True)
+        self._remove.visible = self._opacity.visible = self._overlay is not None
 
     def close(self) -> None:
-        """Lets go of the camera."""
+        """Releases the camera."""
         live, self._live = self._live, None
         if live is not None:
             live.close()
 
     def _clear(self) -> None:
         self.close()
-        self._on.value = False
-        self._show_sheet(None, "")
+        self._live_checkbox.value = False
+        self._show_overlay(None, "")
 
     async def _uploaded(self, event: Any) -> None:
         file = event.target.value
@@ -215,15 +215,16 @@ class BackdropPanel(SidePanel):
         """Takes a picture with a camera of this machine.
 
         Raises:
-            InvalidInputError: it is not one of `CAMERA_NUMBERS`, or does not show the board.
-            CameraLost: it gives no picture.
+            InvalidInputError: the camera is not one of `CAMERA_NUMBERS`, or does not show the
+                board.
+            CameraLost: the camera delivers no picture.
         """
         from burg_drake.cameras import open_source
 
         number, live = self._chosen_camera(), self._live
         if live is not None:
-            self._watch(False)
-            self._on.value = False
+            self._set_live(False)
+            self._live_checkbox.value = False
             live.wait(CAMERA_RELEASE_TIMEOUT)
         with open_source(number) as source:
             frame = source.read()
@@ -247,39 +248,39 @@ class BackdropPanel(SidePanel):
     def _show_picture(self, found: BoardPicture, name: str) -> None:
         markers = count_with_noun(len(found.ids), "marker")
         words = f"{name}: {markers}, off by {1e3 * found.error:.1f} mm"
-        sheet = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
-        self._show_sheet(sheet, f"{words}. {found.note}" if found.note else words)
+        overlay = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
+        self._show_overlay(overlay, f"{words}. {found.note}" if found.note else words)
 
-    def _watch(self, on: bool) -> None:
-        """Shows what a camera sees from now on, or no more."""
+    def _set_live(self, on: bool) -> None:
+        """Starts or stops the live picture of a camera."""
         before = self._live
         self.close()
         if on:
             camera, board = self._chosen_camera(), self._actions.session.view.document.board
             self._live = LivePicture(camera, board, self._on_live_picture, before)
 
-    def _on_live_picture(self, what: BoardPicture | str) -> None:
-        """Called by the live picture's thread."""
+    def _on_live_picture(self, picture: BoardPicture | str) -> None:
+        """Called in the thread of the live picture."""
         live = self._live
 
-        def lay() -> None:
+        def show_picture() -> None:
             if live is None or live is not self._live:
                 return
-            if isinstance(what, str):
-                self._show_line(what)
+            if isinstance(picture, str):
+                self._show_line(picture)
             else:
-                self._show_picture(what, f"camera {live.camera}")
+                self._show_picture(picture, f"camera {live.camera}")
 
-        self._actions.submit(lay, key="live picture", wait_for_typing=True)
+        self._actions.submit(show_picture, key="live picture", wait_for_typing=True)
 
     def _set_opacity(self, opacity: float) -> None:
-        if self._sheet is not None:
-            self._sheet = replace(self._sheet, opacity=min(max(float(opacity), 0.0), 1.0))
-            self._layers.show("backdrop", self._sheet)
+        if self._overlay is not None:
+            self._overlay = replace(self._overlay, opacity=min(max(float(opacity), 0.0), 1.0))
+            self._layers.show("backdrop", self._overlay)
 
-    def _show_sheet(self, sheet: BoardOverlay | None, words: str) -> None:
-        self._sheet = sheet
-        self._layers.show("backdrop", sheet)
+    def _show_overlay(self, overlay: BoardOverlay | None, words: str) -> None:
+        self._overlay = overlay
+        self._layers.show("backdrop", overlay)
         self._show_line(words or "Lay a picture of the printed board under the objects.")
         self.show(self._actions.session.view)
 
@@ -299,10 +300,10 @@ class DisplayPanel(SidePanel):
     """Chooses how the scene is drawn.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
         views: of all pages.
-        on_change: called when something is to be drawn differently.
+        on_change: called after each change of a choice.
     """
 
     def __init__(
@@ -328,7 +329,7 @@ class DisplayPanel(SidePanel):
 
     @property
     def coloring(self) -> Coloring:
-        """Which colours objects have."""
+        """The chosen colouring of objects."""
         return COLORING_CHOICES.get(self._colors.value, "objects")
 
     @property
@@ -337,7 +338,7 @@ class DisplayPanel(SidePanel):
         return bool(self._markers.value)
 
     def next_colors(self) -> None:
-        """Goes on to the next colours."""
+        """Switches to the next colouring."""
         names = tuple(COLORING_CHOICES)
         self._colors.value = names[(names.index(self._colors.value) + 1) % len(names)]
         self._on_change()

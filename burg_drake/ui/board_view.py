@@ -16,9 +16,9 @@ from burg_drake.ui.panel_parts import FIXED_COLOR
 
 
 def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
-    """(H, W, 3) the printed sheet from above, its upper edge at the top.
+    """(H, W, 3) picture of the printed sheet from above, with its far edge at the top.
 
-    A board that its markers do not fit on is white.
+    White if the markers do not fit on the board.
     """
     scale = 1600 / max(board.size)  # Pixels per metre.
     width, height = (max(2, round(scale * side)) for side in board.size)
@@ -38,10 +38,10 @@ def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
 
 
 class BoardView:
-    """Shows the board, and once the station: table and obstacles.
+    """Shows the board and the station's table and obstacles.
 
     Args:
-        scene: viser's.
+        scene: API of viser.
         station: around the board.
     """
 
@@ -52,7 +52,7 @@ class BoardView:
             self._show_station(station)
 
     def show(self, board: Board, *, markers: bool = True) -> None:
-        """Brings the browser to a board."""
+        """Shows a board in the browser."""
         if self._shown == (board, markers):
             return
         self._shown = board, markers
@@ -92,11 +92,11 @@ class BoardView:
 
 @dataclass(frozen=True, eq=False)
 class BoardOverlay:
-    """A picture that lies on the board.
+    """A picture on the board.
 
     Attributes:
-        pixels: (H, W, 3 or 4) its first row along the far edge.
-        lower, upper: corners of what it covers in S [m].
+        pixels: (H, W, 3 or 4), the first row at the far edge.
+        lower, upper: corners of the covered rectangle in S [m].
         opacity: 0 to 1.
     """
 
@@ -106,7 +106,7 @@ class BoardOverlay:
     opacity: float = 1.0
 
     def rgba(self) -> NDArray[np.uint8]:
-        """(H, W, 4) with its opacity."""
+        """(H, W, 4) pixels with the opacity as alpha."""
         alpha = self.pixels[..., 3:] if self.pixels.shape[2] == 4 else np.uint8(255)
         faint = np.round(self.opacity * np.broadcast_to(alpha, (*self.pixels.shape[:2], 1)))
         return np.concatenate([self.pixels[..., :3], faint.astype(np.uint8)], axis=2)
@@ -116,7 +116,7 @@ class BoardLayers:
     """Shows pictures on the board.
 
     Args:
-        scene: of viser.
+        scene: API of viser.
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -124,7 +124,7 @@ class BoardLayers:
         self._shown: dict[str, tuple[BoardOverlay, Any]] = {}
 
     def show(self, name: str, sheet: BoardOverlay | None) -> None:
-        """Brings the layer `backdrop` or `reach` to a picture, or to none."""
+        """Shows a picture as layer `backdrop` or `reach`; None removes it."""
         # Metres from the plane on which objects stand; the board is below all layers.
         layer_heights = {"backdrop": -2e-4, "reach": -1e-4}
         shown = self._shown.get(name)

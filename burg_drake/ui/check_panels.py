@@ -42,7 +42,7 @@ class CheckPanel:
     """Lists issues.
 
     Args:
-        gui: of viser, in whose container the panel goes.
+        gui: API of viser, inside the container for the panel.
     """
 
     def __init__(self, gui: viser.GuiApi) -> None:
@@ -50,13 +50,13 @@ class CheckPanel:
             self._text = gui.add_html("")
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         self._text.content = paragraph(*issues_html(view))
 
 
 def issues_html(view: SessionView) -> list[Child]:
-    """What there is to say about the scene."""
-    max_rows = 30  # Issues that are shown.
+    """The issues of the scene as HTML."""
+    max_rows = 30  # Maximum number of issues shown.
     if not view.instances:
         return [secondary_text("Add objects; they are checked as they are moved.")]
     unknown = [name for name, status in view.status.items() if status == "unknown"]
@@ -98,7 +98,7 @@ class SettlePanel(SidePanel):
             self._cancel = self._button("Cancel", session.revert, icon=icon.PLAYER_STOP)
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         self._settle.visible = view.working is None and view.proposal is None
         self._settle.disabled = not view.instances
         self._accept.visible = self._revert.visible = view.proposal is not None
@@ -115,7 +115,7 @@ def _status_lines(view: SessionView) -> list[Child]:
 
 
 def _proposal_html(proposal: SettlingProposal, *, outdated: bool) -> list[Child]:
-    max_rows = 20  # Moved objects that are shown.
+    max_rows = 20  # Maximum number of moved objects shown.
     moved = [(name, proposal.displacements[name]) for name in names_of_moved_instances(proposal)]
     moved.sort(key=lambda item: -item[1].distance)
     rows = [(name, f"{1e3 * d.distance:.1f} mm", f"{degrees(d.angle):.1f}°") for name, d in moved]
@@ -140,14 +140,14 @@ class GraspPanel:
     """Counts grasps.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         self._session = actions.session
         with gui.add_folder("Grasps"):
-            self._on = actions.on_choice(
+            self._enabled = actions.on_choice(
                 gui.add_checkbox(
                     "Count grasps",
                     False,
@@ -158,9 +158,9 @@ class GraspPanel:
             self._text = gui.add_html("")
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         text = ""
-        if self._on.value:
+        if self._enabled.value:
             late = view.grasps_revision != view.revision
             text = paragraph(
                 _grasp_count_table(view.grasps), secondary_text("Counting ...") if late else None
@@ -180,21 +180,21 @@ def _grasp_count_table(grasps: Mapping[str, GraspCount]) -> str | None:
 
 
 class ReachPanel:
-    """Shows what the arm reaches.
+    """Shows the area that the arm reaches.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
         layers: of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
         self._actions, self._layers = actions, layers
         self._worker = BackgroundWorker()
-        self._shown_for: tuple[Board, float] | None = None
+        self._shown_request: tuple[Board, float] | None = None
         self._job: BackgroundJob[ReachLayer] | None = None
         with gui.add_folder("Reach"):
-            self._on = gui.add_checkbox(
+            self._enabled = gui.add_checkbox(
                 "Arm's reach", False, hint="Where the arm can grasp straight from above"
             )
             self._height = gui.add_number(
@@ -206,7 +206,7 @@ class ReachPanel:
                 hint="Of the middle between the fingers above the board",
             )
             self._text = gui.add_html("")
-            actions.on_choice(self._on, lambda on: self.show(actions.session.view))
+            actions.on_choice(self._enabled, lambda on: self.show(actions.session.view))
             actions.typed_field(self._height, lambda height: self.show(actions.session.view))
 
     def close(self) -> None:
@@ -214,25 +214,25 @@ class ReachPanel:
         self._worker.close()
 
     def show(self, view: SessionView) -> None:
-        """Brings layer and panel to a view; computes what is not known yet."""
-        self._height.visible = bool(self._on.value)
-        if not self._on.value:
+        """Updates layer and panel from a view; starts to compute a new layer if needed."""
+        self._height.visible = bool(self._enabled.value)
+        if not self._enabled.value:
             self._discard()
             return
-        asked = view.document.board, 1e-3 * float(self._height.value)
-        if asked == self._shown_for:
+        request = view.document.board, 1e-3 * float(self._height.value)
+        if request == self._shown_request:
             return
         self._discard()
-        self._shown_for = asked
+        self._shown_request = request
         station = self._actions.session.station
         if station.document.arm is None:
             self._show_line("The station has no arm.")
             return
         self._show_line("Computing; the first time takes half a minute ...")
-        self._job = self._worker.submit(ReachTask(station, *asked), self._on_job_change)
+        self._job = self._worker.submit(ReachTask(station, *request), self._on_job_change)
 
     def _discard(self) -> None:
-        self._shown_for = None
+        self._shown_request = None
         job, self._job = self._job, None
         if job is not None:
             job.cancel()
@@ -240,7 +240,7 @@ class ReachPanel:
         self._show_line("")
 
     def _on_job_change(self, job: BackgroundJob[ReachLayer]) -> None:
-        """Called by the worker's thread."""
+        """Called in the thread of the worker."""
         if job.done:
             self._actions.submit(lambda: self._finish(job), wait_for_typing=True)
 
@@ -255,7 +255,7 @@ class ReachPanel:
 
         layer = job.wait()
         width, depth = self._actions.session.view.document.board.size
-        pixels = reach_image(layer, pixels=8)  # of each cell, so that cells keep sharp edges
+        pixels = reach_image(layer, pixels=8)  # per cell, so that cells keep sharp edges
         self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), opacity=0.55))
         share = f"Some orientation of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = paragraph(reachability_key(), secondary_text(share))

@@ -1,7 +1,7 @@
-// Runs before viser's page does: says what is missing where it cannot run, and what cannot be sent.
+// Runs before viser's page: reports missing browser features and files that are too large.
 "use strict";
 (() => {
-  const LARGEST_UPLOAD = 0; // put in by html_page.py [bytes]
+  const MAX_UPLOAD_BYTES = 0; // replaced by admission.py
 
   const styled = (tag, style, text = "") => {
     const element = document.createElement(tag);
@@ -10,7 +10,7 @@
     return element;
   };
 
-  // The token is used up, and what an address says of other servers is not believed.
+  // Remove the used token, and parameters that would make viser connect to other servers.
   const query = new URLSearchParams(location.search);
   ["token", "websocket", "playbackPath"].forEach((name) => query.delete(name));
   history.replaceState(null, "", query.size ? `/?${query}` : "/");
@@ -42,7 +42,7 @@
     box.setAttribute("role", "alert");
     box.append(styled("h1", "font-size: 1.4em", lines[0]), styled("p", "", lines[1]));
     document.addEventListener("DOMContentLoaded", () => document.body.append(box));
-    document.write("<template>"); // in which viser's own scripts, later in this file, do not run
+    document.write("<template>"); // keeps viser's scripts, later in this file, from running
     return;
   }
 
@@ -66,34 +66,34 @@
     (event) => {
       const input = event.target;
       if (!(input instanceof HTMLInputElement) || input.type !== "file") return;
-      const large = [...input.files].find((file) => file.size > LARGEST_UPLOAD);
+      const large = [...input.files].find((file) => file.size > MAX_UPLOAD_BYTES);
       if (large === undefined) return;
       event.stopImmediatePropagation();
       input.value = "";
       const mib = (bytes) => `${(bytes / 2 ** 20).toFixed(1)} MiB`;
       complain(
         `${large.name} was not sent: it has ${mib(large.size)}, and ` +
-          `${mib(LARGEST_UPLOAD)} are the most that this page takes.`,
+          `${mib(MAX_UPLOAD_BYTES)} are the most that this page takes.`,
       );
     },
     true,
   );
 
-  // What is typed counts once Enter is pressed or the field is left: a key says so that nobody
-  // presses, which the program knows as a command (shortcuts.py).
+  // A typed value is applied after Enter or when the field loses focus: the page then sends a
+  // shortcut that nobody presses (shortcuts.py).
   const isTypedIn = (element) =>
     element instanceof HTMLInputElement &&
     ["text", "number"].includes(element.type) &&
     !element.hasAttribute("aria-haspopup");
   const TYPED = { key: "Enter", code: "Enter", altKey: true, shiftKey: true, bubbles: true };
-  const SENT = 150; // viser sends what was typed within 50 ms
+  const SEND_DELAY = 150; // ms; viser sends typed values within 50 ms
   let edited = null;
   let saying = 0;
   let byPointer = false;
   document.addEventListener(
     "input",
     (event) => {
-      clearTimeout(saying); // typing in the next field says it, too
+      clearTimeout(saying); // typing in the next field has the same effect
       edited = event.target;
     },
     true,
@@ -102,7 +102,7 @@
     if (event.target !== edited || !isTypedIn(edited)) return;
     edited = null;
     const say = () => document.documentElement.dispatchEvent(new KeyboardEvent("keydown", TYPED));
-    saying = setTimeout(say, SENT);
+    saying = setTimeout(say, SEND_DELAY);
   });
   document.addEventListener("pointerdown", () => (byPointer = true), true);
   document.addEventListener("keydown", () => (byPointer = false), true);
@@ -110,27 +110,27 @@
     if (event.key === "Enter" && isTypedIn(event.target)) event.target.blur();
   });
 
-  // viser's page leaves keys to a box that was ticked, and to a list that was chosen from.
+  // After a click, a checkbox or a drop-down list keeps the focus, and viser ignores shortcuts.
   document.addEventListener("click", (event) => {
     const isTicked = event.target instanceof HTMLInputElement && event.target.type === "checkbox";
     if (!byPointer || !(isTicked || event.target.closest?.("[role=option]"))) return;
     setTimeout(() => document.activeElement?.blur(), 0);
   });
 
-  // Where the window is narrow, panels begin folded: the library, and on still narrower ones both.
+  // In a narrow window the library panel starts folded, in a narrower one both panels.
   // On phones they are a sheet below the scene, which stays open.
-  const FOLDED_AT = { left: 1100, right: 800 }; // width of the window [pixel]
-  const PHONE = 576;
-  const PANEL_POLL_INTERVAL = 200; // between checks for panels that are not there yet [ms]
-  const isNarrow = (side) => PHONE < innerWidth && innerWidth < FOLDED_AT[side];
-  const toFold = Object.keys(FOLDED_AT).filter(isNarrow);
+  const FOLD_WIDTHS = { left: 1100, right: 800 }; // width of the window [pixel]
+  const PHONE_WIDTH = 576;
+  const PANEL_POLL_INTERVAL = 200; // ms between checks for panels that are not loaded yet
+  const isNarrow = (side) => PHONE_WIDTH < innerWidth && innerWidth < FOLD_WIDTHS[side];
+  const toFold = Object.keys(FOLD_WIDTHS).filter(isNarrow);
   const fold = setInterval(() => {
     for (const side of [...toFold]) {
       const handle = document.querySelector(`[data-dock-region-collapse=${side}]`);
       if (handle === null) continue;
       if (handle.getAttribute("aria-expanded") === "true") {
         handle.click();
-        setTimeout(() => document.activeElement?.blur(), 0); // nobody has gone there by keyboard
+        setTimeout(() => document.activeElement?.blur(), 0); // the click has moved the focus
       }
       toFold.splice(toFold.indexOf(side), 1);
     }

@@ -42,22 +42,22 @@ class PageCamera:
 
     @classmethod
     def from_viser(cls, camera: Any) -> PageCamera:
-        """That of a viser client's `camera`."""
+        """The camera from a viser client's `camera`."""
         X_SC = make_pose(rotation_from_quaternion(camera.wxyz), camera.position)
         return cls(X_SC, float(camera.fov), float(camera.aspect))
 
     def on_plane(self, p_SQ: ArrayLike, p_SP: ArrayLike, normal_S: ArrayLike) -> Array | None:
-        """Where the ray from the camera through Q meets a plane.
+        """Intersection of the ray from the camera through Q with a plane.
 
         Args:
-            p_SQ: (3,) a point that is seen at the pointer [m].
+            p_SQ: (3,) a point on the pointer's ray [m].
             p_SP: (3,) a point of the plane [m].
             normal_S: (3,) unit normal of the plane.
 
         Returns:
-            (3,) the point [m]; None where the ray grazes the plane or goes away from it.
+            (3,) the point [m]; None if the ray is nearly parallel to the plane or leads away.
         """
-        max_distance = 20.0  # Metres from the camera to a point that a pointer may drag to.
+        max_distance = 20.0  # Maximum distance of the point from the camera, in metres.
         eye = self.X_SC[:3, 3]
         ray = np.asarray(p_SQ, dtype=float) - eye
         length = float(np.linalg.norm(ray))
@@ -71,9 +71,9 @@ class PageCamera:
         return eye + distance * ray if 0.0 < distance <= max_distance else None
 
     def on_screen(self, p_SQ: ArrayLike) -> Array:
-        """(N, 2) where points (N, 3) are seen: 0 to 1 from left to right and from top to bottom.
+        """(N, 2) projections of points (N, 3): 0 to 1 from left to right and from top to bottom.
 
-        NaN for those behind the camera.
+        NaN for points behind the camera.
         """
         p_CQ = transform_points(inverse(self.X_SC), np.atleast_2d(np.asarray(p_SQ, dtype=float)))
         depth = np.where(p_CQ[:, 2] > 0.0, p_CQ[:, 2], np.nan)
@@ -84,7 +84,7 @@ class PageCamera:
 
 
 def instance_center(view: SessionView, name: str) -> Array:
-    """(3,) middle of an instance's bounding box in S [m]; its origin if its object is unknown."""
+    """(3,) centre of an instance's bounding box in S [m]; its origin if its object is unknown."""
     X_SO = view.X_SO(name)
     entry = view.library.objects.get(view.instances[name].object)
     if entry is None:
@@ -94,7 +94,7 @@ def instance_center(view: SessionView, name: str) -> Array:
 
 
 def mean_center(view: SessionView, names: Iterable[str]) -> Array:
-    """(3,) mean of the middles of one or more instances in S [m]."""
+    """(3,) mean of the centres of one or more instances in S [m]."""
     return np.asarray(np.mean([instance_center(view, name) for name in names], axis=0))
 
 
@@ -104,7 +104,7 @@ def rotation_about_point(p_SM: Array, R: Array, offset: Array) -> Array:
 
 
 GIZMO_SIZE = 0.11
-"""Length of the arrows in metres; other parts scale with it as in drei's PivotControls."""
+"""Length of the arrows in metres; other parts scale with it, as in drei's PivotControls."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,21 +122,21 @@ class Handle:
     axis: int
 
     def distance(self, camera: PageCamera, p_SQ: Array) -> float | None:
-        """From the camera to where the ray through Q meets the handle [m]; None if it does not.
+        """Distance along the ray through Q to the handle [m]; None if the ray misses it.
 
         Args:
             camera: of the page.
-            p_SQ: (3,) a point that is seen at the pointer [m].
+            p_SQ: (3,) a point on the pointer's ray [m].
         """
         half_width = 0.07 * GIZMO_SIZE  # Metres by which a pointer may miss an arrow or a ring.
-        # Metres from the object's centre, within which the object itself is hit.
+        # Metres from the gizmo's origin; closer to it, the pointer hits the object itself.
         arrow_start = 0.2 * GIZMO_SIZE
         ring_radius = 0.65 * GIZMO_SIZE  # Metres.
         # Metres that a square extends along both of its axes.
         square_range = (0.13 * GIZMO_SIZE, 0.355 * GIZMO_SIZE)
         eye = camera.X_SC[:3, 3]
         if self.kind == "arrow":
-            along = self._along(camera, p_SQ)
+            along = self._axis_coordinate(camera, p_SQ)
             if along is None:
                 return None
             p_SA = self._origin + np.clip(along, arrow_start, GIZMO_SIZE) * self._direction
@@ -156,17 +156,17 @@ class Handle:
         return float(np.linalg.norm(p_SP - eye)) if hit else None
 
     def motion(self, camera: PageCamera, p_SQ: Array, p_SQ_now: Array) -> Array | None:
-        """(4, 4) motion in S of what is held, as the pointer went from Q to where it is now.
+        """(4, 4) motion in S of the dragged objects for a movement of the pointer.
 
         Args:
             camera: of the page.
-            p_SQ, p_SQ_now: (3,) points that are seen at the pointer then and now [m].
+            p_SQ, p_SQ_now: (3,) points on the pointer's ray at the start and now [m].
 
         Returns:
-            None where the pointer says nothing, as the view is along the handle.
+            None if the view is along the handle, so that the motion is undefined.
         """
         if self.kind == "arrow":
-            then, now = self._along(camera, p_SQ), self._along(camera, p_SQ_now)
+            then, now = self._axis_coordinate(camera, p_SQ), self._axis_coordinate(camera, p_SQ_now)
             if then is None or now is None:
                 return None
             return make_pose(p_AB=(now - then) * self._direction)
@@ -188,9 +188,9 @@ class Handle:
     def _direction(self) -> Array:
         return np.asarray(self.X_SG[:3, self.axis])
 
-    def _along(self, camera: PageCamera, p_SQ: Array) -> float | None:
-        """Where the axis comes nearest to the ray through Q [m from the origin]; None if the view
-        is along the axis."""
+    def _axis_coordinate(self, camera: PageCamera, p_SQ: Array) -> float | None:
+        """Coordinate along the axis closest to the ray through Q [m from the origin]; None if the
+        view is along the axis."""
         eye, axis = camera.X_SC[:3, 3], self._direction
         ray = (p_SQ - eye) / np.linalg.norm(p_SQ - eye)
         slope = float(ray @ axis)
@@ -201,12 +201,12 @@ class Handle:
 
 
 def handle_under(handles: Iterable[Handle], camera: PageCamera, p_SQ: Array) -> Handle | None:
-    """The handle nearest to the camera of those that are drawn at a pointer, if any is.
+    """The handle under the pointer that is closest to the camera; None if there is none.
 
     Args:
-        handles: that are shown.
+        handles: shown handles.
         camera: of the page.
-        p_SQ: (3,) a point that is seen at the pointer [m].
+        p_SQ: (3,) a point on the pointer's ray [m].
     """
     found = [(handle.distance(camera, p_SQ), handle) for handle in handles]
     hit = [(distance, handle) for distance, handle in found if distance is not None]
@@ -215,12 +215,12 @@ def handle_under(handles: Iterable[Handle], camera: PageCamera, p_SQ: Array) -> 
 
 @dataclass(eq=False)
 class _GizmoPart:
-    """Arrows, or rings.
+    """The arrows or the rings of the gizmo.
 
     Attributes:
         name: of the node.
-        node: of viser, once it was needed.
-        X_SG: (4, 4) where it is shown.
+        node: of viser; None until it is first shown.
+        X_SG: (4, 4) shown pose; None while hidden.
     """
 
     name: str
@@ -229,11 +229,11 @@ class _GizmoPart:
 
 
 class Gizmo:
-    """Shows handles at what is selected.
+    """Shows handles at the selected objects.
 
     Args:
-        scene: of viser.
-        actions: what may be done with the session.
+        scene: API of viser.
+        actions: of the page.
     """
 
     def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:
@@ -242,21 +242,21 @@ class Gizmo:
         self._along_object = False
         self._planar = True
         self._drag: Drag | None = None
-        self._who: int | None = None
-        self._held: _GizmoPart | None = None
+        self._client_id: int | None = None
+        self._dragged_part: _GizmoPart | None = None
         self._X_SGi = np.eye(4)
 
     def show(self, view: SessionView) -> None:
-        """Brings the handles to a view; those that are dragged are the pointer's."""
+        """Updates the handles from a view, except for dragged ones, which follow the pointer."""
         self._planar = view.planar
-        going_on = self._drag is not None and not self._drag.is_over
-        lost = missing_objects(view.state)
-        names = tuple(name for name in view.selection if name not in lost)
+        is_dragging = self._drag is not None and not self._drag.is_over
+        missing = missing_objects(view.state)
+        names = tuple(name for name in view.selection if name not in missing)
         for part, X_SG in (
             (self._arrows, self._arrows_pose(view, names) if names else None),
             (self._rings, self._rings_pose(view, names) if names else None),
         ):
-            if going_on and part is self._held:
+            if is_dragging and part is self._dragged_part:
                 continue
             part.X_SG = X_SG
             if X_SG is None:
@@ -276,12 +276,12 @@ class Gizmo:
             part.node.visible = True
 
     def switch_axes(self) -> None:
-        """Arrows along the object's own axes in place of the board's, or the other way round."""
+        """Switches the arrows between the axes of the board and those of the object."""
         self._along_object = not self._along_object
         self.show(self._actions.session.view)
 
     def handle_under(self, camera: PageCamera, p_SQ: Array) -> Handle | None:
-        """The handle that is drawn at a pointer, if any is; see the function `handle_under`."""
+        """The handle under the pointer; see the function `handle_under`."""
         axes = (2,) if self._planar else (0, 1, 2)
         parts: list[Handle] = []
         if (X_SG := self._arrows.X_SG) is not None:
@@ -293,12 +293,12 @@ class Gizmo:
         return handle_under(parts, camera, p_SQ)
 
     def forget_page(self, client_id: int) -> None:
-        """A page is gone; what it held stays where it is."""
+        """Ends the drag of a page that is gone; the objects stay where they are."""
         self._actions.submit(lambda: self._end(client_id))
 
     def cancel_drag(self, client_id: int) -> bool:
-        """Puts back what a page drags; False if it drags nothing."""
-        if self._who != client_id or self._drag is None or self._drag.is_over:
+        """Cancels the drag of a page, if there is one; returns whether there was."""
+        if self._client_id != client_id or self._drag is None or self._drag.is_over:
             return False
         self._drag.cancel()
         return True
@@ -307,11 +307,11 @@ class Gizmo:
         middle = mean_center(view, names)
         if view.planar:
             right = max(float(instance_bounds(view.state, name)[1, 0]) for name in names)
-            # beside the selection, which the vertical arrow else hides from above
+            # beside the selection; else the vertical arrow would hide it from above
             return make_pose(p_AB=(right + 0.02, middle[1], middle[2]))
         R_SO = view.X_SO(names[0])[:3, :3]
-        alone = len(names) == 1
-        return make_pose(R_SO if alone and self._along_object else np.eye(3), middle)
+        is_single = len(names) == 1
+        return make_pose(R_SO if is_single and self._along_object else np.eye(3), middle)
 
     def _rings_pose(self, view: SessionView, names: tuple[str, ...]) -> Array:
         own = len(names) == 1 and not view.planar
@@ -335,30 +335,32 @@ class Gizmo:
             X_SG = make_pose(
                 rotation_from_quaternion(event.target.wxyz), np.array(event.target.position)
             )
-            who, client = event.client_id, event.client
+            client_id, client = event.client_id, event.client
             if event.phase == "start":
-                self._actions.submit(lambda: self._begin(who, part, X_SG), client)
+                self._actions.submit(lambda: self._begin(client_id, part, X_SG), client)
             elif event.phase == "update":
-                self._actions.submit(lambda: self._move(who, X_SG), client, key=f"gizmo {who}")
+                self._actions.submit(
+                    lambda: self._move(client_id, X_SG), client, key=f"gizmo {client_id}"
+                )
             else:
-                self._actions.submit(lambda: self._end(who), client)
+                self._actions.submit(lambda: self._end(client_id), client)
 
         return node
 
-    def _begin(self, who: int | None, part: _GizmoPart, X_SG: Array) -> None:
-        self._who, self._held, self._X_SGi = who, part, X_SG
+    def _begin(self, client_id: int | None, part: _GizmoPart, X_SG: Array) -> None:
+        self._client_id, self._dragged_part, self._X_SGi = client_id, part, X_SG
         session = self._actions.session
         self._drag = session.drag(session.view.selection)
 
-    def _move(self, who: int | None, X_SG: Array) -> None:
-        if who != self._who or self._drag is None or self._drag.is_over:
+    def _move(self, client_id: int | None, X_SG: Array) -> None:
+        if client_id != self._client_id or self._drag is None or self._drag.is_over:
             return
         self._drag.transform(X_SG @ inverse(self._X_SGi), changes_height=True)
 
-    def _end(self, who: int | None) -> None:
-        if who != self._who:
+    def _end(self, client_id: int | None) -> None:
+        if client_id != self._client_id:
             return
-        drag, self._drag, self._who, self._held = self._drag, None, None, None
+        drag, self._drag, self._client_id, self._dragged_part = self._drag, None, None, None
         if drag is not None and not drag.is_over:
             drag.end()
         self.show(self._actions.session.view)

@@ -25,9 +25,9 @@ from burg_drake.core import MissingDependencyError
 from burg_drake.ui.admission import Admission, RefusedError, Uploads
 
 MAX_MESSAGE_BYTES = 1 << 20
-"""Bytes of a message; the parts of an upload are half as large."""
-MESSAGE_RATE = 200.0  # Messages per second in the long run; a drag sends 50.
-MESSAGE_BURST = 400.0  # Messages at once.
+"""Maximum bytes of a message; the parts of an upload are half as large."""
+MESSAGE_RATE = 200.0  # Maximum messages per second in the long run; a drag sends 50.
+MESSAGE_BURST = 400.0  # Maximum messages at once.
 FIRST_MESSAGE_TYPE = "ViewerCameraMessage"
 """First message of a page; viser cleans up only after pages that sent it."""
 ACCEPTED_TYPES = frozenset(
@@ -49,11 +49,11 @@ ACCEPTED_TYPES = frozenset(
 )
 """Accepted types of messages: no forms, rendered pictures or sharing by a public tunnel."""
 _log = logging.getLogger(__name__)
-_log.addHandler(logging.NullHandler())  # what clients do wrong is not worth a line in the terminal
+_log.addHandler(logging.NullHandler())  # keeps errors of clients out of the terminal
 
 
 class _Message(msgspec.Struct):
-    """What decides about a message; the rest is viser's to read."""
+    """The fields of a message that are checked; viser reads the others."""
 
     type: str
     transfer_uuid: str = ""
@@ -68,7 +68,7 @@ _MESSAGE_DECODER = msgspec.msgpack.Decoder(_Message)
 
 
 class BoundedConnection(ServerConnection):
-    """A connection whose messages are paced and looked at; who sends what no page does, is out.
+    """A connection that limits the rate of messages and is closed after an unexpected one.
 
     Args:
         uploads: of all connections.
@@ -78,16 +78,16 @@ class BoundedConnection(ServerConnection):
         super().__init__(*arguments, **options)
         self._uploads = uploads
         self._connected = False
-        self._credit, self._paced = MESSAGE_BURST, time.monotonic()
+        self._credit, self._refilled = MESSAGE_BURST, time.monotonic()
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """The next message that is let through."""
+        """The next accepted message."""
         while True:
             raw = await super().recv(decode)
             await self._limit_rate()
             if isinstance(raw, str):
                 await self.close(1003)
-                continue  # which raises that the connection is closed
+                continue  # the next call raises ConnectionClosed
             try:
                 if self._accepts(_MESSAGE_DECODER.decode(raw)):
                     return raw
@@ -102,10 +102,10 @@ class BoundedConnection(ServerConnection):
         super().connection_lost(exc)
 
     def _accepts(self, message: _Message) -> bool:
-        """Whether viser gets a message.
+        """Whether a message is passed on to viser.
 
         Raises:
-            RefusedError: no page sends that.
+            RefusedError: our page sends no such message.
         """
         if message.type not in ACCEPTED_TYPES:
             _log.debug("dropped a %.60s from a browser", message.type)
@@ -128,10 +128,12 @@ class BoundedConnection(ServerConnection):
         return True
 
     async def _limit_rate(self) -> None:
-        """Waits if messages come too fast; what else is sent waits with the sender meanwhile."""
+        """Waits if messages come too fast; further ones wait at the sender meanwhile."""
         now = time.monotonic()
-        self._credit = min(MESSAGE_BURST, self._credit + MESSAGE_RATE * (now - self._paced)) - 1.0
-        self._paced = now
+        self._credit = (
+            min(MESSAGE_BURST, self._credit + MESSAGE_RATE * (now - self._refilled)) - 1.0
+        )
+        self._refilled = now
         if self._credit < 0.0:
             await asyncio.sleep(-self._credit / MESSAGE_RATE)
 
@@ -140,14 +142,14 @@ _PATCH_LOCK = threading.Lock()  # Held while viser's output is suppressed.
 
 
 def guarded_server(listener: socket.socket, admission: Admission) -> viser.ViserServer:
-    """Starts viser behind a guard.
+    """Starts viser with checks of requests, messages and uploads.
 
     Args:
         listener: listens on the port; viser closes it.
-        admission: judges requests.
+        admission: decides which requests are accepted.
 
     Raises:
-        MissingDependencyError: this viser does not open its port as the guard expects.
+        MissingDependencyError: this version of viser opens its port without the checks.
     """
     host, port = listener.getsockname()[:2]
     with _silence_viser(), _patch_viser_serve(listener, admission) as calls:
@@ -170,7 +172,7 @@ def stop_server(server: viser.ViserServer) -> None:
 
 @contextlib.contextmanager
 def _patch_viser_serve(listener: socket.socket, admission: Admission) -> Iterator[list[None]]:
-    """While it lasts, viser opens its port with a guard; yields a list of the calls that did."""
+    """Makes viser open its port with our checks; yields a list with one entry per opened port."""
     original = websockets.asyncio.server.serve
     calls: list[None] = []
 
@@ -199,7 +201,7 @@ def _patch_viser_serve(listener: socket.socket, admission: Admission) -> Iterato
 
 
 def _handle_error(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Errors are told, but for those of viser itself about values that no page sends."""
+    """Reports errors, except for those raised in viser about values that no page sends."""
     error = context.get("exception")
     places = [] if error is None else [*traceback.walk_tb(error.__traceback__)]
     if places and places[-1][0].f_globals.get("__name__", "").startswith("viser."):
@@ -209,7 +211,7 @@ def _handle_error(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> N
 
 
 def _forget_uploads(server: viser.ViserServer) -> None:
-    """viser keeps for pages to come how far uploads got, which they would show as their own."""
+    """Keeps viser from sending the progress of other pages' uploads to new pages."""
 
     def forget(client: object) -> None:
         server._websock_server.get_message_buffer().remove_from_buffer(
@@ -220,7 +222,7 @@ def _forget_uploads(server: viser.ViserServer) -> None:
 
 
 def _require_same_version(handler: Callable[[ServerConnection], Any]) -> Callable[..., Any]:
-    """viser's handler, for pages of the same version; of others it would print a line each time."""
+    """viser's handler, for pages of the same version only; it prints a line for each other one."""
     wanted = f"viser-v{viser.__version__}"
 
     async def checked(connection: ServerConnection) -> None:
@@ -234,7 +236,7 @@ def _require_same_version(handler: Callable[[ServerConnection], Any]) -> Callabl
 
 @contextlib.contextmanager
 def _silence_viser() -> Iterator[None]:
-    """While it lasts, viser prints nothing; others do. One thread at a time."""
+    """Suppresses the output of viser only. One thread at a time."""
     with _PATCH_LOCK:
         original = rich.print
 

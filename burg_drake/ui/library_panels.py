@@ -50,7 +50,7 @@ class LibraryPanel(SidePanel):
         self._objects = gui.add_folder(None)
 
     def show(self, view: SessionView, pictures: ObjectPictures) -> None:
-        """Brings the panel to a view.
+        """Updates the panel from a view.
 
         Args:
             view: of the session.
@@ -62,7 +62,7 @@ class LibraryPanel(SidePanel):
         self.draw()
 
     def draw(self) -> None:
-        """Shows the pictures that are there by now."""
+        """Shows the pictures that are finished."""
         assert self._pictures is not None
         for name, button in self._buttons.items():
             set_button_picture(button, self._pictures.get(name))
@@ -110,7 +110,7 @@ MAX_SEED = 2**31 - 1  # Largest seed of a random configuration.
 
 
 class FillPanel(SidePanel):
-    """Puts objects on the board at random, or takes all away."""
+    """Places objects on the board at random, or removes all of them."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         super().__init__(gui, actions)
@@ -134,7 +134,7 @@ class FillPanel(SidePanel):
             )
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         self._clear.disabled = not view.instances
 
     def _ask_to_clear(self, client: viser.ClientHandle | None) -> None:

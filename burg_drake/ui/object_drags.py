@@ -23,13 +23,13 @@ from burg_drake.ui.page_actions import PageActions
 
 @dataclass(eq=False)
 class _PageDrag:
-    """A drag of a page.
+    """A drag with the mouse on one page.
 
     Attributes:
         drag: of the session.
-        p_SM: (3,) what turns go about [m].
-        p_SG: (3,) what was grabbed [m].
-        x: of the pointer on the page at the start, 0 to 1.
+        p_SM: (3,) centre of turns [m].
+        p_SG: (3,) grabbed point [m].
+        x: horizontal position of the pointer at the start, 0 to 1 on the page.
         handle: of the gizmo, if one was grabbed.
     """
 
@@ -44,13 +44,13 @@ class ObjectDrags:
     """Makes handles in the scene draggable.
 
     Args:
-        actions: what may be done with the session.
-        gizmo: whose handles go before objects.
+        actions: of the page.
+        gizmo: its handles take precedence over objects.
     """
 
     def __init__(self, actions: PageActions, gizmo: Gizmo) -> None:
         self._actions, self._gizmo = actions, gizmo
-        self._held: dict[int, _PageDrag] = {}
+        self._page_drags: dict[int, _PageDrag] = {}
         self._turned_from: dict[int, Array] = {}
 
     def attach(self, handle: Any, name: str) -> None:
@@ -66,8 +66,8 @@ class ObjectDrags:
         handle.on_drag("left", modifier="shift")(turn)
 
     def is_end_of_turn(self, client_id: int, corners: Array) -> bool:
-        """Whether a rectangle of a page is the way of a pointer that has turned something: the
-        browser takes a drag with Shift for both.
+        """Whether a selection rectangle comes from a pointer that has turned an object: the browser
+        reports a drag with Shift as both.
 
         Args:
             client_id: of the page.
@@ -80,20 +80,20 @@ class ObjectDrags:
         )
 
     def forget_page(self, client_id: int) -> None:
-        """A page is gone; what it held stays where it is."""
+        """Ends the drag of a page that is gone; the objects stay where they are."""
         self._turned_from.pop(client_id, None)
         self._actions.submit(lambda: self._end(client_id))
 
     def cancel_drag(self, client_id: int) -> bool:
-        """Puts back what a page drags; False if it drags nothing."""
-        held = self._held.pop(client_id, None)
-        if held is None or held.drag.is_over:
+        """Cancels the drag of a page, if there is one; returns whether there was."""
+        page_drag = self._page_drags.pop(client_id, None)
+        if page_drag is None or page_drag.drag.is_over:
             return False
-        held.drag.cancel()
+        page_drag.drag.cancel()
         return True
 
     def _follow(self, event: Any, name: str, *, turns: bool) -> None:
-        """Takes what has happened on a page as an action; the event loop goes on at once."""
+        """Submits a drag event of a page as an action; does not block the event loop."""
         client, client_id = event.client, event.client_id
         x = float(event.end_screen_pos[0])
         camera = PageCamera.from_viser(client.camera)
@@ -118,35 +118,35 @@ class ObjectDrags:
         handle = self._gizmo.handle_under(camera, p_SG)
         names = view.selection if handle or name in view.selection else (name,)
         drag = self._actions.session.drag(names)
-        self._held[client_id] = _PageDrag(drag, mean_center(view, names), p_SG, x, handle)
+        self._page_drags[client_id] = _PageDrag(drag, mean_center(view, names), p_SG, x, handle)
 
     def _follow_pointer(
         self, client_id: int, camera: PageCamera, p_SQ: Array, x: float | None
     ) -> None:
-        """Moves what is held, or turns it if `x` is given."""
-        held = self._held.get(client_id)
-        if held is None:
+        """Moves the dragged objects, or turns them if `x` is given."""
+        page_drag = self._page_drags.get(client_id)
+        if page_drag is None:
             return
         X: Array | None = None
-        if held.handle is not None:
-            X = held.handle.motion(camera, held.p_SG, p_SQ)
+        if page_drag.handle is not None:
+            X = page_drag.handle.motion(camera, page_drag.p_SG, p_SQ)
         elif x is not None:
-            turn = 2.0 * np.pi * (x - held.x)  # a full turn over the width of the page
-            X = rotation_about_point(held.p_SM, rot_z(turn), np.zeros(3))
-        elif (p_SP := camera.on_plane(p_SQ, held.p_SG, (0.0, 0.0, 1.0))) is not None:
-            X = make_pose(p_AB=p_SP - held.p_SG)
+            turn = 2.0 * np.pi * (x - page_drag.x)  # a full turn over the width of the page
+            X = rotation_about_point(page_drag.p_SM, rot_z(turn), np.zeros(3))
+        elif (p_SP := camera.on_plane(p_SQ, page_drag.p_SG, (0.0, 0.0, 1.0))) is not None:
+            X = make_pose(p_AB=p_SP - page_drag.p_SG)
         if X is None:
             return
         try:
-            held.drag.transform(X, changes_height=held.handle is not None)
+            page_drag.drag.transform(X, changes_height=page_drag.handle is not None)
         except BurgError:
-            self._held.pop(client_id, None)  # one error; the rest of the gesture is ignored
+            self._page_drags.pop(client_id, None)  # report one error, ignore the rest of the drag
             raise
 
     def _end(self, client_id: int) -> None:
-        held = self._held.pop(client_id, None)
-        if held is not None and not held.drag.is_over:
-            held.drag.end()
+        page_drag = self._page_drags.pop(client_id, None)
+        if page_drag is not None and not page_drag.drag.is_over:
+            page_drag.drag.end()
 
 
 ADD_MODIFIER = "cmd/ctrl"  # Key that adds an object to the selection.
@@ -155,40 +155,40 @@ ADD_MODIFIER = "cmd/ctrl"  # Key that adds an object to the selection.
 class Picking:
     """Selects instances.
 
-    A click on an object reaches us twice, of the object and of the scene; the second one must not
-    be taken for a click beside all objects.
+    A click on an object is reported twice, by the object and by the scene; the second report must
+    not count as a click on the background.
 
     Args:
-        scene: of viser.
-        actions: what may be done with the session.
-        drags: with Shift they are no rectangles.
+        scene: API of viser.
+        actions: of the page.
+        drags: tells turns with Shift from selection rectangles.
     """
 
     def __init__(self, scene: viser.SceneApi, actions: PageActions, drags: ObjectDrags) -> None:
         self._actions, self._drags = actions, drags
-        self._last: tuple[int, tuple[float, float]] | None = None
+        self._last_object_click: tuple[int, tuple[float, float]] | None = None
 
-        async def beside(event: Any) -> None:
-            last, self._last = self._last, None
+        async def clear_selection(event: Any) -> None:
+            last, self._last_object_click = self._last_object_click, None
             if last != (event.client_id, tuple(event.screen_pos)):
                 actions.submit(lambda: actions.session.select(()), event.client)
 
-        scene.on_click()(beside)  # type: ignore[arg-type]
+        scene.on_click()(clear_selection)  # type: ignore[arg-type]
         for modifier in ("shift", "cmd/ctrl+shift"):
             scene.on_rect_select(modifier=modifier)(self._rectangle)  # type: ignore[arg-type]
 
     def attach(self, handle: Any, name: str) -> None:
         """Lets pages select an instance by a click on a handle of viser."""
 
-        async def choose(event: Any) -> None:
-            self._last = (event.client_id, tuple(event.screen_pos))
+        async def select(event: Any) -> None:
+            self._last_object_click = (event.client_id, tuple(event.screen_pos))
             self._actions.submit(lambda: self._actions.session.select((name,)), event.client)
 
         async def add(event: Any) -> None:
-            self._last = (event.client_id, tuple(event.screen_pos))
+            self._last_object_click = (event.client_id, tuple(event.screen_pos))
             self._actions.submit(lambda: self._toggle(name), event.client)
 
-        handle.on_click(choose)
+        handle.on_click(select)
         handle.on_click(modifier=ADD_MODIFIER)(add)
 
     async def _rectangle(self, event: Any) -> None:
@@ -196,15 +196,15 @@ class Picking:
         lower, upper = np.array(event.screen_min), np.array(event.screen_max)
         if self._drags.is_end_of_turn(event.client_id, np.stack([lower, upper])):
             return
-        more = ADD_MODIFIER in (event.modifier or "")
-        self._actions.submit(lambda: self._select_within(camera, lower, upper, more), event.client)
+        add = ADD_MODIFIER in (event.modifier or "")
+        self._actions.submit(lambda: self._select_within(camera, lower, upper, add), event.client)
 
-    def _select_within(self, camera: PageCamera, lower: Any, upper: Any, more: bool) -> None:
+    def _select_within(self, camera: PageCamera, lower: Any, upper: Any, add: bool) -> None:
         view = self._actions.session.view
         names = [
             name for name in view.instances if _is_center_within(view, name, camera, lower, upper)
         ]
-        before = view.selection if more else ()
+        before = view.selection if add else ()
         self._actions.session.select(dict.fromkeys((*before, *names)))
 
     def _toggle(self, name: str) -> None:
@@ -216,6 +216,6 @@ class Picking:
 
 
 def _is_center_within(view: Any, name: str, camera: PageCamera, lower: Any, upper: Any) -> bool:
-    """Whether the middle of an instance's bounds is seen within a rectangle."""
+    """Whether an instance's centre is projected into a rectangle."""
     seen = camera.on_screen(instance_center(view, name))[0]
     return bool((seen >= lower).all() and (seen <= upper).all())

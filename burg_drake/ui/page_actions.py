@@ -24,14 +24,14 @@ _log = logging.getLogger("burg_drake")
 
 @dataclass(frozen=True, eq=False)
 class _QueuedAction:
-    """An action that waits.
+    """A queued action.
 
     Attributes:
         action: to run.
-        who: asked for it, and hears of its errors.
-        key: a newer action of the same key takes the place of one that is still the last to wait.
-        due: when it may run if nothing waits behind it [s of the monotonic clock].
-        wait_for_typing: it hurries none that waits before it, but runs before that.
+        who: page that submitted it and is told of errors.
+        key: a new action replaces the last queued one if that has the same key.
+        due: when it may run if no other action follows [s of the monotonic clock].
+        wait_for_typing: whether it may run before delayed actions, without hurrying them.
     """
 
     action: Action
@@ -42,10 +42,10 @@ class _QueuedAction:
 
 
 class ActionQueue:
-    """Runs actions in a thread of its own.
+    """Runs actions in order, in its own thread.
 
     Args:
-        on_error: gets who asked, and one line that says what went wrong.
+        on_error: called with the page that submitted the action, and a one-line error message.
     """
 
     def __init__(self, on_error: ErrorCallback) -> None:
@@ -66,33 +66,34 @@ class ActionQueue:
         after: float = 0.0,
         wait_for_typing: bool = False,
     ) -> None:
-        """Puts an action last.
+        """Appends an action.
 
         Args:
-            action: to run; what it returns is dropped.
-            who: asks, and is told of errors.
-            key: it replaces an action of the same key that nothing waits behind, as of a drag only
-                the last position counts.
-            after: it waits that long for a newer one of its key [s], but never holds up others.
-            wait_for_typing: it only shows what is so, and does not hurry those that wait before it.
+            action: to run; its result is dropped.
+            who: page that is told of errors.
+            key: the action replaces the last queued one if that has the same key; of a drag, for
+                example, only the last position counts.
+            after: time to wait for a newer action of the same key [s]; a following action ends it.
+            wait_for_typing: for actions that only update the display: delayed actions before it
+                keep waiting.
         """
-        asked = _QueuedAction(action, who, key, time.monotonic() + after, wait_for_typing)
+        queued = _QueuedAction(action, who, key, time.monotonic() + after, wait_for_typing)
         with self._condition:
             if self._closed:
                 return
             waiting = [a for a in self._waiting if wait_for_typing or not a.wait_for_typing]
             if key and waiting and waiting[-1].key == key:
                 self._waiting.remove(waiting[-1])
-            self._waiting.append(asked)
+            self._waiting.append(queued)
             self._condition.notify_all()
 
     def idle(self, timeout: float) -> bool:
-        """Waits until nothing is left to do; False if that takes longer than `timeout` [s]."""
+        """Waits until all actions are done; False if not within `timeout` [s]."""
         with self._condition:
             return self._condition.wait_for(lambda: not self._waiting and not self._busy, timeout)
 
     def close(self) -> None:
-        """Ends the thread once all that was asked for is done."""
+        """Ends the thread after all queued actions."""
         with self._condition:
             self._closed = True
             self._condition.notify_all()
@@ -100,23 +101,23 @@ class ActionQueue:
             self._thread.join()
 
     def _run(self) -> None:
-        while (asked := self._next()) is not None:
+        while (queued := self._wait_for_next()) is not None:
             try:
-                asked.action()
+                queued.action()
             except BurgError as error:
-                self._on_error(asked.who, str(error))
-            except Exception as error:  # the page goes on, whatever one action stumbled over
+                self._on_error(queued.who, str(error))
+            except Exception as error:  # the page goes on after any error of an action
                 _log.exception("an action of the setup page failed")
-                self._on_error(asked.who, f"that failed unexpectedly: {error!r}")
+                self._on_error(queued.who, f"that failed unexpectedly: {error!r}")
 
-    def _next(self) -> _QueuedAction | None:
-        """The next action, as soon as it may run; None at the end."""
+    def _wait_for_next(self) -> _QueuedAction | None:
+        """Waits for the next action that may run; None after `close`."""
         with self._condition:
             self._busy = False
             self._condition.notify_all()
             while True:
                 now = time.monotonic()
-                if (ready := self._ready(now)) is not None:
+                if (ready := self._first_ready(now)) is not None:
                     self._busy = True
                     self._waiting.remove(ready)
                     return ready
@@ -124,12 +125,12 @@ class ActionQueue:
                     return None
                 self._condition.wait(min((a.due - now for a in self._waiting), default=None))
 
-    def _ready(self, now: float) -> _QueuedAction | None:
-        """The first that may run at a time."""
-        hurried = self._closed or len([a for a in self._waiting if not a.wait_for_typing]) > 1
-        for asked in self._waiting:
-            if asked.due <= now or (hurried and not asked.wait_for_typing) or self._closed:
-                return asked
+    def _first_ready(self, now: float) -> _QueuedAction | None:
+        """The first action that may run at time `now`; None if there is none."""
+        delays_end = self._closed or len([a for a in self._waiting if not a.wait_for_typing]) > 1
+        for queued in self._waiting:
+            if queued.due <= now or (delays_end and not queued.wait_for_typing) or self._closed:
+                return queued
         return None
 
 
@@ -137,59 +138,59 @@ TYPING_DELAY = 0.8
 """Seconds after the last key until a number counts, unless Enter ends the typing."""
 NAME_TYPING_DELAY = 2.0  # Seconds after the last key until a name counts.
 CROSSING_TIME = 2.0
-"""Seconds after a field was set in which typed values may have been sent before."""
+"""Seconds after a field was set during which typed values sent earlier may still arrive."""
 
 
 class TypedField:
-    """A field that is typed in.
+    """A field for typing.
 
     Args:
-        handle: of viser; it sends each key.
-        ask: has an action done; `PageActions.submit`.
-        action: done with what was typed.
-        after: the last key [s].
+        handle: of viser; it sends the value after each key.
+        submit: submits an action; `PageActions.submit`.
+        action: called with the typed value.
+        after: delay after the last key [s].
 
     Attributes:
         handle: of viser.
     """
 
     def __init__(
-        self, handle: Any, ask: Callable[..., None], action: Callable[[Any], Any], after: float
+        self, handle: Any, submit: Callable[..., None], action: Callable[[Any], Any], after: float
     ) -> None:
         self.handle = handle
         self._action = action
-        self._typed = self._taken = 0
+        self._typed = self._applied = 0
         self._set_at = -CROSSING_TIME
         self._crossed = False
 
         @handle.on_update
         async def _(event: Any) -> None:
-            if event.client_id is None:  # it was this program
+            if event.client_id is None:  # changed by this program
                 return
             self._typed += 1
             self._crossed |= time.monotonic() - self._set_at < CROSSING_TIME
             number, value = self._typed, event.target.value
-            ask(
-                lambda: self._take(number, value),
+            submit(
+                lambda: self._apply(number, value),
                 event.client,
                 key=f"typed {id(self)}",
                 after=after,
             )
 
     def show(self, value: Any) -> None:
-        """Shows what is so, unless the user is still typing."""
-        if self._taken != self._typed:
+        """Shows the current value, unless the user is still typing."""
+        if self._applied != self._typed:
             return
         if self.handle.value == value and self._crossed:
-            # viser sends nothing if it believes that it is so
+            # viser sends nothing if the value is the same as the last that it knows
             self.handle.value = _different_value(value)
         if self.handle.value != value:
             self.handle.value = value
             self._set_at = time.monotonic()
         self._crossed = False
 
-    def _take(self, number: int, value: Any) -> None:
-        self._taken = number
+    def _apply(self, number: int, value: Any) -> None:
+        self._applied = number
         self._action(value)
 
 
@@ -203,16 +204,16 @@ WARNING_DURATION = 12.0  # Seconds that a warning or an error stays on the page.
 
 
 class PageActions:
-    """What panels may do.
+    """Connects controls of panels with actions on the session, and shows messages.
 
     Args:
-        server: to show messages with.
+        server: that shows the messages.
         session: the scene.
 
     Attributes:
-        queue: in which all actions are done.
-        submit: puts an action into it, with the page that hears of errors.
-        on_refused: called after an action that was refused: fields show again what is so.
+        queue: runs all actions.
+        submit: appends an action to the queue, with the page that is told of errors.
+        on_refused: called after an action that failed, so that fields show the current values.
     """
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
@@ -224,11 +225,11 @@ class PageActions:
         self._messages: WeakKeyDictionary[viser.ClientHandle, list[Any]] = WeakKeyDictionary()
 
     def on_click(self, button: Any, action: Callable[[], Any]) -> Any:
-        """Has something done at each click of a button; gives the button."""
+        """Submits an action at each click of a button; returns the button."""
         return self.on_page_click(button, lambda client: action())
 
     def on_page_click(self, button: Any, action: Callable[[viser.ClientHandle | None], Any]) -> Any:
-        """The same, of an action that needs to know whose page it was."""
+        """Like `on_click`, for an action that takes the page that was clicked on."""
 
         @button.on_click
         async def _(event: Any) -> None:
@@ -237,17 +238,17 @@ class PageActions:
         return button
 
     def on_choice(self, field: Any, action: Callable[[Any], Any], *, key: str = "") -> Any:
-        """Has something done with each value that a user gives a field; gives the field.
+        """Submits an action for each value that a user sets in a field; returns the field.
 
         Args:
             field: of viser.
-            action: gets the value.
+            action: called with the value.
             key: see `ActionQueue.submit`.
         """
 
         @field.on_update
         async def _(event: Any) -> None:
-            if event.client_id is None:  # it was this program
+            if event.client_id is None:  # changed by this program
                 return
             value = event.target.value
             self.submit(lambda: action(value), event.client, key=key)
@@ -257,15 +258,15 @@ class PageActions:
     def typed_field(
         self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING_DELAY
     ) -> TypedField:
-        """The same of a field that is typed in: `after` the last key, or when typing ends."""
+        """Like `on_choice`, for typing: acts `after` the last key, or when typing ends."""
         return TypedField(field, self.submit, action, after)
 
     def show_message(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
-        """Shows a page what was done; every page if `client` is None."""
+        """Shows a message on a page; on every page if `client` is None."""
         self._show(client, title or "Done", line, "green", 5.0)
 
     def show_warning(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
-        """Shows a page what it should know."""
+        """Shows a warning on a page; on every page if `client` is None."""
         self._show(client, title or "Please note", line, "orange", WARNING_DURATION)
 
     def _show_error(self, client: viser.ClientHandle | None, line: str) -> None:
@@ -275,7 +276,7 @@ class PageActions:
     def _show(
         self, client: viser.ClientHandle | None, title: str, line: str, color: Any, seconds: float
     ) -> None:
-        max_messages = 3  # Messages on a page at a time; the oldest make room for a new one.
+        max_messages = 3  # Messages on a page at a time; new ones replace the oldest.
         clients = [client] if client is not None else self._server.get_clients().values()
         for each in clients:
             shown = self._messages.setdefault(each, [])

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ServedPage:
-    """An open door; closed by `close` or at the end of a `with`.
+    """A page that is being served, until `close` or the end of a `with` block.
 
     Attributes:
-        server: viser's, to build the page on.
-        host: the address that is listened on.
-        port: likewise.
-        admission: who may come in.
+        server: viser's server, to build the page on.
+        host: address that the server listens on.
+        port: that the server listens on.
+        admission: decides which requests are accepted.
     """
 
     server: viser.ViserServer
@@ -35,18 +35,18 @@ class ServedPage:
 
     @property
     def address(self) -> str:
-        """Of the page, for browsers that were let in."""
+        """Address of the page for admitted browsers."""
         return page_url(self.host, self.port)
 
     @property
     def url(self) -> str:
-        """Address of the page for the next browser; with a token, good for this one alone, if
-        other machines can reach it."""
+        """Address of the page for the next browser; with a token for one browser if other machines
+        can reach the page."""
         token = self.admission.token
         return f"{self.address}?token={token}" if token else self.address
 
     def close(self) -> None:
-        """Stops serving; browsers see that the connection is lost."""
+        """Stops serving; browsers show that the connection is lost."""
         from burg_drake.ui.guarded_viser import stop_server
 
         stop_server(self.server)
@@ -59,10 +59,10 @@ class ServedPage:
 
 
 def require_viser() -> None:
-    """Raises what is missing.
+    """Checks that the packages for the page are installed.
 
     Raises:
-        MissingDependencyError: viser, or what the door needs besides, is not installed.
+        MissingDependencyError: viser, websockets or msgspec is not installed.
     """
     for name in ("viser", "websockets", "msgspec"):
         if find_spec(name) is None:
@@ -72,7 +72,7 @@ def require_viser() -> None:
 def serve_page(
     host: str = "127.0.0.1", port: int | None = None, *, title: str = "burg_drake"
 ) -> ServedPage:
-    """Opens the door to an empty page.
+    """Serves an empty page.
 
     Args:
         host: address to listen on; only this machine can reach the default.
@@ -81,7 +81,7 @@ def serve_page(
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
-        MissingDependencyError: viser is not installed, or is one that cannot be guarded.
+        MissingDependencyError: viser is not installed, or this version cannot be guarded.
     """
     require_viser()
     from burg_drake.ui.admission import Admission
@@ -103,16 +103,16 @@ def serve_page(
 
 
 def require_guarded(address: str, port: int) -> None:
-    """Connects as a foreign site would.
+    """Checks that the server refuses requests of foreign web sites.
 
     Args:
-        address: that is listened on.
-        port: likewise.
+        address: that the server listens on.
+        port: that the server listens on.
 
     Raises:
-        MissingDependencyError: what is foreign was let in.
+        MissingDependencyError: a foreign request was accepted.
     """
-    foreign_host = "foreign.invalid"  # Name that no page of ours has.
+    foreign_host = "foreign.invalid"  # Host name of another site.
     # Headers of a websocket handshake.
     handshake = {
         "Connection": "Upgrade",

@@ -1,4 +1,4 @@
-"""What panels are made of: texts as HTML, colours of statuses, buttons, and their base class."""
+"""Parts of panels: texts as HTML, colours of statuses, buttons, and the base class."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ Rgb8 = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class StatusStyle:
-    """How a status of an instance is shown.
+    """Colour and text of an instance's status.
 
     Attributes:
         color: red, green, blue as bytes.
-        words: for people.
+        words: text on the page.
     """
 
     color: Rgb8
@@ -31,7 +31,7 @@ class StatusStyle:
 
     @property
     def hex(self) -> str:
-        """The colour as HTML has it."""
+        """The colour in HTML notation."""
         return "#" + bytes(self.color).hex()
 
 
@@ -52,7 +52,7 @@ FIXED_COLOR: Rgb8 = (150, 155, 162)
 
 
 def status_style(status: str) -> StatusStyle:
-    """How a status is shown."""
+    """The style of a status."""
     return STATUS_STYLES.get(status, UNCHECKED_STYLE)
 
 
@@ -62,7 +62,7 @@ def paragraph(*children: Child) -> str:
 
 
 def title_html(text: str) -> Html:
-    """The name of what a panel is about."""
+    """The title of a panel."""
     return element("span", text, class_="bd-title")
 
 
@@ -72,17 +72,17 @@ def small_heading(text: str) -> Html:
 
 
 def secondary_text(text: Child) -> Html:
-    """A line that stands back."""
+    """A line of secondary text."""
     return element("div", text, class_="bd-quiet")
 
 
 def color_dot(color: str) -> Html:
-    """A small disc in a colour as HTML has it."""
+    """A small disc in a colour, in HTML notation."""
     return element("span", class_="bd-dot", style=f"background:{color}")
 
 
 def status_chip(status: str, count: int) -> Html:
-    """How many instances have a status."""
+    """Number of instances with a status."""
     style = status_style(status)
     return element("span", color_dot(style.hex), f"{count} {style.words}", class_="bd-chip")
 
@@ -98,7 +98,7 @@ def html_table(heads: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers
     Args:
         heads: of its columns.
         rows: their cells.
-        numbers: how many columns, from the right, have numbers.
+        numbers: count of number columns, from the right.
     """
     names = list(heads)
     classes = [None] * (len(names) - numbers) + ["bd-number"] * numbers
@@ -111,7 +111,7 @@ def html_table(heads: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers
 
 
 def notice_html(text: str) -> Html:
-    """A line that the user should see."""
+    """A highlighted line for the user."""
     return element("div", text, class_="bd-notice")
 
 
@@ -127,12 +127,12 @@ def text_button(
     """A button with a label.
 
     Args:
-        gui: of viser.
+        gui: API of viser.
         label: on it.
         width: twelfths of the panel: 2, 3, 4, 6 or 12.
         icon: beside the label, one of `viser.Icon`.
-        primary: it stands out.
-        options: as of viser's `add_button`.
+        primary: whether to highlight the button.
+        options: of viser's `add_button`.
     """
     look = "bd-strong-button" if primary else "bd-quiet-button"
     return _mark_button(gui.add_button(label, **options), icon, width, look)
@@ -157,7 +157,7 @@ def set_button_picture(button: Any, png: bytes | None, *, chosen: bool = False) 
     Args:
         button: of `picture_button`.
         png: a blank if None.
-        chosen: it gets a frame.
+        chosen: whether to draw a frame around it.
     """
     kind = "bd-mark bd-picture bd-4" + (" bd-chosen" if chosen else "")
     picture = element("span", class_=kind)
@@ -181,15 +181,15 @@ def ask_for_confirmation(
     label: str,
     action: Callable[[], Any],
 ) -> None:
-    """Asks a page whether something shall be done.
+    """Asks on a page for confirmation of an action.
 
     Args:
         actions: of the page.
         client: the page.
         title: of the question.
         text: what would be lost.
-        label: of the button that does it.
-        action: what it does.
+        label: of the button that confirms.
+        action: run if confirmed.
     """
     gui = client.gui
     modal = gui.add_modal(title)
@@ -210,15 +210,15 @@ class SidePanel:
     """A panel beside the scene.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         self._gui, self._actions = gui, actions
 
     def _button(self, label: str, action: Callable[[], Any], **options: Any) -> Any:
-        """Adds a button; `options` as of `_page_button`."""
+        """Adds a button; see `text_button` for `options`."""
         return self._page_button(label, lambda client: action(), **options)
 
     def _selection_button(
@@ -231,6 +231,6 @@ class SidePanel:
     def _page_button(
         self, label: str, action: Callable[[viser.ClientHandle | None], Any], **options: Any
     ) -> Any:
-        """Adds a button whose action gets the page that it was clicked on; `options` as of
-        `text_button`."""
+        """Adds a button whose action takes the page that it was clicked on; see `text_button` for
+        `options`."""
         return self._actions.on_page_click(text_button(self._gui, label, **options), action)

@@ -30,12 +30,12 @@ from burg_drake.visualization import Html, element
 
 
 class SummaryPanel(SidePanel):
-    """Says how the scene is, and takes steps back.
+    """Shows name and state of the scene, with buttons for undo and redo.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-        keys: the list of mouse and keys.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
+        keys: dialog with mouse actions and shortcuts.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, keys: KeysDialog) -> None:
@@ -50,7 +50,7 @@ class SummaryPanel(SidePanel):
         )
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         self._text.content = paragraph(*_summary_html(view))
         self._dismiss.visible = bool(view.notices)
         _set_enabled(self._undo, view.undo_label, "Undo")
@@ -79,17 +79,17 @@ def _summary_html(view: SessionView) -> list[Html]:
     ]
 
 
-_LIBRARY_KEY = re.compile(rb"^library:", re.MULTILINE)  # Line by which a file is known as a scene.
+_LIBRARY_KEY = re.compile(rb"^library:", re.MULTILINE)  # Line that identifies a scene file.
 
 
 def scene_names(folder: Path) -> tuple[str, ...]:
     """Names of the scene files of a folder, without their suffix, in alphabetical order.
 
     Args:
-        folder: that was opened; what is in it may be unreadable, and is left out then.
+        folder: that was opened; unreadable files in it are left out.
     """
-    max_files = 500  # Files that are read.
-    head_bytes = 4096  # Bytes at the start of a file in which a scene names its library.
+    max_files = 500  # Maximum number of files read.
+    head_bytes = 4096  # Bytes from the start of a file that are searched for the library.
     found = []
     try:
         files = sorted(folder.glob("*.yaml"))
@@ -140,7 +140,7 @@ class FilePanel(SidePanel):
             )
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view; nothing of it changes while something is dragged."""
+        """Updates the panel from a view, but not during a drag."""
         if view.dragging:
             return
         name = view.path.stem if view.path else view.document.name
@@ -157,7 +157,7 @@ class FilePanel(SidePanel):
             self._shown_library = self._library.value = library
 
     def save(self, client: Client) -> None:
-        """Writes the scene to the file of the name that stands in the field."""
+        """Saves the scene under the name in the field."""
         session, name = self._actions.session, self._name.value.strip()
         view = session.view
         own = view.path is not None and name == view.path.stem
@@ -175,7 +175,7 @@ class FilePanel(SidePanel):
         self._actions.show_message(client, str(view.path), "Saved")
 
     def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
-        """Goes over to another scene, and asks first if something would be lost."""
+        """Opens another scene; asks first if changes would be lost."""
         discard = partial(open, name, discard=True)
         try:
             open(name)
@@ -185,14 +185,14 @@ class FilePanel(SidePanel):
     def _confirm(
         self, client: Client, error: BurgError, title: str, label: str, action: Callable[[], Any]
     ) -> None:
-        """Asks a page whether something shall be done in spite of an error, which is raised if
-        there is no page to ask."""
+        """Asks on a page whether to act in spite of an error; raises the error if there is no page
+        to ask."""
         if client is None:
             raise error
         ask_for_confirmation(self._actions, client, title, str(error), label, action)
 
     def print_out(self, client: Client) -> None:
-        """Sends the printout of the board to a page."""
+        """Sends the printout of the board to a page, as a download."""
         session = self._actions.session
         printout = session.printout(PrintSettings(page=self._page.value, instructions=True))
         for warning in printout.warnings:

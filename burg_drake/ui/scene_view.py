@@ -36,12 +36,12 @@ from burg_drake.visualization import linear_light
 
 @dataclass(frozen=True, eq=False)
 class ObjectMesh:
-    """An object to look at.
+    """The mesh of an object for the browser.
 
     Attributes:
-        glb: it looks, as a binary glTF whose axes are those of the object frame.
-        vertices: (N, 3) of its plain shape in the object frame [m].
-        faces: (M, 3) of its plain shape.
+        glb: mesh with materials in the object frame, as binary glTF.
+        vertices: (N, 3) of the mesh without materials in the object frame [m].
+        faces: (M, 3) of the mesh without materials.
     """
 
     glb: bytes
@@ -55,26 +55,26 @@ class ObjectMesh:
 
 
 class ObjectMeshes:
-    """Shapes by object.
+    """Meshes by object name, loaded when first used.
 
     Args:
-        library: where the objects are.
+        library: of the objects.
     """
 
     def __init__(self, library: ObjectLibrary) -> None:
         self.library = library
-        self._known: dict[str, ObjectMesh] = {}
+        self._meshes: dict[str, ObjectMesh] = {}
 
     def __getitem__(self, name: str) -> ObjectMesh:
-        """The shape of an object.
+        """The mesh of an object.
 
         Raises:
-            UnknownNameError: no such object, or its file is missing.
+            UnknownNameError: there is no such object, or its file is missing.
             MeshError: its file is damaged.
         """
-        if name not in self._known:
-            self._known[name] = _read_mesh(self.library, name)
-        return self._known[name]
+        if name not in self._meshes:
+            self._meshes[name] = _read_mesh(self.library, name)
+        return self._meshes[name]
 
 
 def _read_mesh(library: ObjectLibrary, name: str) -> ObjectMesh:
@@ -87,7 +87,7 @@ def _read_mesh(library: ObjectLibrary, name: str) -> ObjectMesh:
                 _make_matte(part)
             glb = scene.export(file_type="glb", include_normals=True)
         plain = trimesh.util.concatenate([_geometry_only(part) for part in parts])
-    except Exception as error:  # the reader raises whatever it stumbles over
+    except Exception as error:  # the reader may raise any exception
         raise library.damaged(path) from error
     if not len(plain.faces):
         raise MeshError(f"{path} has no faces")
@@ -100,7 +100,7 @@ def _read_mesh(library: ObjectLibrary, name: str) -> ObjectMesh:
 
 
 def _make_matte(part: trimesh.Trimesh) -> None:
-    """Gives a part a surface that does not shine like metal, which glTF takes for the default."""
+    """Gives a part a matte material; the default of glTF is metallic."""
     max_texture = 1024  # Pixels along each side; larger textures are reduced.
     material = getattr(part.visual, "material", None)
     if material is None:
@@ -108,7 +108,7 @@ def _make_matte(part: trimesh.Trimesh) -> None:
     if hasattr(material, "to_pbr"):
         material = material.to_pbr()
     material.metallicFactor, material.roughnessFactor = 0.0, 0.75  # paper, paint and plastic
-    if material.baseColorFactor is not None:  # of colours as files have them; glTF has light
+    if material.baseColorFactor is not None:  # files have sRGB colours; glTF has linear light
         r, g, b, a = np.asarray(material.baseColorFactor, dtype=float) / 255.0
         material.baseColorFactor = [*(float(linear_light(c)) for c in (r, g, b)), a]
     image = material.baseColorTexture
@@ -131,13 +131,13 @@ OUTLINE_LINE_WIDTH = 2.0  # Pixels; outlines of selected objects are wider.
 
 @dataclass(frozen=True, eq=False)
 class ShownInstance:
-    """An instance as it is to be shown.
+    """The appearance of an instance.
 
     Attributes:
         object: its name in the library.
         X_SO: (4, 4) pose.
         status: see `STATUS_STYLES`.
-        selected: whether it is.
+        selected: whether it is selected.
         fixed: whether it is background.
     """
 
@@ -150,7 +150,7 @@ class ShownInstance:
 
 @dataclass(eq=False)
 class _InstanceNodes:
-    """What stands for an instance in the browser."""
+    """The nodes of an instance in viser's scene."""
 
     object: str
     frame: viser.FrameHandle
@@ -163,12 +163,13 @@ class _InstanceNodes:
 
 
 class SceneView:
-    """Shows instances and tells which one the pointer is on.
+    """Shows the instances of a scene.
 
     Args:
-        scene: viser's, in whose world the scene frame is the origin.
+        scene: API of viser, whose world frame is the scene frame.
         shapes: of the library's objects.
-        attach: called with each new handle that pointers may touch, and its instance.
+        attach: called with each new handle that can be clicked or dragged, and its instance's
+            name.
     """
 
     def __init__(
@@ -179,16 +180,16 @@ class SceneView:
         self._attach = attach
         self._nodes: dict[str, _InstanceNodes] = {}
         self._coloring: Coloring = "objects"
-        self._made = 0
+        self._color_count = 0
 
     def use_library(self, shapes: ObjectMeshes) -> None:
-        """Shows objects of another library from now on."""
+        """Uses the meshes of another library from now on."""
         if shapes is not self._shapes:
             self.show({}, self._coloring)
             self._shapes = shapes
 
     def show(self, instances: Mapping[str, ShownInstance], coloring: Coloring) -> None:
-        """Brings the browser to a scene; only what is not yet so is sent."""
+        """Shows instances in the browser; sends changes only."""
         self._coloring = coloring
         for name in list(self._nodes):
             if name not in instances or instances[name].object != self._nodes[name].object:
@@ -204,12 +205,12 @@ class SceneView:
         nodes.frame.remove()
 
     def _add(self, name: str, shown: ShownInstance) -> _InstanceNodes:
-        ball_radius = 0.03  # Metres, of the ball that replaces an unreadable shape.
+        ball_radius = 0.03  # Metres; a ball replaces an unreadable mesh.
         frame = self._scene.add_frame(f"{OBJECTS_NODE}/{name}", show_axes=False)
         mesh: Any
         try:
             shape = self._shapes[shown.object]
-        except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
+        except BurgError:  # the issues report the error; the ball shows the position
             mesh = self._scene.add_icosphere(
                 f"{OBJECTS_NODE}/{name}/look", radius=ball_radius, color=(200, 60, 200)
             )
@@ -225,13 +226,13 @@ class SceneView:
             thickness=OUTLINE_LINE_WIDTH,
             thickness_units="screen",
         )
-        self._made += 1
-        red, green, blue = distinct_colors(self._made)[-1]
+        self._color_count += 1
+        red, green, blue = distinct_colors(self._color_count)[-1]
         color = (round(255 * red), round(255 * green), round(255 * blue))
         return _InstanceNodes(shown.object, frame, mesh, np.asarray(p_OV), outline, color)
 
     def _update(self, nodes: _InstanceNodes, name: str, shown: ShownInstance) -> None:
-        outline_height = 4e-4  # Metres over the board; at its own height outlines would flicker.
+        outline_height = 4e-4  # Metres above the board; on the board, outlines would flicker.
         nodes.frame.position = shown.X_SO[:3, 3]
         nodes.frame.wxyz = quaternion_from_rotation(shown.X_SO[:3, :3])
         self._paint(nodes, name, shown)
@@ -275,13 +276,13 @@ def _status_color(shown: ShownInstance) -> Rgb8:
 
 
 def footprint(p_OV: Array, X_SO: Array, height: float, margin: float = 0.004) -> Array:
-    """The outline of an object's convex hull from above.
+    """The outline of an object's convex hull in the view from above.
 
     Args:
         p_OV: (N, 3) vertices of the object [m].
-        X_SO: (4, 4) its pose.
+        X_SO: (4, 4) pose of the object.
         height: z of the outline in S [m].
-        margin: by which it is larger than the object [m].
+        margin: distance between the outline and the hull [m].
 
     Returns:
         (M, 2, 3) segments of a closed line in S [m].
@@ -296,10 +297,10 @@ def footprint(p_OV: Array, X_SO: Array, height: float, margin: float = 0.004) ->
 
 
 class ProposalView:
-    """Shows a proposal of the session.
+    """Shows the settled poses of a proposal.
 
     Args:
-        scene: of viser.
+        scene: API of viser.
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -308,10 +309,10 @@ class ProposalView:
         self._handles: list[Any] = []
 
     def show(self, proposal: SettlingProposal | None, shapes: ObjectMeshes) -> None:
-        """Brings the browser to a proposal, or to none.
+        """Shows a proposal in the browser.
 
         Args:
-            proposal: of the view.
+            proposal: of the view; None hides it.
             shapes: of the library's objects.
         """
         if proposal is self._shown:
@@ -322,7 +323,7 @@ class ProposalView:
         self._handles = []
         if proposal is None:
             return
-        # The shade of an object that moves less would flicker within it.
+        # The ghost of an object that moves less would flicker within the object.
         moved = names_of_moved_instances(proposal, distance=2e-3, angle_deg=2.0)
         for instance in proposal.document.instances:
             if instance_name(instance) in moved:
@@ -331,7 +332,7 @@ class ProposalView:
     def _add(self, name: str, object: str, X_SO: Any, shapes: ObjectMeshes) -> None:
         try:
             shape = shapes[object]
-        except BurgError:  # what is wrong with it is told elsewhere
+        except BurgError:  # the issues report the error
             return
         self._handles.append(
             self._scene.add_mesh_simple(
@@ -349,10 +350,10 @@ class ProposalView:
 
 
 class HeightView:
-    """Shows how far selected objects are above what is below them.
+    """Shows the heights of selected objects above the surface below them.
 
     Args:
-        scene: of viser.
+        scene: API of viser.
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -360,9 +361,9 @@ class HeightView:
         self._shown: dict[str, tuple[viser.LineSegmentsHandle, viser.LabelHandle]] = {}
 
     def show(self, view: SessionView) -> None:
-        """Brings the browser to a view."""
+        """Updates lines and labels from a view."""
         for name in [name for name in self._shown if name not in view.gaps]:
-            self._shown.pop(name)[0].remove()  # and the label below it
+            self._shown.pop(name)[0].remove()  # also removes its child, the label
         for name, gap in view.gaps.items():
             lower, upper = instance_bounds(view.state, name)
             x, y = (lower[:2] + upper[:2]) / 2.0

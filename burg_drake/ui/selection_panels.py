@@ -49,9 +49,9 @@ class ObjectPanel(SidePanel):
     """Shows the selection and edits it.
 
     Args:
-        gui: of viser, in whose container the panel goes.
-        actions: what it may do.
-        switch_axes: makes arrows lie along the board or along the object.
+        gui: API of viser, inside the container for the panel.
+        actions: of the page.
+        switch_axes: switches the arrows between the axes of the board and of the object.
     """
 
     def __init__(
@@ -60,8 +60,8 @@ class ObjectPanel(SidePanel):
         super().__init__(gui, actions)
         session = actions.session
         self._text = gui.add_html("")
-        self._one = gui.add_folder(None)
-        with self._one:
+        self._instance_folder = gui.add_folder(None)
+        with self._instance_folder:
             self._name = actions.typed_field(
                 gui.add_text("Name", ""), self._rename, after=NAME_TYPING_DELAY
             )
@@ -71,7 +71,7 @@ class ObjectPanel(SidePanel):
                 ),
                 lambda fixed: session.do(SetFixed(session.view.selection, fixed)),
             )
-            self._numbers = _PoseFields(gui, actions)
+            self._pose_fields = _PoseFields(gui, actions)
         self._restrict = actions.on_choice(
             gui.add_checkbox(
                 "Keep upright",
@@ -88,22 +88,22 @@ class ObjectPanel(SidePanel):
             hint="Arrows lie along the axes of the board, or of the object (X); rings always"
             " lie about those of the object",
         )
-        self._some = gui.add_folder(None)
-        with self._some:
+        self._selection_folder = gui.add_folder(None)
+        with self._selection_folder:
             self._add_buttons()
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         names = view.selection
         self._restrict.value = view.planar
-        self._one.visible = len(names) == 1
-        self._some.visible = bool(names)
+        self._instance_folder.visible = len(names) == 1
+        self._selection_folder.visible = bool(names)
         self._axes.visible = len(names) == 1 and not view.planar
         self._text.content = _selection_html(view)
         if len(names) == 1:
             self._name.show(names[0])
             self._fixed.value = view.instances[names[0]] in view.document.background
-            self._numbers.show(view.X_SO(names[0]), free=not view.planar)
+            self._pose_fields.show(view.X_SO(names[0]), free=not view.planar)
 
     def _rename(self, new: str) -> None:
         names = self._actions.session.view.selection
@@ -144,7 +144,7 @@ class _PoseFields:
         self._angles.show(angles)
 
     def _place(self, typed_mm: tuple[float, ...]) -> None:
-        """Moves the selected object; numbers that were left alone stay exact."""
+        """Moves the selected object; coordinates that were not edited stay exact."""
         if (X_SO := self._selected()) is None:
             return
         shown_mm, _ = _pose_numbers(X_SO)
@@ -159,7 +159,7 @@ class _PoseFields:
             self._turn_freely((*_pose_numbers(X_SO)[1][:2], yaw_deg))
 
     def _turn_freely(self, typed_deg: tuple[float, ...]) -> None:
-        """Turns the selected object; angles that were left alone stay exact."""
+        """Turns the selected object; angles that were not edited stay exact."""
         if (X_SO := self._selected()) is None:
             return
         _, shown_deg = _pose_numbers(X_SO)
@@ -170,7 +170,7 @@ class _PoseFields:
         self._move(X_SO, "angles")
 
     def _selected(self) -> Array | None:
-        """(4, 4) pose of the selected object; None unless it is one."""
+        """(4, 4) pose of the selected object; None unless one object is selected."""
         view = self._actions.session.view
         return view.X_SO(view.selection[0]) if len(view.selection) == 1 else None
 
@@ -181,7 +181,7 @@ class _PoseFields:
 
 
 def _pose_numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """x, y, z [mm] and roll, pitch, yaw [degrees], rounded for people."""
+    """x, y, z [mm] and roll, pitch, yaw [degrees], rounded for display."""
     position = tuple((np.round(1e3 * X_SO[:3, 3], 2) + 0.0).tolist())
     angles = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
     return position, tuple((np.round(angles, 2) + 0.0).tolist())
@@ -212,7 +212,7 @@ def _selection_html(view: SessionView) -> str:
 
 
 class PosePanel(SidePanel):
-    """Offers the stable poses that the objects selected have in common."""
+    """Offers the stable poses of the selected object, or of several of the same kind."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         super().__init__(gui, actions)
@@ -225,7 +225,7 @@ class PosePanel(SidePanel):
         self._chosen: int | None = None
 
     def show(self, view: SessionView, pictures: ObjectPictures) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         objects = {view.instances[name].object for name in view.selection}
         self._folder.visible = bool(objects)
         object = objects.pop() if len(objects) == 1 else None
@@ -237,7 +237,7 @@ class PosePanel(SidePanel):
         self.draw()
 
     def draw(self) -> None:
-        """Shows the pictures that are there by now."""
+        """Shows the pictures that are finished."""
         if self._object is None or self._pictures is None:
             return
         for k, button in enumerate(self._buttons):
@@ -249,7 +249,7 @@ class PosePanel(SidePanel):
         session.do(SetPose(session.view.selection, stable_pose))
 
     def _fill(self, entry: ObjectEntry | None) -> None:
-        max_poses = 12  # Poses that are offered; further ones are improbable.
+        max_poses = 12  # Maximum number of poses offered; further ones are improbable.
         for button in self._buttons:
             button.remove()
         self._buttons = []
@@ -273,7 +273,7 @@ class PosePanel(SidePanel):
 
 def _current_stable_pose(view: SessionView) -> int | None:
     """The stable pose that a single selected object is in."""
-    max_tilt = 0.02  # Radians between an object and the stable pose that it is in.
+    max_tilt = 0.02  # Maximum angle between an object and its stable pose, in radians.
     if len(view.selection) != 1:
         return None
     (name,) = view.selection
@@ -289,7 +289,7 @@ def _current_stable_pose(view: SessionView) -> int | None:
 
 
 class ArrangePanel(SidePanel):
-    """Buttons that move what is selected."""
+    """Buttons that move the selected objects."""
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         super().__init__(gui, actions)
@@ -303,12 +303,12 @@ class ArrangePanel(SidePanel):
                 self._add_alignment_buttons()
 
     def snap(self) -> None:
-        """Brings what is selected onto the grid."""
+        """Snaps the selected objects to the grid."""
         session = self._actions.session
         session.do(SnapToGrid(session.view.selection, 1e-3 * float(self._grid.value)))
 
     def show(self, view: SessionView) -> None:
-        """Brings the panel to a view."""
+        """Updates the panel from a view."""
         self._folder.visible = bool(view.selection)
         self._several.visible = len(view.selection) > 1
 

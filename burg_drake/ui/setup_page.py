@@ -32,14 +32,14 @@ from burg_drake.ui.viewpoints import PageViews
 
 
 class SetupPage:
-    """A page on a session.
+    """The page of a session.
 
     Args:
-        server: viser's, with nothing on it yet; see `serve_page`.
+        server: viser's server, still without content; see `serve_page`.
         session: the scene.
 
     Attributes:
-        actions: what pages ask for, and the queue in which it is done.
+        actions: of the page.
     """
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
@@ -66,7 +66,7 @@ class SetupPage:
         self._refresh()
 
     def close(self) -> None:
-        """Finishes what was asked for, and lets go of the session."""
+        """Finishes the queued actions, and detaches from the session."""
         self._unsubscribe()
         self.actions.queue.close()
         self._reach.close()
@@ -119,7 +119,7 @@ class SetupPage:
         register_shortcuts(gui, actions, self._shortcut_calls())
 
     def _shortcut_calls(self) -> dict[str, ActionCall]:
-        """What keys do; see `shortcuts`."""
+        """Actions by the names of `SHORTCUTS`."""
 
         def anywhere(action: Callable[[], Any]) -> ActionCall:
             return lambda client: action()
@@ -162,7 +162,7 @@ class SetupPage:
             self._poses.draw()
 
     def _refresh(self) -> None:
-        """Brings everything to the session's view of now."""
+        """Updates the page from the session's current view."""
         view = self._session.view
         if view.library is not self._shapes.library:
             self._pictures.close()

@@ -28,8 +28,8 @@ from burg_drake.visualization import element
 
 
 def selection_actions(session: ComposeSession) -> dict[str, Callable[[], Any]]:
-    """Actions by the names of `SHORTCUTS`, of those that are about the selection."""
-    # Unit vectors in S by the name of the key's action.
+    """Actions of the shortcuts for undo, redo and the selection, by the names of `SHORTCUTS`."""
+    # Unit vectors in S by the name of the shortcut.
     directions = {
         "left": (-1.0, 0.0, 0.0),
         "right": (1.0, 0.0, 0.0),
@@ -60,7 +60,7 @@ def selection_actions(session: ComposeSession) -> dict[str, Callable[[], Any]]:
 
 
 def shift_selection(session: ComposeSession, offset: Any) -> None:
-    """Moves what is selected by an offset (3,) in S [m]."""
+    """Moves the selected objects by an offset (3,) in S [m]."""
     view = session.view
     X_SO = {name: view.X_SO(name) for name in view.selection}
     for X in X_SO.values():
@@ -69,10 +69,10 @@ def shift_selection(session: ComposeSession, offset: Any) -> None:
 
 
 def set_next_stable_pose(session: ComposeSession) -> None:
-    """Brings what is selected, of one kind, to the stable pose after the one it is in.
+    """Puts the selected objects, all of one kind, into their next stable pose.
 
     Raises:
-        InvalidInputError: nothing is selected, or it has no stable poses.
+        InvalidInputError: nothing is selected, or the object has no stable poses.
     """
     view = session.view
     if not view.selection:
@@ -90,13 +90,13 @@ Modifier = Literal["cmd/ctrl", "shift", "cmd/ctrl+shift"]
 
 @dataclass(frozen=True)
 class Shortcut:
-    """A key.
+    """A keyboard shortcut.
 
     Attributes:
-        name: what of the page it calls.
-        key: as viser calls it.
-        modifier: held meanwhile, or None.
-        label: what it does, for people.
+        name: of its action.
+        key: name of the key in viser.
+        modifier: to be held down, or None.
+        label: description of the action.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Shortcut:
 
     @property
     def keys(self) -> str:
-        """Such as `Ctrl+Z`."""
+        """Text of the keys, such as `Ctrl+Z`."""
         parts = [] if self.modifier is None else self.modifier.split("+")
         return "+".join([_KEY_NAMES.get(part, part) for part in (*parts, self.key)])
 
@@ -160,7 +160,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("colors", "C", None, "Next colours"),
     Shortcut("help", "H", None, "List these keys"),
 )
-"""All keys; the page and the list of shortcuts follow from this table."""
+"""All shortcuts, for the page and the list of shortcuts."""
 
 MOUSE_ACTIONS: tuple[tuple[str, str], ...] = (
     ("Click", "Select an object; on free space: none"),
@@ -171,7 +171,7 @@ MOUSE_ACTIONS: tuple[tuple[str, str], ...] = (
     ("Drag an arrow or a ring", "Move or turn what is selected along it or about it"),
     ("Drag on free space, wheel, right drag", "Rotate, zoom and shift the view"),
 )
-"""Actions of the mouse in the list of shortcuts."""
+"""Mouse actions in the list of shortcuts."""
 
 ActionCall = Callable[[viser.ClientHandle | None], Any]
 
@@ -179,12 +179,12 @@ ActionCall = Callable[[viser.ClientHandle | None], Any]
 def register_shortcuts(
     gui: viser.GuiApi, actions: PageActions, calls: dict[str, ActionCall]
 ) -> None:
-    """Makes the keys work, and lists them in viser's palette of commands (Ctrl+K).
+    """Registers the shortcuts, also in viser's command palette (Ctrl+K).
 
     Args:
-        gui: of viser.
-        actions: what may be done.
-        calls: by the names of `SHORTCUTS`; each gets the page that the key was pressed on.
+        gui: API of viser.
+        actions: of the page.
+        calls: by the names of `SHORTCUTS`; each takes the page on which the key was pressed.
     """
     for shortcut in SHORTCUTS:
         call = calls[shortcut.name]
@@ -200,16 +200,16 @@ def register_shortcuts(
 
     typed = gui.add_command("Take what was typed", hotkey="enter", modifier="alt+shift")
 
-    @typed.on_trigger  # by first_page.js; any action makes what was typed before it count
+    @typed.on_trigger  # by first_page.js; any action applies the values typed before it
     async def _(event: Any) -> None:
         actions.submit(lambda: None, event.client)
 
 
 class KeysDialog:
-    """Lists mouse and keys on pages; viser gives its dialogs no way to be closed.
+    """Shows the list of mouse actions and shortcuts on pages, with a button to close it.
 
     Args:
-        actions: what may be done.
+        actions: of the page.
     """
 
     def __init__(self, actions: PageActions) -> None:
@@ -235,7 +235,7 @@ class KeysDialog:
 
 
 def shortcut_list_html() -> str:
-    """The list as HTML."""
+    """The list of mouse actions and shortcuts as HTML."""
 
     def key(text: str) -> Any:
         return element("span", text, class_="bd-key")

@@ -15,7 +15,7 @@ from burg_drake.scene import Board
 
 FRONT_FOV = float(np.deg2rad(42.0))  # Radians; vertical angle of view from the front.
 TOP_FOV = float(np.deg2rad(18.0))
-"""Radians; narrow, so that hardly any perspective is left from above."""
+"""Radians; narrow, so that there is little perspective from above."""
 TOP_VIEW_TILT = 1e-3
 """Radians off the vertical, so that the camera has an upward direction."""
 VIEW_TOLERANCE = 1e-3
@@ -29,7 +29,7 @@ def direction_to_camera(*, above: bool) -> Array:
 
 
 def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Array, Array]:
-    """A camera that sees a board.
+    """A camera pose that has a board in view.
 
     Args:
         board: in the scene frame.
@@ -38,19 +38,19 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
         aspect: width over height of the page's scene.
 
     Returns:
-        Its position (3,) and what it looks at (3,) in S [m].
+        Position (3,) and target (3,) of the camera in S [m].
     """
     margin_factor = 1.22  # Extent in view relative to that of the board.
-    object_height = 0.25  # Metres; objects at the far edge of the board are in view up to this.
+    object_height = 0.25  # Metres; visible height of objects at the far edge of the board.
     size = np.array(board.size)
     level = float(np.hypot(back[0], back[1]))
     ahead = -back[:2] / level
     width, depth = float(size @ np.abs(ahead[::-1])), float(size @ np.abs(ahead))
     tall = 0.0 if level <= TOP_VIEW_TILT else object_height * level
-    share = 0.55 if aspect < 0.6 else 1.0  # of the height, above the panel on a phone
+    share = 0.55 if aspect < 0.6 else 1.0  # of the height that is above the panel on a phone
     half_height = margin_factor * (depth * back[2] + tall) / 2.0
     half = max(half_height / share, margin_factor * width / 2.0 / aspect)
-    # from the page's upper edge, in its heights
+    # from the page's upper edge, as a share of its height
     middle = min(0.5, share - half_height / half / 2.0)
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
@@ -61,15 +61,15 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
 
 @dataclass(eq=False)
 class _AssignedView:
-    """A view that was given to a page.
+    """A view that was assigned to a page.
 
     Attributes:
         back: (3,) unit vector in S from the board to the camera.
         fov: vertical angle of view [rad].
-        aspect: width over height that it was made for.
-        position, target: (3,) of the camera, and what it looks at, in S [m].
-        arrived: the page has reported it; reports from before may come later than it was given.
-        sendings_left: how often it may still be sent; a page that cannot have it keeps its own.
+        aspect: width over height of the page's scene for which it was computed.
+        position, target: (3,) of the camera in S [m].
+        arrived: whether the page has reported this view; earlier reports may still arrive.
+        sendings_left: remaining attempts to send it; then the page keeps its own view.
     """
 
     back: Array
@@ -94,12 +94,12 @@ class PageViews:
 
     Args:
         server: of viser.
-        board: gives the board of now, in any thread.
+        board: returns the current board, in any thread.
     """
 
     def __init__(self, server: viser.ViserServer, board: Callable[[], Board]) -> None:
         self._server, self._board = server, board
-        self._given: dict[int, _AssignedView] = {}
+        self._assigned: dict[int, _AssignedView] = {}
         self._shown = board().size
         camera = server.initial_camera
         camera.position, camera.look_at = viewpoint(
@@ -109,23 +109,23 @@ class PageViews:
         server.on_client_connect(self._on_connect)
 
     def set_view(self, client: viser.ClientHandle | None, *, above: bool) -> None:
-        """Brings a page's camera above the board, or in front of it."""
+        """Moves a page's camera above the board, or in front of it."""
         if client is not None:
             back, fov = direction_to_camera(above=above), TOP_FOV if above else FRONT_FOV
             self._in_server_thread(lambda: self._assign_view(client, back, fov))
 
     def show(self) -> None:
-        """Brings a board of another size into view on all pages, from where they look."""
+        """After a change of the board's size, fits it on all pages, keeping the view direction."""
         if (size := self._board().size) != self._shown:
             self._shown = size
             self._in_server_thread(self._fit_all)
 
     def forget_page(self, client_id: int) -> None:
-        """A page is gone."""
-        self._given.pop(client_id, None)
+        """Drops the view of a page that is gone."""
+        self._assigned.pop(client_id, None)
 
     def _in_server_thread(self, action: Callable[[], None]) -> None:
-        with contextlib.suppress(RuntimeError):  # the server has stopped, and no page is left
+        with contextlib.suppress(RuntimeError):  # the server has stopped
             self._server.get_event_loop().call_soon_threadsafe(action)
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
@@ -133,33 +133,33 @@ class PageViews:
             self._follow(client)
 
         client.camera.on_update(follow)
-        # `follow` is called next, with the report that made the page connect, and sends this view.
+        # `follow` is called next, with the page's first report, and sends this view.
         back = direction_to_camera(above=False)
-        self._given[client.client_id] = self._fit_view(client.camera, back, FRONT_FOV)
+        self._assigned[client.client_id] = self._fit_view(client.camera, back, FRONT_FOV)
 
     def _follow(self, client: viser.ClientHandle) -> None:
-        """A page has reported its camera: it was moved, or the room for the scene has changed."""
-        given = self._given.get(client.client_id)
-        if given is None:
+        """Handles a reported camera: it was moved, or the page's scene has another size."""
+        assigned = self._assigned.get(client.client_id)
+        if assigned is None:
             return
         camera = client.camera
-        if abs(camera.aspect - given.aspect) > VIEW_TOLERANCE:
-            given = self._fit_view(camera, given.back, given.fov)
-            self._given[client.client_id] = given
-        if given.is_shown_by(camera):
-            given.arrived = True
-        elif given.sendings_left and (
-            not given.arrived
+        if abs(camera.aspect - assigned.aspect) > VIEW_TOLERANCE:
+            assigned = self._fit_view(camera, assigned.back, assigned.fov)
+            self._assigned[client.client_id] = assigned
+        if assigned.is_shown_by(camera):
+            assigned.arrived = True
+        elif assigned.sendings_left and (
+            not assigned.arrived
             or _is_same_point(camera.position, self._server.initial_camera.position)
         ):
-            self._send(client, given)  # it is not there yet, or the page has put its first over it
+            self._send(client, assigned)  # not arrived yet, or replaced by the page's initial view
         else:
-            del self._given[client.client_id]
+            del self._assigned[client.client_id]
 
     def _fit_all(self) -> None:
         for client in self._server.get_clients().values():
-            if (given := self._given.get(client.client_id)) is not None:
-                self._assign_view(client, given.back, given.fov)
+            if (assigned := self._assigned.get(client.client_id)) is not None:
+                self._assign_view(client, assigned.back, assigned.fov)
                 continue
             back = client.camera.position - client.camera.look_at
             back = back / np.linalg.norm(back)
@@ -170,20 +170,20 @@ class PageViews:
     def _assign_view(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
         if client.client_id not in self._server.get_clients():
             return
-        before = self._given.get(client.client_id)
-        given = self._given[client.client_id] = self._fit_view(client.camera, back, fov)
+        before = self._assigned.get(client.client_id)
+        assigned = self._assigned[client.client_id] = self._fit_view(client.camera, back, fov)
         is_reported = before is None or before.arrived
-        given.arrived = is_reported and given.is_shown_by(client.camera)
-        self._send(client, given)
+        assigned.arrived = is_reported and assigned.is_shown_by(client.camera)
+        self._send(client, assigned)
 
-    def _send(self, client: viser.ClientHandle, given: _AssignedView) -> None:
-        given.sendings_left -= 1
+    def _send(self, client: viser.ClientHandle, assigned: _AssignedView) -> None:
+        assigned.sendings_left -= 1
         camera = client.camera
         with client.atomic():
             camera.up_direction = np.array([0.0, 0.0, 1.0])
-            camera.fov = given.fov
-            camera.position = given.position
-            camera.look_at = given.target
+            camera.fov = assigned.fov
+            camera.position = assigned.position
+            camera.look_at = assigned.target
 
     def _fit_view(self, camera: Any, back: Array, fov: float) -> _AssignedView:
         position, target = viewpoint(self._board(), back, fov, camera.aspect)

@@ -39,12 +39,12 @@ def write_calibration_report(calibration: Calibration, advice: list[str], path: 
     """Writes the page, which needs no other file and no network.
 
     Args:
-        calibration: what it is about.
-        advice: sentences about what would be better.
+        calibration: the calibration.
+        advice: suggestions for improvement, as sentences.
         path: file to write.
 
     Raises:
-        InvalidInputError: the place cannot be written to.
+        InvalidInputError: the file cannot be written.
     """
     page = render_page(
         "visualization/calibration_report.html.jinja",
@@ -65,7 +65,7 @@ CaptionedDrawing = tuple[Html, str]
 
 
 def _image_svg(calibration: Calibration, *shapes: Html) -> Html:
-    """An SVG in pixels of the image, with its frame."""
+    """SVG of the image's outline and shapes, in pixels of the image."""
     k = calibration.intrinsics
     line = _line_width(calibration)
     frame = svg_rectangle(
@@ -77,7 +77,7 @@ def _image_svg(calibration: Calibration, *shapes: Html) -> Html:
 
 
 def _line_width(calibration: Calibration) -> float:
-    """Width of a line that is one pixel of the screen wide [pixels of the image]."""
+    """Width of a line of one screen pixel [pixels of the image]."""
     return round(calibration.intrinsics.width / FIGURE_WIDTH, 3)
 
 
@@ -106,7 +106,7 @@ def _residual_figure(calibration: Calibration) -> CaptionedDrawing:
 
 
 def _draw_cells(calibration: Calibration, shades: Array, words: list[str], color: str) -> Html:
-    """A grid over the image: shades (rows, columns) from 0 to 1, and what each cell says."""
+    """Draws a grid over the image, with shades (rows, columns) from 0 to 1 and tooltips."""
     k = calibration.intrinsics
     rows, columns = shades.shape
     width, height = k.width / columns, k.height / rows
@@ -175,6 +175,6 @@ def _distortion_figure(calibration: Calibration) -> CaptionedDrawing:
 
 
 def _floor_to_one_digit(value: float) -> float:
-    """One digit of a number, rounded down."""
+    """Rounds a number down to one significant digit."""
     power = 10.0 ** math.floor(math.log10(value))
     return float(f"{math.floor(value / power) * power:.1g}")

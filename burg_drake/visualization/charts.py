@@ -1,4 +1,4 @@
-"""Charts as SVG: intervals of shares, histograms, ranked shares, and the round steps of axes."""
+"""Charts as SVG: intervals of rates, histograms, ranked rates, and round steps of axes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from burg_drake.visualization.html_page import (
 
 
 def nice_step(rough: float, multiples: Sequence[float] = (1.0, 2.0, 5.0, 10.0)) -> float:
-    """The smallest of some multiples of a power of ten that is not below `rough` (> 0)."""
+    """Smallest step >= `rough` (> 0) of the form multiple times power of ten."""
     power = 10.0 ** math.floor(math.log10(rough))
     return next(f * power for f in multiples if f * power >= rough * (1 - 1e-9))
 
@@ -32,7 +32,7 @@ def _chart(width: float, height: float, label: str, *shapes: Child, style: str) 
 
 
 def interval_mark(share: float, low: float, high: float) -> Html:
-    """A point with its interval on an axis from 0 to 1."""
+    """Mark of a rate with its confidence interval on an axis from 0 to 1."""
 
     def x(value: float) -> float:
         return round(4 + 112 * value, 1)
@@ -49,13 +49,13 @@ def interval_mark(share: float, low: float, high: float) -> Html:
     )
 
 
-HISTOGRAM_BINS = 20  # Along the axis.
+HISTOGRAM_BINS = 20
 
 
 class _Mirrored:
     """Lengths in a mirrored histogram, in SVG units."""
 
-    left = 34  # Where the axis begins.
+    left = 34  # Start of the axis.
     axis = 262  # Length of the axis.
     overflow = (316, 332)  # Left and right edge of the bars for values beyond the axis.
     width = 340
@@ -63,7 +63,7 @@ class _Mirrored:
     half = 76  # Height of either half of the chart.
     bar = 62  # Height of the highest bar.
     line = 16  # Height of a line of text.
-    base = head + half  # Where the halves meet.
+    base = head + half  # Boundary of the halves.
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class HistogramSeries:
     Attributes:
         values: (N,) finite values.
         style: CSS class.
-        name: for the tip.
+        name: name in the tooltip.
     """
 
     values: Array
@@ -83,11 +83,11 @@ class HistogramSeries:
 
 @dataclass(frozen=True)
 class Limit:
-    """A value that decides about an outcome.
+    """A limit of a margin that decides the outcome.
 
     Attributes:
-        value: on the axis.
-        name: what it stands for.
+        value: value on the axis.
+        name: name of the limit.
     """
 
     value: float
@@ -113,15 +113,15 @@ def mirrored_histogram(
     unit: str,
     limit: Limit | None = None,
 ) -> Html:
-    """The distribution of a margin from zero, successes upward and failures downward. Each half
-    has its own scale, whose largest count stands on the left; what lies beyond the axis is counted
-    in a bar of its own. Without failures there is no lower half.
+    """Histogram of a margin from zero, successes upward and failures downward. Each half has its
+    own scale, with the largest count on the left; an extra bar counts values beyond the axis.
+    Without failures there is no lower half.
 
     Args:
-        success: values of what succeeded; the axis is fitted to all but their largest hundredth.
-        failures: others, stacked from the axis in this order.
-        title, unit: of the horizontal axis.
-        limit: drawn as a line, and always on the axis.
+        success: margins of successes; the axis covers them up to their 99th percentile.
+        failures: margins of failures, stacked from the axis in this order.
+        title, unit: title and unit of the horizontal axis.
+        limit: limit to draw as a line; the axis always includes it.
     """
     size = _Mirrored
     failed = np.concatenate([np.empty(0), *(s.values for s in failures)])
@@ -220,12 +220,12 @@ def _series_text(name: str, values: Array, unit: str) -> str:
 
 @dataclass(frozen=True)
 class RankedShare:
-    """A share of successes.
+    """Success rate of a scene.
 
     Attributes:
-        name: of the scene.
-        successes, trials: their numbers.
-        interval: of the share.
+        name: name of the scene.
+        successes, trials: numbers of successes and trials.
+        interval: confidence interval of the rate.
     """
 
     name: str
@@ -235,15 +235,15 @@ class RankedShare:
 
     @property
     def share(self) -> float:
-        """Successes over trials; there must be some."""
+        """Successes over trials; requires trials."""
         return self.successes / self.trials
 
 
 def ranked_chart(ranked: Sequence[RankedShare]) -> Html:
-    """A dot with its interval for each scene, from the worst on the left to the best. Scenes
-    without trials have a place, but no dot."""
+    """Chart of success rates with their intervals, a dot per scene, the worst on the left. Scenes
+    without trials have an empty column."""
     left, right, top, bottom = 44, 474, 8, 164  # Edges of the plot [SVG units].
-    max_named = 200  # With more scenes, dots do not tell their names.
+    max_named = 200  # With more scenes, dots have no tooltips with names.
 
     def y(share: float) -> float:
         return round(bottom - (bottom - top) * share, 1)
@@ -289,13 +289,13 @@ text { font: 11px system-ui, sans-serif; fill: #5b656e; }
 def histogram_file(
     values: Sequence[float], title: str, unit: str, *, limits: tuple[float, float] | None = None
 ) -> str:
-    """How values are distributed.
+    """Histogram of values.
 
     Args:
-        values: in the unit to show.
-        title: above the bars.
-        unit: below them.
-        limits: of the axis; those of the values if None.
+        values: values in the unit to show.
+        title: text above the bars.
+        unit: text below the bars.
+        limits: ends of the axis; minimum and maximum of the values if None.
 
     Returns:
         An SVG document.
@@ -314,7 +314,7 @@ def histogram_file(
 
 
 def bars_of_counts_file(values: Sequence[int], title: str, unit: str) -> str:
-    """How often each whole number occurs: a bar for each from 0 to the largest.
+    """Bar chart of integers: how often each number from 0 to the largest occurs.
 
     Returns:
         An SVG document.
@@ -326,7 +326,7 @@ def bars_of_counts_file(values: Sequence[int], title: str, unit: str) -> str:
 
 
 def _bar_file(counts: Indices, title: str, unit: str, ticks: list[tuple[float, float]]) -> str:
-    """Bars, with ticks at shares of the axis, as an SVG document."""
+    """SVG document of bars, with ticks at fractions of the axis."""
     width, height = 360, 200  # Pixels.
     left, right, top, base = 46, 346, 30, 160  # Edges of the bars [pixel].
     step = (right - left) / len(counts)

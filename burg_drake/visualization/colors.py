@@ -18,10 +18,10 @@ VIRIDIS_COLORS = (
 
 
 def map_colors(share: ArrayLike) -> Array:
-    """Colours of numbers.
+    """Colours of a colour map.
 
     Args:
-        share: (...,) 0 for the lowest and 1 for the highest colour; what is beyond is cut.
+        share: (...,) 0 for the lowest and 1 for the highest colour; clipped to this range.
 
     Returns:
         (..., 3) red, green, blue in [0, 1] (sRGB).
@@ -60,7 +60,7 @@ def rgb_from_hex(color: str) -> tuple[float, float, float]:
 
 
 COLOR_BINS = 32
-"""Colours of a bar: steps in lightness of 2.5, about what eyes tell apart."""
+"""Colours of a bar: steps of 2.5 in lightness, about the smallest that one can distinguish."""
 
 
 @dataclass(frozen=True)
@@ -105,17 +105,17 @@ class ColorScale:
 
 
 def color_scale(values: ArrayLike, limits: tuple[float, float] | None = None) -> ColorScale:
-    """The scale for values: from and to round numbers, without their outliers.
+    """Colour scale for values, without outliers, with round numbers as ends.
 
     Args:
-        values: (N,), NaN and infinite ones allowed.
-        limits: lower and upper end to be taken as they are.
+        values: (N,), NaN and infinite values allowed.
+        limits: lower and upper end of the scale; from the values if None.
 
     Raises:
         InvalidInputError: the limits do not rise, or are not finite.
     """
-    max_number = 1e100  # Larger numbers stand for infinity.
-    min_span = 1e-300  # Ranges are longer than that.
+    max_number = 1e100  # Larger numbers count as infinite.
+    min_span = 1e-300  # Minimum length of the range.
     if limits is not None:
         if not min_span < limits[1] - limits[0] < max_number:
             raise InvalidInputError(
@@ -140,12 +140,12 @@ def color_scale(values: ArrayLike, limits: tuple[float, float] | None = None) ->
 
 def range_without_outliers(numbers: Array) -> tuple[float, float]:
     """Ends of the range of numbers (N,), N > 0: the extremes, or quantiles if those are far."""
-    quantiles = (0.02, 0.98)  # What lies between them is always told apart.
+    quantiles = (0.02, 0.98)  # The scale always includes the values between them.
     reach_share = 0.25  # Extremes that are this close to the quantiles are included.
     lower, upper = (float(q) for q in np.quantile(numbers, quantiles))
     reach = reach_share * (upper - lower)
     least, most = float(numbers.min()), float(numbers.max())
-    if not upper > lower:  # nearly all are one value; what the others are is all there is to see
+    if not upper > lower:  # nearly all values are equal; show the range of the others
         return least, most
     return (
         least if lower - least <= reach else lower,
@@ -154,7 +154,7 @@ def range_without_outliers(numbers: Array) -> tuple[float, float]:
 
 
 def _axis_step(span: float) -> float:
-    """The smallest of 1, 2, 5, 10, 20 ... that divides a span in at most six parts."""
+    """Smallest of 1, 2, 5, 10, 20 ... that divides a span into at most six parts."""
     return nice_step(span / (6 * 1.001))
 
 
@@ -227,7 +227,7 @@ OUTCOME_GROUPS = (
 """All groups, best outcome first. Every outcome is in exactly one."""
 
 UNJUDGED_GROUP = OutcomeGroup("not judged", (0.34, 0.71, 0.91, 1.0), ())
-"""Grasps that have no outcome."""
+"""Group of grasps without an outcome."""
 OTHERS_COLOR: Rgba = (0.35, 0.35, 0.35, 0.6)
 """Colour of all names beyond the `CATEGORY_COLORS`."""
 UNKNOWN_COLOR: Rgba = (0.62, 0.62, 0.62, 0.6)
@@ -235,7 +235,7 @@ UNKNOWN_COLOR: Rgba = (0.62, 0.62, 0.62, 0.6)
 
 
 def outcome_group(outcome: Outcome | None) -> OutcomeGroup:
-    """The group of an outcome; None stands for a grasp that nobody judged."""
+    """The group of an outcome; None for a grasp that was not judged."""
     if outcome is None:
         return UNJUDGED_GROUP
     return next((g for g in OUTCOME_GROUPS if outcome in g.outcomes), UNJUDGED_GROUP)

@@ -1,4 +1,4 @@
-"""A library on one page: a card with pictures and figures for each object."""
+"""Contact sheet of a library: a card with pictures and properties for each object."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def write_contact_sheet(
     """Writes the page.
 
     Args:
-        library: what to show.
+        library: library to show.
         path: file to write.
-        names: of objects, in this order; all if None.
-        remarks: sentences on objects that deserve attention, by name.
+        names: names of objects, in this order; all if None.
+        remarks: warnings about objects, as sentences, by name.
 
     Raises:
         UnknownNameError: no such object, or one of its files is missing.
@@ -59,7 +59,7 @@ def write_contact_sheet(
 
 
 def _object_card(library: ObjectLibrary, name: str, renderer: ObjectRenderer) -> dict[str, Any]:
-    """What the card of an object shows."""
+    """Values of an object's card, for the template."""
     pose_size = (160, 120)  # Pixels.
     entry = library.entry(name)
     poses = [
@@ -84,7 +84,7 @@ def _object_card(library: ObjectLibrary, name: str, renderer: ObjectRenderer) ->
 
 
 def surface_notes(library: ObjectLibrary, name: str) -> list[str]:
-    """What was repaired, and whether the surface is closed, as sentences."""
+    """Notes on repairs of a mesh, and on whether it is closed, as sentences."""
     repairs = list(dict.fromkeys(library.entry(name).source.repairs))
     closed = bool(library.surface(name).is_watertight)
     state = "The surface is closed." if closed else "The surface is open."
@@ -94,13 +94,13 @@ def surface_notes(library: ObjectLibrary, name: str) -> list[str]:
 
 
 def percent_text(probability: float) -> str:
-    """A probability in percent, with as many digits as it takes to see that it is not zero."""
+    """A probability in percent, with enough digits not to read as zero."""
     percent = 100.0 * probability
     return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.1f} %"
 
 
 def pose_note(pose: StablePose) -> str:
-    """What is known of a pose besides its probability."""
+    """Properties of a stable pose other than its probability."""
     notes = ["rolls"] if pose.rolls else []
     if pose.residual is not None:
         notes.append(f"tilt {math.degrees(pose.residual):.1f}°")
@@ -108,7 +108,7 @@ def pose_note(pose: StablePose) -> str:
 
 
 def contact_name(contact: ContactGeometry) -> str:
-    """What touches others, in words."""
+    """Name of a contact geometry, in words."""
     if contact.primitive is None:
         return CONTACT_KIND_NAMES[contact.kind]
     lengths = " x ".join(_length_text(s) for s in contact.primitive.size)
@@ -116,7 +116,7 @@ def contact_name(contact: ContactGeometry) -> str:
 
 
 def _source_line(entry: ObjectEntry) -> str:
-    """Where the object came from."""
+    """Source of an object."""
     file = entry.source.file or "made by code"
     scaled = "" if entry.source.scale == 1.0 else f", times {entry.source.scale:g}"
     return file + scaled

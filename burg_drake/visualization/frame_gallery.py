@@ -22,9 +22,9 @@ from burg_drake.visualization.object_drawing import camera_rotation
 
 FRAMES_PATH = "/drake/frames"  # Path of the grasp frames in Meshcat's tree.
 R_WC = camera_rotation(np.deg2rad(22.0))
-"""(3, 3) the camera."""
+"""(3, 3) axes of the camera in the world."""
 X_LT = make_pose(R_WC @ np.diag([1.0, -1.0, -1.0]))
-"""(4, 4) text that faces the camera, where the axes of L are those of the world."""
+"""(4, 4) pose of text that faces the camera; the axes of L are those of the world."""
 OWN_TRIAD = TriadStyle(length=0.066, radius=0.0009, head=0.007)
 """Style of our grasp frame G: thin and long."""
 FORMAT_TRIAD = TriadStyle(length=0.044, radius=0.0026, head=0.013)
@@ -43,8 +43,8 @@ class FrameGrid:
 
     Attributes:
         columns, rows: numbers of cells.
-        width, height: of a cell [m].
-        foot, head: of a cell's contents, from G upwards [m].
+        width, height: size of a cell [m].
+        foot, head: lower and upper end of a cell's contents, upwards from G [m].
     """
 
     columns: int
@@ -55,12 +55,12 @@ class FrameGrid:
     head: float
 
     def place(self, index: int) -> tuple[float, float]:
-        """Where in the picture G of a hand is, to the right and up [m]."""
+        """Position of a hand's G in the picture, to the right and up [m]."""
         row, column = divmod(index, self.columns)
         return self.width * column, -self.height * row
 
     def bounds(self) -> Array:
-        """(2, 2) lower and upper corner in the picture [m]."""
+        """(2, 2) lower and upper corner of the grid in the picture [m]."""
         left, right = -0.5 * self.width, self.width * (self.columns - 0.5)
         return np.array([[left, self.foot - self.height * (self.rows - 1)], [right, self.head]])
 
@@ -68,14 +68,14 @@ class FrameGrid:
 def show_frames(
     hand: Hand, model: Path, gripper: Gripper, formats: Sequence[GraspFormat], meshcat: Meshcat
 ) -> tuple[LegendEntry, ...]:
-    """Shows a hand for each format, or for several of the same convention, with both frames.
+    """Shows a hand for each grasp frame convention of the formats, with both frames.
 
     Args:
-        hand: its document.
-        model: its model file.
-        gripper: what formats know of it.
+        hand: document of the hand.
+        model: model file of the hand.
+        gripper: the hand as formats describe it.
         formats: at least one.
-        meshcat: where; what it showed below `/drake/frames` before is removed.
+        meshcat: Meshcat to draw in; anything below `/drake/frames` is replaced.
 
     Returns:
         Switches for frames, hands and objects.
@@ -114,27 +114,27 @@ def show_frames(
 
 
 def downward_grasp_pose() -> Array:
-    """(4, 4) pose, but for the place, of G in the world: approaching along -z."""
+    """(4, 4) pose of G that approaches along -z of the world, at the origin."""
     hand_yaw = np.deg2rad(-28.0)  # Radians. No axis of G points at the camera.
     return make_pose(rot_z(hand_yaw) @ np.diag([1.0, -1.0, -1.0]))
 
 
 def pose_in_picture_plane(u: float, v: float) -> Array:
-    """(4, 4) the world's axes at a point of the plane through W that the camera faces.
+    """(4, 4) pose at a point of the picture plane through W, with the world's axes.
 
     Args:
-        u, v: to the right and up in the picture [m].
+        u, v: coordinates to the right and up in the picture [m].
     """
     return make_pose(p_AB=u * R_WC[:, 0] - v * R_WC[:, 1])
 
 
 def _fit_grid(count: int, lower: Array, upper: Array, caption: float) -> FrameGrid:
-    """As many columns and rows as let the camera come nearest.
+    """The grid whose numbers of columns and rows let the camera come nearest.
 
     Args:
-        count: of hands.
+        count: number of hands.
         lower, upper: (2,) bounds of a hand in the picture, around G [m].
-        caption: width of the widest [m].
+        caption: width of the widest caption [m].
     """
     gap = 0.035  # Metres between neighbours.
     caption_lines = 4
@@ -147,7 +147,7 @@ def _fit_grid(count: int, lower: Array, upper: Array, caption: float) -> FrameGr
 
 
 def _hand_bounds(visuals: Sequence[HandVisual], hand: Hand) -> tuple[Array, Array]:
-    """Corners (2,) in the picture [m] of a hand with the longest axes, G in the middle."""
+    """Lower and upper corner (2,) in the picture of a hand with its axes, centred on G [m]."""
     X_WH = hand.X_AH(downward_grasp_pose())
     points = [transform_points(X_WH @ v.X_HV, v.corners) for v in visuals]
     margin = max(OWN_TRIAD.length + 0.5 * CAPTION_HEIGHT, FORMAT_TRIAD.length + LETTER_HEIGHT)
@@ -169,7 +169,7 @@ def _format_caption(formats: Sequence[GraspFormat], gripper: Gripper) -> tuple[M
 
 
 def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
-    object_color = Rgba(0.93, 0.70, 0.25, 0.5)  # To be seen through, too.
+    object_color = Rgba(0.93, 0.70, 0.25, 0.5)
     x, y, z = hand.opening[1] * np.array([0.34, 0.24, 0.40])
     meshcat.SetObject(path, Box(x, y, z), object_color)
     X_GO = make_pose(p_AB=(0.0, 0.0, 0.25 * z))
@@ -177,7 +177,7 @@ def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
 
 
 def _write_letters(meshcat: Meshcat, path: str, X_WF: Array) -> None:
-    """x, y, z beyond the tips of a frame's axes."""
+    """Writes x, y, z beyond the tips of a frame's axes."""
     for k, letter in enumerate("xyz"):
         middle = X_WF[:3, 3] + (FORMAT_TRIAD.length + 0.5 * LETTER_HEIGHT) * X_WF[:3, k]
         foot = make_pose(p_AB=middle + 0.4 * LETTER_HEIGHT * R_WC[:, 1])

@@ -1,4 +1,4 @@
-"""Layout of an object gallery: one row per object, in as many banks as read well."""
+"""Layout of an object gallery: one row per object, in several banks side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class GalleryItem:
 
     Attributes:
         lower, upper: (3,) bounds in its own frame [m]; its z axis is up.
-        caption: width of what is written in front of it [m].
+        caption: width of the text in front of it [m].
     """
 
     lower: Array
@@ -30,18 +30,18 @@ class GalleryItem:
 
     @property
     def width(self) -> float:
-        """Along x, with the caption [m]."""
+        """Width along x, with the caption [m]."""
         return max(float(self.upper[0] - self.lower[0]), self.caption)
 
 
 @dataclass(frozen=True)
 class GalleryRow:
-    """An object's things.
+    """Items of an object.
 
     Attributes:
-        label: width of what is written at the row's start [m].
-        columns: things that stand in columns, below those of the other rows.
-        rest: things that follow one another.
+        label: width of the text at the row's start [m].
+        columns: items in columns, aligned with those of other rows.
+        rest: items that follow without alignment.
     """
 
     label: float
@@ -51,7 +51,7 @@ class GalleryRow:
 
 @dataclass(frozen=True)
 class PlacedGalleryRow:
-    """Where a row is.
+    """Positions of a row.
 
     Attributes:
         p_WL: (3,) left foot of its label [m].
@@ -71,7 +71,7 @@ class GalleryLayout:
     Attributes:
         rows: in the order given.
         banks: (2, 2) corners (lower, upper) in x and y of each bank's floor [m].
-        height: of the highest thing [m].
+        height: height of the highest item [m].
     """
 
     rows: tuple[PlacedGalleryRow, ...]
@@ -85,7 +85,7 @@ class GalleryLayout:
         return np.vstack(list(boxes))
 
     def distance(self) -> float:
-        """How far away, up to a factor, a camera has to be that sees all of it [m]."""
+        """Distance at which a camera sees the whole gallery, up to a factor [m]."""
         lower, upper = self.corners().min(axis=0), self.corners().max(axis=0)
         return float(
             max((upper - lower)[0] / VIEW_ASPECT, (upper - lower)[1] * np.sin(GALLERY_ELEVATION))
@@ -99,11 +99,11 @@ def layout_gallery(
 
     Args:
         rows: at least one.
-        unit: size of a usual object [m].
+        unit: typical size of an object [m].
         line: height of a line of text [m].
-        max_banks: at least one.
+        max_banks: largest number of banks, at least 1.
     """
-    gap_share = 0.16  # Of the gallery's unit.
+    gap_share = 0.16  # Gap as a share of the gallery's unit.
     layouts = [
         _layout_banks(rows, count, gap_share * unit, line)
         for count in range(1, min(max_banks, len(rows)) + 1)
@@ -146,7 +146,7 @@ def _center_layout(layout: GalleryLayout) -> GalleryLayout:
 def _layout_bank(
     rows: Sequence[GalleryRow], x0: float, gap: float, line: float
 ) -> tuple[list[PlacedGalleryRow], Array]:
-    """Rows one in front of the other from y = 0 on, and the bank's floor."""
+    """Places rows one in front of the other from y = 0 on; returns them and the bank's floor."""
     columns = max(len(row.columns) for row in rows)
     widths = [max(row.columns[k].width for row in rows) for k in range(columns)]
     start = x0 + gap + max(row.label for row in rows) + gap
@@ -180,7 +180,7 @@ def _standing_position(item: GalleryItem, x: float, y: float) -> Array:
 
 
 def _row_depth(row: GalleryRow, gap: float, line: float) -> float:
-    """Along y: caption, footprints, and what the highest thing hides behind it."""
+    """Depth of a row along y: caption, footprints, and the floor hidden by the highest item."""
     items = (*row.columns, *row.rest)
     deepest = max(float(i.upper[1] - i.lower[1]) for i in items)
     behind = max(

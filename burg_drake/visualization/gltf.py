@@ -33,7 +33,7 @@ def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
         opacity: 0 to 1, on top of the materials'.
 
     Returns:
-        Drake's shape; the same look at the same place as the file's.
+        Drake's shape, with the look and the pose of the file's mesh.
 
     Raises:
         MeshError: the file is damaged.
@@ -69,12 +69,12 @@ def label_mesh(
     stretch: float = 1.0,
     color: Rgb = (0.227, 0.227, 0.227),
 ) -> tuple[Mesh, float]:
-    """Text as a picture in the plane z = 0 that reads along +x from the origin, top line first.
+    """Text as a textured quadrangle in the plane z = 0, along +x from the origin, top line first.
 
     Args:
         lines: of text; the first is bold.
-        height: from line to line, before stretching [m]; the last line's foot is at y = 0.
-        stretch: of the letters along y.
+        height: line spacing before stretching [m]; the last line's foot is at y = 0.
+        stretch: factor for the letters along y.
         color: red, green, blue in [0, 1] (sRGB).
 
     Returns:
@@ -88,19 +88,19 @@ def label_mesh(
 
 
 def draw_label(meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WT: Array) -> None:
-    """Draws a text of `label_mesh`; the middle of its foot is at the origin of T (4, 4)."""
+    """Draws a text of `label_mesh` with the middle of its foot at the origin of T (4, 4)."""
     text, width = label
     meshcat.SetObject(path, text)
     meshcat.SetTransform(path, RigidTransform(X_WT @ make_pose(p_AB=(-0.5 * width, 0.0, 0.0))))
 
 
 def picture_mesh(image: Bytes, corners: ArrayLike) -> Mesh:
-    """A picture in its own colours, whatever light falls on it; seen from both sides.
+    """A picture without shading, visible from both sides.
 
     Args:
         image: (H, W, 3) of sRGB bytes.
-        corners: (4, 3) of a flat quadrangle [m]: where the picture's upper left corner is, then
-            around it, clockwise as one sees the picture upright.
+        corners: (4, 3) corners of a flat quadrangle [m], clockwise from the upper left of the
+            upright picture.
 
     Returns:
         Drake's shape.
@@ -109,7 +109,7 @@ def picture_mesh(image: Bytes, corners: ArrayLike) -> Mesh:
 
 
 def _textured_quadrangle(image: Image.Image, corners: Array, name: str) -> Mesh:
-    """A picture on a quadrangle (4, 3), without shading; seen from the front if transparent."""
+    """A picture on a quadrangle (4, 3) without shading; if transparent, visible from the front."""
     transparent = "A" in image.mode
     material = PBRMaterial(
         baseColorTexture=image,
@@ -142,8 +142,8 @@ def _in_memory_shape(document: dict[str, Any], files: dict[str, bytes], name: st
 
 
 def _reduce_texture(image: Image.Image) -> Image.Image:
-    """A texture for the gallery: reduced, and as a JPEG unless it is transparent."""
-    max_size = 1024  # Pixels. Enough for a gallery.
+    """Reduces a texture for the gallery, and makes it a JPEG unless it is transparent."""
+    max_size = 1024  # Pixels.
     small = image.copy()
     small.thumbnail((max_size, max_size), reducing_gap=2.0)
     if small.mode in ("RGBA", "LA", "PA") or "transparency" in small.info:
@@ -154,7 +154,7 @@ def _reduce_texture(image: Image.Image) -> Image.Image:
 
 
 def _text_image(lines: tuple[str, ...], color: Rgb) -> Image.Image:
-    """Lines of text in a colour, with the ink as opacity."""
+    """Image of lines of text in a colour on a transparent background."""
     font = ImageFont.load_default(0.76 * LABEL_LINE_PIXELS)
     width = max(2, *(int(np.ceil(font.getlength(line))) + 4 for line in lines))
     ink = Image.new("L", (width, LABEL_LINE_PIXELS * len(lines)))

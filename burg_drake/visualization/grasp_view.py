@@ -43,8 +43,8 @@ class GraspGroup:
     """Grasps that are drawn as one mesh.
 
     Attributes:
-        key: tells the group from the others; part of its path in Meshcat.
-        label: for legends; groups of the same label are one line there.
+        key: unique key of the group; part of its path in Meshcat.
+        label: label in legends; groups with the same label share a line.
         rgba: colour.
         members: (M,) indices of the grasps.
     """
@@ -57,13 +57,13 @@ class GraspGroup:
 
 @dataclass(frozen=True, eq=False)
 class NumberGroups:
-    """Grasps by a number.
+    """Grasps grouped by a number.
 
     Attributes:
-        scale: colours of the numbers.
-        bins: (N,) bin of each grasp; -1 where the number is not known.
-        outside: how many numbers are below and above the scale.
-        groups: of the bins that are not empty, lowest first, then of missing numbers.
+        scale: colour scale of the numbers.
+        bins: (N,) bin of each grasp; -1 for an unknown number.
+        outside: counts of numbers below and above the scale.
+        groups: groups of the bins that are not empty, lowest first, then of unknown numbers.
     """
 
     scale: ColorScale
@@ -78,11 +78,11 @@ class NumberGroups:
 
 
 def group_by_number(values: ArrayLike, limits: tuple[float, float] | None = None) -> NumberGroups:
-    """Groups grasps by numbers (N,); NaN where one is not known.
+    """Groups grasps by numbers.
 
     Args:
-        values: (N,).
-        limits: ends of the colour scale; they follow from the values if None.
+        values: (N,) numbers; NaN if unknown.
+        limits: ends of the colour scale; from the values if None.
 
     Raises:
         InvalidInputError: the limits do not rise.
@@ -106,9 +106,9 @@ def bin_key(bin: int) -> str:
 
 
 def group_by_name(names: Sequence[str]) -> tuple[GraspGroup, ...]:
-    """Groups grasps by names (N,), the most frequent first; empty ones are not known.
+    """Groups grasps by names (N,), the most frequent first; an empty name is unknown.
 
-    Names that are outcomes, all of them, get the colours of outcomes.
+    If all names are outcomes, they get the colours of outcomes.
     """
     texts = np.asarray(names, dtype=str)
     counts = Counter(texts[texts != ""].tolist())
@@ -134,7 +134,7 @@ def group_by_name(names: Sequence[str]) -> tuple[GraspGroup, ...]:
 
 
 def group_by_outcome(outcomes: Sequence[Outcome | None]) -> tuple[GraspGroup, ...]:
-    """Groups grasps by outcomes (N,), best first; None for grasps that nobody judged."""
+    """Groups grasps by outcomes (N,), best first; None for grasps that were not judged."""
     index: dict[Outcome | None, list[int]] = {}
     for i, outcome in enumerate(outcomes):
         index.setdefault(outcome, []).append(i)
@@ -169,16 +169,16 @@ GRASPS_PATH = "/drake/grasps"
 def draw_grasps(
     meshcat: Meshcat, X_WG: ArrayLike, width: ArrayLike, groups: Iterable[GraspGroup]
 ) -> None:
-    """Draws grasps in groups of one colour each, in the place of those drawn before.
+    """Draws grasps in groups of one colour each; replaces the grasps drawn before.
 
     Args:
-        meshcat: where to draw, below `/drake/grasps`, one path a group.
+        meshcat: Meshcat to draw in, below `/drake/grasps`, one path per group.
         X_WG: (N, 4, 4) grasps in the world.
         width: (N,) distance between the pads [m]; finite.
-        groups: with indices of the grasps; those that are in none are not drawn.
+        groups: groups of grasps; grasps without a group are not drawn.
 
     Raises:
-        InvalidInputError: the lengths differ, or a width is not known.
+        InvalidInputError: the lengths differ, or a width is unknown.
     """
     faint_radius = 0.0008  # Metres.
     poses = np.asarray(X_WG, dtype=float).reshape(-1, 4, 4)
@@ -194,7 +194,7 @@ def draw_grasps(
 
 
 def grasp_path(key: str) -> str:
-    """Where in Meshcat's tree the group of grasps with a key is."""
+    """Meshcat path of the group of grasps with a key."""
     return f"{GRASPS_PATH}/{key}"
 
 
@@ -239,12 +239,12 @@ def _bar_triangles(start: Array, end: Array, radius: float) -> tuple[Array, NDAr
 def color_grasps_by(
     grasps: GraspSet, column: str | None = None, limits: Sequence[float] | None = None
 ) -> tuple[tuple[GraspGroup, ...], list[ColorBar | LegendEntry]]:
-    """Colours for grasps, and what they stand for.
+    """Groups grasps by colour, with a legend.
 
     Args:
-        grasps: (N,).
-        column: one of the set's; None for the outcome, else the score, whatever there is.
-        limits: lower and upper end of the colours of numbers; they follow from these if None.
+        grasps: (N,) grasps.
+        column: column of the set; None for the outcome, or else the score, if there is one.
+        limits: lower and upper end of the colour scale; from the numbers if None.
 
     Returns:
         The grasps in groups of one colour each, and the legend.
@@ -270,14 +270,14 @@ def color_grasps_by(
 
 
 def default_color_column(grasps: GraspSet) -> str | None:
-    """What grasps are best coloured by; None where nothing is known of them."""
+    """Default column to colour grasps by; None if there is no such column."""
     if "outcome" in grasps.columns:
         return "outcome"
     return "score" if np.isfinite(grasps.score).any() else None
 
 
 def column_title(name: str) -> str:
-    """A column's name for people, with its unit if that is known."""
+    """Readable name of a column, with its unit if known."""
     column = describe_column(name)
     if column is None or column.unit in (TEXT_UNIT, DIMENSIONLESS):
         return name
@@ -285,7 +285,7 @@ def column_title(name: str) -> str:
 
 
 def grasp_group_entries(groups: Iterable[GraspGroup]) -> list[LegendEntry]:
-    """A switch for each label, with the number of grasps."""
+    """A legend switch for each label, with the number of grasps."""
     by_label: dict[str, list[GraspGroup]] = {}
     for group in groups:
         by_label.setdefault(group.label, []).append(group)
@@ -300,11 +300,11 @@ def grasp_group_entries(groups: Iterable[GraspGroup]) -> list[LegendEntry]:
 
 
 def number_legend(title: str, grouped: NumberGroups) -> list[ColorBar | LegendEntry]:
-    """The colour bar of a number, and a switch for the grasps where it is not known.
+    """Colour bar of a number, and a switch for grasps with an unknown number.
 
     Args:
-        title: what the number is.
-        grouped: the grasps by it.
+        title: name of the number.
+        grouped: the grasps, grouped by the number.
     """
     below, above = grouped.outside
     notes = [f"{count} {side} the range" for count, side in ((below, "below"), (above, "above"))]
@@ -320,7 +320,7 @@ def number_legend(title: str, grouped: NumberGroups) -> list[ColorBar | LegendEn
 
 
 def _bar_ticks(scale: ColorScale, outside: tuple[int, int]) -> tuple[tuple[float, str], ...]:
-    """Both ends of a bar, and the round numbers between them."""
+    """Ticks of a bar: both ends, and round numbers between them."""
     min_distance = 0.08  # From the bar's ends, as a share of it.
     span = scale.upper - scale.lower
     inner = [(t, (t - scale.lower) / span) for t in scale.ticks()]
@@ -338,7 +338,7 @@ def _bar_ticks(scale: ColorScale, outside: tuple[int, int]) -> tuple[tuple[float
 
 
 def _tick_text(value: float, span: float) -> str:
-    """A number with as many digits as tell it from others on a bar that is `span` long."""
+    """A number with enough digits to distinguish ticks of a bar of length `span`."""
     if abs(value) < 1e-9 * span:
         return "0"
     digits = max(4, int(np.ceil(np.log10(abs(value) / span))) + 2)
@@ -346,8 +346,8 @@ def _tick_text(value: float, span: float) -> str:
 
 
 def grasp_corners(X_WG: Array, width: Array) -> Array:
-    """(N, 6, 3) corners of grasps in the world [m]: tip, knuckle, knuckle and tip of the fork, then
-    both ends of the stem.
+    """(N, 6, 3) corners of grasp glyphs in the world [m]: tip, knuckle, knuckle and tip of the
+    fingers, then both ends of the stem.
 
     Args:
         X_WG: (N, 4, 4) grasps.
@@ -366,7 +366,7 @@ def _glyph_corners(width: Array) -> Array:
 
 
 def grasp_strokes(corners: Array, view: FlatView) -> list[str]:
-    """The `d` of one path a grasp, from `grasp_corners` (N, 6, 3)."""
+    """SVG path data `d` of each grasp, from `grasp_corners` (N, 6, 3)."""
     return [
         path_data(fork, closed=False) + path_data(stem, closed=False)
         for fork, stem in ((places[:4], places[4:]) for places in view.project(corners))

@@ -21,12 +21,12 @@ class HandVisual:
     """A visual geometry of a hand.
 
     Attributes:
-        shape: for Meshcat.
-        model: the shape as the hand's model has it, for renderers.
-        color: of shapes that have none of their own.
-        X_HV: (4, 4) where it is on the open hand.
-        slide: (3,) displacement in H for each metre by which the hand closes.
-        corners: (N, 3) that its bounds follow from, in its own frame V [m].
+        shape: shape for Meshcat.
+        model: shape of the hand's model, for renderers.
+        color: colour, for shapes without colours of their own.
+        X_HV: (4, 4) pose on the open hand.
+        slide: (3,) displacement in H per metre of closing.
+        corners: (N, 3) points with the same bounds, in the shape's frame V [m].
     """
 
     shape: Shape
@@ -86,7 +86,7 @@ def hand_visuals(
 
 
 def _meshcat_shape(shape: Shape, opacity: float) -> Shape:
-    """A visual as Meshcat gets it; of the colours of meshes only those of .obj become fainter."""
+    """Converts a shape for Meshcat. Of meshes, only .obj files get the opacity."""
     if isinstance(shape, Mesh) and shape.source().is_path():
         path = Path(shape.source().path())
         if path.suffix.lower() == ".obj" and np.array_equal(shape.scale3(), np.ones(3)):
@@ -95,7 +95,7 @@ def _meshcat_shape(shape: Shape, opacity: float) -> Shape:
 
 
 def _shape_corners(shape: Shape) -> Array:
-    """Points (N, 3) around a shape, tightly [m]."""
+    """Points (N, 3) with the bounds of a shape [m]."""
     if isinstance(shape, Mesh | Convex):
         hull = shape.GetConvexHull()
         return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
@@ -110,19 +110,18 @@ GRIPPER_PATH = "/drake/gripper"
 
 
 class GripperView:
-    """A gripper that is hidden until it is put somewhere.
+    """A gripper in Meshcat, hidden until it is placed at a grasp.
 
     Args:
-        meshcat: where to draw it.
+        meshcat: Meshcat to draw in.
         hand: the document.
         model: the model file.
         packages: what a station says of packages.
 
     Attributes:
         hand: the document.
-        slides: displacement (3,) in H of the parts, by Meshcat path, for each metre by which the
-            hand closes.
-        shown: whether it is in the view.
+        slides: displacement (3,) in H per metre of closing, by Meshcat path of the parts.
+        shown: whether the gripper is visible.
 
     Raises:
         InvalidInputError: the model cannot be loaded.
@@ -143,12 +142,12 @@ class GripperView:
         self.hide()
 
     def hide(self) -> None:
-        """Takes it out of the view."""
+        """Hides the gripper."""
         self._meshcat.SetProperty(GRIPPER_PATH, "visible", False)
         self.shown = False
 
     def place(self, X_WG: Array, width: float) -> None:
-        """Shows it at a grasp (4, 4) with so much between its pads [m], as far as it can."""
+        """Shows the gripper at a grasp (4, 4), closed to a width [m] as far as it can."""
         self._meshcat.SetTransform(GRIPPER_PATH, RigidTransform(self.hand.X_AH(X_WG)))
         for path, slide in self.slides.items():
             shift = self.closing_distance(width) * slide
@@ -157,6 +156,6 @@ class GripperView:
         self.shown = True
 
     def closing_distance(self, width: float) -> float:
-        """How far the open hand closes to a width [m]."""
+        """Closing distance from the open hand to a width [m]."""
         low, high = self.hand.opening
         return high - float(np.clip(width, low, high))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Html(str):
-    """Markup that is complete and needs no escaping any more."""
+    """Markup that is already escaped."""
 
     def __html__(self) -> Html:
         """Itself; this tells templates not to escape it."""
@@ -32,13 +32,13 @@ Attribute = str | float | None
 
 
 def element(name: str, /, *children: Child, **attributes: Attribute) -> Html:
-    """An element.
+    """An HTML or SVG element.
 
     Args:
-        name: its tag.
-        children: elements, and texts, which are escaped; None is left out.
-        attributes: their values are escaped. Underscores stand for hyphens, a trailing one is
-            dropped (`class_`); None leaves the attribute out.
+        name: tag.
+        children: elements, or texts, which are escaped; None is left out.
+        attributes: attributes, whose values are escaped. Underscores stand for hyphens, a trailing
+            one is dropped (`class_`); None leaves the attribute out.
     """
     # HTML elements without an end tag, and SVG elements without content.
     void_elements = ("br", "hr", "meta", "img", "input", "rect", "line", "path", "circle")
@@ -61,7 +61,7 @@ def svg_line(
     css_class: str | None = None,
     **attributes: Attribute,
 ) -> Html:
-    """A line of an SVG picture, in its units; `css_class` has its look."""
+    """A line of an SVG picture, in its units, styled by `css_class`."""
     ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
     return element("line", **_rounded(ends), class_=css_class, **attributes)
 
@@ -77,7 +77,7 @@ def svg_rectangle(
 def svg_text(
     text: Child, x: float, y: float, css_class: str | None = None, **attributes: Attribute
 ) -> Html:
-    """A text of an SVG picture, at a place in its units; `css_class` has its look."""
+    """A text of an SVG picture, at a position in its units, styled by `css_class`."""
     return element("text", text, **_rounded({"x": x, "y": y}), class_=css_class, **attributes)
 
 
@@ -86,17 +86,17 @@ def _rounded(lengths: dict[str, float]) -> dict[str, float]:
 
 
 def join(*children: Child) -> Html:
-    """Children one after the other."""
+    """Concatenates elements and texts; texts are escaped."""
     given = (child for child in children if child is not None)
     return Html("".join(c if isinstance(c, Html) else escape(str(c)) for c in given))
 
 
 def page_style(package: str, name: str) -> str:
-    """A style sheet of a page, with the rules before it that all pages have.
+    """Style sheet of a page, after the rules that all pages share.
 
     Args:
-        package: that has the sheet.
-        name: of its file.
+        package: package with the style sheet.
+        name: file name of the style sheet.
     """
     sheets = ("burg_drake.visualization", "page.css"), (package, name)
     return "".join((files(where) / file).read_text(encoding="utf-8") for where, file in sheets)
@@ -106,9 +106,9 @@ def html_document(title: str, style: str, *content: Child) -> str:
     """A whole HTML document.
 
     Args:
-        title: of the window.
-        style: its style sheet.
-        content: of the body.
+        title: title of the window.
+        style: style sheet.
+        content: content of the body.
     """
     values = {"title": title, "style": Html(style), "content": join(*content)}
     return render_page("visualization/document.html.jinja", **values)
@@ -120,8 +120,8 @@ class PageTable:
 
     Attributes:
         head: names of the columns.
-        rows: cells of each row; the first one names the row. "·" stands for no value.
-        numbers: indices of the columns that are aligned to the right.
+        rows: cells of each row; the first cell names the row. "·" stands for no value.
+        numbers: indices of right-aligned columns.
         style: CSS class.
         total: whether the last row is the sum of the others.
     """
@@ -134,20 +134,20 @@ class PageTable:
 
 
 def render_page(template: str, **values: object) -> str:
-    """A page as HTML.
+    """Renders a page from a template.
 
     Args:
-        template: its path in the package, such as `evaluation/report/report.html.jinja`. A whole
+        template: path in the package, such as `evaluation/report/report.html.jinja`. A whole
             page starts with `{% extends "visualization/page.html.jinja" %}`, and can import the
             tables of `visualization/blocks.html.jinja`.
-        values: what the template shows, by name. They are escaped, except those that are `Html`.
+        values: values of the template by name. They are escaped, unless they are `Html`.
     """
     return _environment().get_template(template).render(values)
 
 
 @functools.cache
 def _environment() -> Environment:
-    """The templates of the package; they are compiled once a process."""
+    """The package's template environment; compiles each template once per process."""
     # Imported here, as processes that write no page need none of its 80 ms.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -171,5 +171,5 @@ def _environment() -> Environment:
 
 
 def _png_uri(data: bytes) -> str:
-    """A PNG file as the source of a picture."""
+    """A PNG file as a data URI."""
     return f"data:image/png;base64,{base64.b64encode(data).decode()}"

@@ -23,7 +23,7 @@ HIGH_PRESSURE_COLOR = np.array([0.90, 0.10, 0.08])
 
 @dataclass(frozen=True)
 class HydroelasticMesh:
-    """A geometry as hydroelastic contact has it, in the object frame O.
+    """Mesh of a geometry in hydroelastic contact, in the object frame O.
 
     Attributes:
         vertices: (V, 3) [m].
@@ -91,8 +91,8 @@ def _hydroelastic_mesh(scene_graph: SceneGraph, geometry: GeometryId) -> Hydroel
 
 
 def boundary_faces(tetrahedra: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Faces (F, 3) of tetrahedra (T, 4) that belong to one of them only."""
-    # Of the face opposite to each vertex, seen from outside.
+    """Faces (F, 3) that belong to only one of some tetrahedra (T, 4)."""
+    # Vertices of the face opposite to each vertex, counter-clockwise from outside.
     corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
     faces = tetrahedra[:, corners].reshape(-1, 3)
     _, index, count = np.unique(
@@ -102,7 +102,7 @@ def boundary_faces(tetrahedra: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def convex_depth(vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Depth of points below the surface of a convex body, as a share of the deepest one's.
+    """Depth of points below the surface of a convex body, relative to the deepest point.
 
     Drake's pressure is the hydroelastic modulus times this share; all compliant geometries of a
     library are convex.
@@ -124,12 +124,12 @@ def convex_depth(vertices: Array, faces: NDArray[np.int64]) -> Array:
 def cut_open(
     mesh: HydroelasticMesh, point: Array, normal: Array
 ) -> tuple[Array, NDArray[np.int64], Array]:
-    """What is left of a compliant mesh behind a plane, with the cut as its face.
+    """Cuts a compliant mesh with a plane; returns the surface of the rest, with the cut closed.
 
     Args:
-        mesh: compliant.
-        point: (3,) of the plane [m].
-        normal: (3,) towards the side that is taken away.
+        mesh: compliant mesh.
+        point: (3,) point of the plane [m].
+        normal: (3,) normal of the plane, towards the removed side.
 
     Returns:
         Vertices (N, 3) [m], triangles (M, 3) and pressure (N,), as in `HydroelasticMesh`.

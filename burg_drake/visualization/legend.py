@@ -21,13 +21,13 @@ BAR_MARGIN = 14
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A line of the legend that switches what it names on and off.
+    """A line of the legend that shows and hides what it names.
 
     Attributes:
         label: what the colour stands for.
         color: as CSS has it.
         paths: Meshcat paths that the entry shows and hides.
-        shown: whether they are shown when the page is opened; who draws them hides them if not.
+        shown: whether the paths are visible when the page is opened; if not, the caller hides them.
     """
 
     label: str
@@ -38,16 +38,16 @@ class LegendEntry:
 
 @dataclass(frozen=True)
 class ColorBar:
-    """What the colours of numbers stand for: a bar below their histogram, and which part is shown.
+    """Colour bar of a number below its histogram, with a selection of the visible range.
 
     Attributes:
-        title: what the numbers are.
-        colors: of the bins, lowest first, as CSS has them.
-        counts: of the bins.
-        ticks: places along the bar in [0, 1], rising from 0 to 1, and what is written there; left
-            out where a picture has no room for it, except at the ends.
+        title: name of the number.
+        colors: CSS colours of the bins, lowest first.
+        counts: counts of the bins.
+        ticks: positions along the bar, rising from 0 to 1, and their texts; texts without room are
+            left out, except at the ends.
         paths: Meshcat path of each bin.
-        note: below the bar.
+        note: text below the bar.
     """
 
     title: str
@@ -85,7 +85,7 @@ class ColorBar:
 
 
 def _ticks_with_room(ticks: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
-    """The ends of a bar, whose texts reach inwards, and the ticks that fit between them."""
+    """Both end ticks of a bar, whose texts extend inwards, and the ticks that fit between them."""
     character_width = 7  # Pixels, of the widest character, and the least gap between two texts.
     first, *inner, last = ticks
     kept = [first]

@@ -59,18 +59,18 @@ GALLERY_FIELD_OF_VIEW_DEG = 22.0
 def show_library(
     library: ObjectLibrary, meshcat: Meshcat, names: Iterable[str] | None = None
 ) -> tuple[LegendEntry, ...]:
-    """Shows a row for each object: its looks, its convex pieces, what contact sees, stable poses.
+    """Shows a row for each object: visual mesh, convex pieces, contact geometry, stable poses.
 
-    All is below `/drake/library`: `labels/NAME`, `visual/NAME`, `pieces/NAME/000`, `contact/NAME`
+    Paths below `/drake/library`: `labels/NAME`, `visual/NAME`, `pieces/NAME/000`, `contact/NAME`
     and `poses/NAME/0`.
 
     Args:
-        library: what to show.
-        meshcat: where; what it showed below that path before is removed.
-        names: of objects, in this order; all if None.
+        library: library to show.
+        meshcat: Meshcat to draw in; anything below that path is replaced.
+        names: names of objects, in this order; all if None.
 
     Returns:
-        Switches for the columns, to be given to `save_html`.
+        Legend switches for the columns, for `save_html`.
 
     Raises:
         UnknownNameError: no such object, or one of its files is missing.
@@ -154,14 +154,14 @@ def _gallery_legend(compliant: bool) -> tuple[LegendEntry, ...]:
 
 @dataclass(frozen=True)
 class GalleryThing:
-    """Something that stands in the gallery.
+    """An exhibit of the gallery: an object in one of its representations.
 
     Attributes:
-        path: in Meshcat's tree.
-        R_WO: (3, 3) how it stands.
-        item: room for it and its caption.
-        caption: what is written in front of it, and how wide that is [m].
-        draw: draws it in its frame O, at a path of Meshcat.
+        path: path in Meshcat's tree.
+        R_WO: (3, 3) orientation.
+        item: space for the exhibit and its caption.
+        caption: text in front of it, and width of the text [m].
+        draw: draws the exhibit in its frame O, at a path of Meshcat.
         has_tile: whether it stands on a tile.
     """
 
@@ -221,12 +221,12 @@ def _hull_corners(library: ObjectLibrary, name: str) -> Array:
 
 
 def _turn_to_camera(corners: Array, R_SO: Array) -> Array:
-    """(3, 3) a standing object, turned so that the camera sees most of its corners (N, 3)."""
+    """(3, 3) orientation of a standing object with the best yaw for its corners (N, 3)."""
     return rot_z(best_yaw(corners @ R_SO.T, camera_rotation(GALLERY_ELEVATION))) @ R_SO
 
 
 def _room_for(points: Array, caption: tuple[Mesh, float]) -> GalleryItem:
-    """The room for points (N, 3) around O with the axes of the world [m]."""
+    """Space for points (N, 3) around O, along the axes of the world [m]."""
     return GalleryItem(points.min(axis=0), points.max(axis=0), caption[1])
 
 
@@ -307,7 +307,7 @@ def _draw_contact(
 
 
 def _cut_normal(points: Array) -> Array:
-    """Normal (3,) of the cut through points (N, 3) of which the camera sees more: front or top."""
+    """Normal (3,) of the cut through points (N, 3), front or top, whichever shows more area."""
     _, depth, height = np.ptp(points, axis=0)
     front = height * np.cos(GALLERY_ELEVATION) > depth * np.sin(GALLERY_ELEVATION)
     return np.array([0.0, -1.0, 0.0] if front else [0.0, 0.0, 1.0])
@@ -316,7 +316,7 @@ def _cut_normal(points: Array) -> Array:
 def _join_meshes(
     meshes: Sequence[tuple[Array, NDArray[np.int64], Array]],
 ) -> tuple[Array, NDArray[np.int32], Array]:
-    """Several meshes as one for Meshcat: vertices (3, V), faces (3, F), values (V,)."""
+    """Joins meshes for Meshcat: vertices (3, V), faces (3, F), values (V,)."""
     vertices, faces, values = zip(*meshes, strict=True)
     first = np.cumsum([0, *map(len, vertices)])
     shifted = [f + start for f, start in zip(faces, first, strict=False)]
@@ -328,13 +328,13 @@ def _join_meshes(
 
 
 def write_label(meshcat: Meshcat, path: str, label: tuple[Mesh, float], p_WL: Array) -> None:
-    """Puts the middle of a text's foot at `p_WL` (3,) on the floor [m]."""
+    """Writes a text on the floor, with the middle of its foot at `p_WL` (3,) [m]."""
     text_lift = 1e-3  # Metres above the floor, against flicker.
     draw_label(meshcat, path, label, make_pose(p_AB=p_WL + np.array([0.0, 0.0, text_lift])))
 
 
 def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: Rgba) -> None:
-    """A slab between corners (2, 2) in x and y, `SLAB_HEIGHT` high."""
+    """Draws a slab between corners (2, 2) in x and y, `SLAB_HEIGHT` high."""
     (x0, y0), (x1, y1) = bounds
     meshcat.SetObject(path, Box(x1 - x0, y1 - y0, SLAB_HEIGHT), color)
     middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, bottom + SLAB_HEIGHT / 2.0]
@@ -344,13 +344,13 @@ def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: 
 def show_objects_for_grasps(
     library: ObjectLibrary, grasps: GraspSet, width: Array, meshcat: Meshcat
 ) -> Array:
-    """Shows the objects of grasps in rows and aims the camera; the grasps are left to draw.
+    """Shows the objects of grasps in rows and aims the camera. Does not draw the grasps.
 
     Args:
-        library: of the objects.
+        library: library of the objects.
         grasps: at least one.
-        width: (N,) at which they will be drawn [m].
-        meshcat: where, below `/drake/library`; what was there before is removed.
+        width: (N,) distance between the fingers of the drawn grasps [m].
+        meshcat: Meshcat to draw in; anything below `/drake/library` is replaced.
 
     Returns:
         `X_WG` (N, 4, 4) of the grasps.
@@ -377,7 +377,7 @@ def show_objects_for_grasps(
 def _object_with_grasps(
     library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float
 ) -> tuple[str, GalleryThing]:
-    """The name of an object, and the object with room for its grasps."""
+    """Name of an object, and the object with space for its grasps."""
     corners = _hull_corners(library, name)
     R_WO = _turn_to_camera(corners, upright_rotation(library.entry(name)))
     own = grasps.object == name
@@ -393,7 +393,7 @@ def _object_with_grasps(
 def _layout_rows(
     things: list[tuple[str, GalleryThing]], unit: float
 ) -> tuple[GalleryLayout, list[list[tuple[str, GalleryThing]]]]:
-    """As many rows, one behind the other, as let the camera come nearest."""
+    """Divides objects into the number of rows that lets the camera come nearest."""
     layouts = []
     for count in range(1, len(things) + 1):
         size = -(-len(things) // count)

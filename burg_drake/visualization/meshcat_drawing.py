@@ -25,18 +25,18 @@ def aim_at(
     *,
     field_of_view_deg: float = 45.0,
 ) -> Array:
-    """Looks from as near as lets all points be in view; the eye turns about their middle.
+    """Aims the camera from the nearest place with all points in view; it orbits their middle.
 
     Args:
         meshcat: whose camera to set.
         p_WQ: (N, 3) points [m].
-        forward: (3,) direction in the world in which to look; not vertical.
+        forward: (3,) viewing direction in the world; not vertical.
         field_of_view_deg: vertical angle of view.
 
     Returns:
         (3, 3) `R_WC` of the camera: x to the right, y down, z forward.
     """
-    filled_share = 0.94  # Of the view.
+    filled_share = 0.94  # Share of the view that the points fill.
     points = np.asarray(p_WQ, dtype=float).reshape(-1, 3)
     R_WC = camera_rotation_along(forward)
     vertical = np.tan(np.deg2rad(field_of_view_deg) / 2.0)
@@ -61,12 +61,12 @@ def draw_flat_triangles(
 ) -> None:
     """Draws triangles in one colour, without shading and shadow.
 
-    The material is black but for its own glow, and three.js' tone curve, which would brighten it,
-    is off: the pixels have the colour as it was given.
+    The material is black and emissive, and three.js' tone mapping, which would brighten it, is
+    off: the pixels have exactly the given colour.
 
     Args:
-        meshcat: where to draw.
-        path: in its tree.
+        meshcat: Meshcat to draw in.
+        path: path in its tree.
         vertices: (3, V) [m].
         faces: (3, F) triangles, seen from both sides.
         rgba: colour (sRGB) and opacity.
@@ -109,15 +109,15 @@ def draw_triad(meshcat: Meshcat, path: str, X_WF: Array, style: TriadStyle) -> N
     """Draws a frame.
 
     Args:
-        meshcat: where to draw.
-        path: gets the frame's pose; below it are `x`, `y`, `z`, each with `shaft` and `head`, whose
-            own frame is at the tip, and `origin`.
+        meshcat: Meshcat to draw in.
+        path: path that gets the frame's pose; below it are `origin`, and `x`, `y`, `z`, each with
+            `shaft` and `head`, whose own frame is at the tip.
         X_WF: (4, 4) the frame.
         style: sizes.
     """
     origin_color = Rgba(0.2, 0.2, 0.2)
-    head_scale = 2.4  # Radius over that of an axis.
-    origin_scale = 1.6  # Radius over that of an axis.
+    head_scale = 2.4  # Radius relative to that of an axis.
+    origin_scale = 1.6  # Radius relative to that of an axis.
     shaft = style.length - style.head
     radius = head_scale * style.radius
     X_AH = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, style.length))

@@ -28,14 +28,14 @@ class GraspPicker:
     """Control of a page that shows the gripper at any of the drawn grasps.
 
     Attributes:
-        gripper: drawn in the same Meshcat.
-        X_WG: (N, 4, 4) the grasps.
-        width: (N,) between the pads [m].
-        holder: (N,) the object of each; grasps of one object follow each other.
-        label: (N,) text of each in the list.
+        gripper: gripper in the same Meshcat.
+        X_WG: (N, 4, 4) grasps.
+        width: (N,) distance between the pads [m].
+        holder: (N,) object of each grasp; grasps of one object are consecutive.
+        label: (N,) text of each grasp in the list.
         title: heading of the list.
-        groups: as they are drawn.
-        selected: shown when the page is opened; none if None.
+        groups: groups of the drawn grasps.
+        selected: grasp that is shown when the page is opened; none if None.
     """
 
     gripper: GripperView
@@ -58,7 +58,7 @@ class GraspPicker:
         meshcat.AddSlider("grasp", 0, len(self.label), 1, start, "ArrowLeft", "ArrowRight")
 
     def follow_slider(self, meshcat: Meshcat) -> None:
-        """Puts the gripper where the slider says."""
+        """Moves the gripper to the grasp selected by the slider."""
         k = round(meshcat.GetSliderValue("grasp")) - 1
         if k >= 0:
             self.gripper.place(self.X_WG[k], float(self.width[k]))
@@ -66,7 +66,7 @@ class GraspPicker:
             self.gripper.hide()
 
     def script_data(self) -> dict[str, Any]:
-        """What the script of the page needs to know."""
+        """Data for the script of the page."""
         groups = np.full(len(self.label), -1)
         for g, group in enumerate(self.groups):
             groups[group.members] = g
@@ -91,7 +91,7 @@ class GraspPicker:
 
 
 def _column_major(X: Array) -> list[float]:
-    """A pose (4, 4) as three.js has it: column by column."""
+    """A pose (4, 4) in three.js' order: column by column."""
     return (np.round(X.T.reshape(-1), MATRIX_DECIMALS) + 0.0).tolist()
 
 
@@ -137,6 +137,6 @@ def page_panel(
     legend: Sequence[LegendEntry | ColorBar],
     controls: GraspPicker | None = None,
 ) -> str:
-    """HTML of the panel, and how page and view behave."""
+    """HTML of the panel, with the style and the script of the page."""
     values = {"title": title, "caption": caption, "legend": legend, "picker": controls}
     return render_page("visualization/meshcat_panel.html.jinja", aspect=VIEW_ASPECT, **values)

@@ -14,7 +14,7 @@ from burg_drake.objects import UPRIGHT_TOLERANCE, ObjectEntry, ObjectLibrary
 
 
 def upright_rotation(entry: ObjectEntry) -> Array:
-    """(3, 3) `R_WO` of a standing object: in its own frame if it can, else in its first pose."""
+    """(3, 3) `R_WO` of a standing object: its own frame if it is stable, else its first pose."""
     if not entry.stable_poses:
         return np.eye(3)
     R_SO = entry.X_SO(entry.proposed_pose)[:3, :3]
@@ -22,11 +22,11 @@ def upright_rotation(entry: ObjectEntry) -> Array:
 
 
 def best_yaw(points: Array, R_WC: Array) -> float:
-    """Angle [rad] to turn points (N, 3) about z so that they show most of themselves to a camera.
+    """Rotation of points (N, 3) about z with the largest silhouette for a camera [rad].
 
     Args:
-        points: corners of the convex hull, say, in the world.
-        R_WC: (3, 3) camera.
+        points: points in the world, such as the corners of a convex hull.
+        R_WC: (3, 3) axes of the camera.
     """
     yaws = np.deg2rad(np.arange(0.0, 360.0, 15.0))  # Radians.
     yaw_cost = 0.03  # Share of the silhouette that a half turn must gain.
@@ -46,7 +46,7 @@ def camera_rotation(elevation: float) -> Array:
 
 
 def fit_camera(points: Array, R_WC: Array, half_view: Array) -> Array:
-    """The nearest place (3,) of a camera from which points are in the picture, and in its middle.
+    """Nearest position (3,) of a camera with points in view, in the middle of the picture.
 
     Args:
         points: (N, 3) in the world [m].
@@ -86,7 +86,7 @@ class FlatView:
     Attributes:
         R_WC: (3, 3) the camera's axes: x to the right, y down, z into the picture.
         scale: SVG units a metre.
-        corner: (2,) what along the camera's x and y is at the picture's upper left [m].
+        corner: (2,) position of the picture's upper left corner along the camera's x and y [m].
         size: width and height [SVG units].
     """
 
@@ -96,11 +96,11 @@ class FlatView:
     size: tuple[float, float]
 
     def project(self, p_WQ: Array) -> Array:
-        """Where points (..., 3) in the world [m] are in the picture (..., 2) [SVG units]."""
+        """Projects points (..., 3) in the world [m] into the picture (..., 2) [SVG units]."""
         return (np.asarray(p_WQ) @ self.R_WC[:, :2] - self.corner) * self.scale
 
     def depths(self, p_WQ: Array) -> Array:
-        """How far (...) points (..., 3) in the world [m] lie behind the picture [m]."""
+        """Depth (...) of points (..., 3) in the world [m] behind the picture [m]."""
         return np.asarray(p_WQ) @ self.R_WC[:, 2]
 
 
@@ -113,7 +113,7 @@ def fit_view(
         p_WQ: (N, 3) points in the world [m]; at least one.
         R_WC: (3, 3) the camera's axes.
         width, height: of the picture [SVG units]; the height follows from the points if None.
-        margin: that is left free on every side [SVG units].
+        margin: free margin on every side [SVG units].
     """
     seen = np.asarray(p_WQ) @ R_WC[:, :2]
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -172,13 +172,13 @@ def shaded_outline(solids: Sequence[SolidMesh], view: FlatView) -> list[str]:
 
 
 def object_surface(library: ObjectLibrary, name: str) -> SolidMesh:
-    """The surface of an object in its own frame; read once a process, as long as it is the same.
+    """The surface of an object in its own frame; cached per process until its files change.
 
     Raises:
         UnknownNameError: no such object, or its mesh file is missing.
         MeshError: the mesh file is damaged.
     """
-    max_surfaces = 64  # So many objects' surfaces are kept for the next scene.
+    max_surfaces = 64  # Number of cached surfaces.
     key = str(library.root.resolve()), name, library.content[name]
     if key not in _SURFACE_CACHE:
         while len(_SURFACE_CACHE) >= max_surfaces:
@@ -193,20 +193,20 @@ _SURFACE_CACHE: dict[tuple[str, str, str], SolidMesh] = {}
 
 
 def footprint(solid: SolidMesh, view: FlatView) -> str:
-    """The `d` of what a solid covers of the plane that it stands on."""
+    """SVG path data `d` of a solid's vertical projection onto the plane that it stands on."""
     hull = cv2.convexHull(view.project(project_to_ground(solid)).astype(np.float32))
     return path_data(hull[:, 0, :])
 
 
 def project_to_ground(solid: SolidMesh) -> Array:
-    """(N, 3) its vertices, moved straight down onto the plane that it stands on [m]."""
+    """(N, 3) vertices of a solid, projected vertically onto the plane that it stands on [m]."""
     ground = solid.vertices.copy()
     ground[:, 2] = solid.vertices[:, 2].min()
     return ground
 
 
 def _tone_raster(solids: Sequence[SolidMesh], view: FlatView) -> NDArray[np.uint8]:
-    """(H, W) 1 and more for the tones from the darkest on, 0 where nothing is."""
+    """(H, W) tones of the pixels, from 1 for the darkest; 0 for the background."""
     subpixel_bits = 4  # Fractional bits of OpenCV's coordinates.
     width, height = (int(np.ceil(side * PIXELS_PER_UNIT)) for side in view.size)
     image = np.zeros((height, width), dtype=np.uint8)
@@ -223,7 +223,7 @@ def _tone_raster(solids: Sequence[SolidMesh], view: FlatView) -> NDArray[np.uint
 
 
 def _smooth_mask(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where more than half of the neighbours are set; counting is quicker than `medianBlur`."""
+    """Majority filter of a mask; counting neighbours is faster than `medianBlur`."""
     filter_width = 9  # Pixels, odd.
     size = filter_width, filter_width
     count = cv2.boxFilter(
@@ -262,7 +262,7 @@ def _trace_contours(mask: NDArray[np.bool_]) -> str:
 def painted_shadow(
     hulls: Sequence[Array], X_WC: Array, focal: float, size: NDArray[np.int64]
 ) -> Array:
-    """Light left on a ground at z = 0 under convex pieces, as a factor (H, W) in [0, 1].
+    """Painted shadow of convex pieces on the ground z = 0, as a factor (H, W) in [0, 1].
 
     Args:
         hulls: (N, 3) corners of each in the world [m].

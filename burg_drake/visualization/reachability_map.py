@@ -1,4 +1,4 @@
-"""Reachability maps from above: as an inline SVG of the board, and as an image to lay on it."""
+"""Reachability maps from above: as an inline SVG of the board, and as an image of the board."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def reachability_chart(
 
 
 def reachability_key() -> Html:
-    """What the colours stand for, from none to all orientations."""
+    """Colour key, from no to all hand orientations."""
     colors = map_colors((np.arange(10) + 0.5) / 10)
     bars = [
         svg_rectangle(16 * k, 0, 16, 10, fill=hex_color(color)) for k, color in enumerate(colors)
@@ -88,12 +88,12 @@ def object_outlines(scene: Scene) -> dict[str, Array]:
 
 
 def reach_image(layer: ReachLayer, *, pixels: int = 1, opacity: float = 1.0) -> NDArray[np.uint8]:
-    """The shares of the hand's turns as colours, from none to all.
+    """Image of the shares of reachable hand orientations at one height.
 
     Args:
-        layer: what is reached.
-        pixels: along each side of a point's cell.
-        opacity: 0 to 1, of all colours.
+        layer: the layer of the map.
+        pixels: pixels along each side of a point's cell.
+        opacity: opacity of all colours, 0 to 1.
 
     Returns:
         (H, W, 4) red, green, blue, opacity; it covers the board, its first row along the upper edge

@@ -15,10 +15,10 @@ from burg_drake.visualization.object_drawing import box_corners
 
 
 def open_meshcat(port: int | None = None) -> Meshcat:
-    """A Meshcat server with a quiet page: light background, no grid, no axes.
+    """Starts a Meshcat server: light background, no grid, no axes.
 
     Args:
-        port: where to listen on localhost; the first free one from 7000 if None.
+        port: port on localhost; the first free one from 7000 if None.
 
     Raises:
         InvalidInputError: the port is taken.
@@ -61,14 +61,14 @@ def show_scene(
     robot: Robot = "arm",
     labels: bool = True,
 ) -> StationDiagram:
-    """Shows a scene as its document places it, the robot at home, and aims the camera.
+    """Shows a scene at its documented poses, with the robot at home, and aims the camera.
 
     Args:
-        scene: what stands on the board.
-        station: where.
-        meshcat: where to show it.
+        scene: scene on the board.
+        station: station of the scene.
+        meshcat: Meshcat to draw in.
         robot: as for `build_station_diagram`.
-        labels: write the instances' names on the board.
+        labels: whether to write the instances' names on the board.
 
     Returns:
         The diagram that was shown.
@@ -118,14 +118,14 @@ def aim_camera(
     robot: Robot = "arm",
     also: Array | None = None,
 ) -> Array:
-    """Looks at the board: across it towards the arm if there is one, else from its lower edge.
+    """Aims the camera at the board: towards the arm if there is one, else from the lower edge.
 
     Args:
-        scene: what stands on the board; all of it will be in view.
-        station: where.
-        meshcat: whose camera to set.
+        scene: scene on the board, all of which will be in view.
+        station: station of the scene.
+        meshcat: Meshcat whose camera to set.
         robot: as for `build_station_diagram`.
-        also: (N, 3) points in the world that will be in view, too [m].
+        also: (N, 3) additional points in the world to have in view [m].
 
     Returns:
         (3, 3) `R_WC`.

@@ -38,15 +38,15 @@ def show_station(
     """Shows a station with a scene on it.
 
     Args:
-        scene: what stands on the board.
+        scene: scene on the board.
         station: the station.
-        meshcat: where to show it.
-        reachability: drawn as coloured tiles, if given.
-        span: of the arm; drawn as the circle in which it cuts the table top, if given.
-        camera: look through this one; else across the board.
+        meshcat: Meshcat to draw in.
+        reachability: map to draw as coloured tiles, if given.
+        span: span of the arm, drawn as its circle on the table top, if given.
+        camera: camera to look through; across the board if None.
 
     Returns:
-        A legend that switches what is shown.
+        A legend that shows and hides the parts.
 
     Raises:
         UnknownNameError: the station has no such camera.
@@ -76,9 +76,9 @@ def show_station(
 
 
 def draw_obstacles(station: Station, meshcat: Meshcat) -> LegendEntry:
-    """Draws the station's obstacles as glass, in place of those that a diagram shows."""
+    """Draws the station's obstacles transparently, in place of those of a diagram."""
     obstacles_path = "/drake/obstacles"
-    opacity = 0.35  # Opacity of obstacles, so that what is behind them is seen.
+    opacity = 0.35  # Things behind an obstacle stay visible.
     r, g, b, _ = SurroundingsProperties.obstacle_color
     for name, box in station.document.background.items():
         meshcat.SetProperty(f"/drake/visualizer/{name}", "visible", False)
@@ -88,7 +88,7 @@ def draw_obstacles(station: Station, meshcat: Meshcat) -> LegendEntry:
 
 
 def board_condition(scene: Scene) -> str:
-    """What stood on the board while its reachability was measured, for people."""
+    """Condition of a reachability map, in words: the objects on the board."""
     count = len(scene.instances) + len(scene.background)
     if count == 0:
         return "board empty"
@@ -99,12 +99,12 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[Legen
     """Draws each camera as the pyramid over its image, upper edge bold, with its name.
 
     Args:
-        station: whose cameras; at least one.
-        meshcat: where to draw them.
-        R_WT: (3, 3) how names stand: x along them, y up.
+        station: station with at least one camera.
+        meshcat: Meshcat to draw in.
+        R_WT: (3, 3) orientation of the names: x along the text, y up.
 
     Returns:
-        A switch for them, and points (N, 3) that have to be in view for them to be [m].
+        A legend switch for the cameras, and points (N, 3) around the drawings [m].
     """
     camera_color = "#b3471d"
     image_depth = 0.16  # Metres.
@@ -131,7 +131,7 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[Legen
 
 
 def draw_span(span: ArmSpan, meshcat: Meshcat) -> LegendEntry:
-    """Draws where the ball that the grasp frame never leaves cuts the table top."""
+    """Draws the circle on the table top of the ball that bounds the grasp frame's positions."""
     span_path = "/drake/span"
     span_color = "#3b6ea5"
     circle = np.asfortranarray(span_circle(span).T)
@@ -141,7 +141,7 @@ def draw_span(span: ArmSpan, meshcat: Meshcat) -> LegendEntry:
 
 
 def span_circle(span: ArmSpan) -> Array:
-    """(N, 3) points around where the ball of `draw_span` cuts the table top [m]."""
+    """(N, 3) points on the circle of `draw_span` [m]."""
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     p = _span_radius(span) * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     return p + np.array([span.p_WJ[0], span.p_WJ[1], MAP_TILE_LIFT])
@@ -154,14 +154,14 @@ def _span_radius(span: ArmSpan) -> float:
 def draw_reachability(
     reachability: ReachabilityMap, station: Station, meshcat: Meshcat, condition: str
 ) -> list[LegendEntry | ColorBar]:
-    """Draws a map as tiles: the lowest points on the board, smaller tiles for others where they
-    are.
+    """Draws a map as tiles: those of the lowest height on the board, smaller ones at the heights
+    above.
 
     Args:
         reachability: the map.
-        station: whose board.
-        meshcat: where to draw it.
-        condition: under which it was measured, for the legend.
+        station: station of the board.
+        meshcat: Meshcat to draw in.
+        condition: condition of the map, for the legend.
     """
     tile_shares = (0.94, 0.45)  # Side of a tile over that of a cell: on the board, and above it.
     tile_opacity = 0.85
@@ -193,10 +193,10 @@ def draw_reachability(
 
 
 def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, NDArray[np.int32]]:
-    """Equal rectangles at one height, to be seen from above.
+    """Equal rectangles at one height, visible from above.
 
     Args:
-        middle: (N, 2) their middles [m].
+        middle: (N, 2) centres of the rectangles [m].
         size: (2,) extents [m].
         z: height [m].
 
@@ -212,7 +212,7 @@ def tile_triangles(middle: Array, size: Array, z: float) -> tuple[Array, NDArray
 
 
 def look_through(camera: Camera, meshcat: Meshcat) -> None:
-    """Puts Meshcat's eye into a camera, with its vertical field of view; the eye stands upright."""
+    """Moves Meshcat's eye to a camera, with its vertical field of view, but without its roll."""
     X_WC = camera.X_WC.matrix()
     ahead = transform_points(X_WC, [[0.0, 0.0, 1.0]])[0]
     vertical = 2.0 * np.arctan(0.5 * camera.height / camera.focal[1])
@@ -221,8 +221,8 @@ def look_through(camera: Camera, meshcat: Meshcat) -> None:
 
 
 def _height_entries(reachability: ReachabilityMap) -> Sequence[LegendEntry]:
-    """Switches for the heights; names of them that people can read on the picture."""
-    key_color = "#9aa3ad"  # None of the map's colours.
+    """Legend switches for the heights."""
+    key_color = "#9aa3ad"  # Not a colour of the map.
     entries = []
     for k, height in enumerate(reachability.heights):
         where = "tiles on the board" if k == 0 else "small tiles"

@@ -70,7 +70,7 @@ THUMBNAIL_LIGHTS = [
         ("world", (-1.0, 0.2, -0.2), 0.16),
     )
 ]
-"""Room light from the upper left, a weaker one with the camera, a faint one from the right."""
+"""Light from the upper left, a weaker one at the camera, a faint one from the right."""
 OBJECT_LABEL = 1  # Render label of the object that is in the picture.
 
 
@@ -80,7 +80,7 @@ class Thumbnail:
 
     Attributes:
         pixels: (H, W, 3) colours as bytes.
-        coverage: (H, W) share of each pixel that is the object and not background, in [0, 1].
+        coverage: (H, W) share of each pixel that the object covers, in [0, 1].
     """
 
     pixels: NDArray[np.uint8]
@@ -100,8 +100,8 @@ class ObjectRenderer:
     """Renders the objects of a library, all with one renderer.
 
     Args:
-        library: where the objects are.
-        names: of those that will be asked for; all if None.
+        library: library of the objects.
+        names: names of the objects to render; all if None.
 
     Raises:
         UnknownNameError: no such object, or one of its files is missing.
@@ -132,19 +132,20 @@ class ObjectRenderer:
     def portrait(
         self, name: str, size: tuple[int, int] = (320, 240), *, stable_pose: int | None = None
     ) -> Thumbnail:
-        """An object as it looks.
+        """Renders the visual mesh of an object.
 
         Args:
-            name: of the object.
+            name: name of the object.
             size: width and height [pixel].
-            stable_pose: in which it stands; None: in its own frame if it can, else the first.
+            stable_pose: index of its stable pose; if None, its own frame if stable, else the first.
         """
         entry = self._library.entry(name)
         R_WO = upright_rotation(entry) if stable_pose is None else entry.X_SO(stable_pose)[:3, :3]
         return self._render(name, False, R_WO, size)
 
     def pieces(self, name: str, size: tuple[int, int] = (320, 240)) -> Thumbnail:
-        """The convex pieces of an object, each in its colour and slightly apart, turned alike."""
+        """Renders the convex pieces of an object, coloured and slightly apart, seen as in
+        `portrait`."""
         return self._render(name, True, upright_rotation(self._library.entry(name)), size)
 
     def _add(self, name: str) -> None:
@@ -183,7 +184,7 @@ class ObjectRenderer:
 
     def _render(self, name: str, pieces: bool, R_WO: Array, size: tuple[int, int]) -> Thumbnail:
         supersampling = 2  # Rendered pixels per pixel, each way, against jagged edges.
-        elevation = np.deg2rad(32.0)  # Radians: into a mug, and still at its side.
+        elevation = np.deg2rad(32.0)  # Radians. Shows both the inside and the side of a mug.
         hulls = self._hulls[name]
         if pieces:
             offsets = explosion_offsets(hulls, THUMBNAIL_EXPLOSION)
@@ -212,7 +213,7 @@ class ObjectRenderer:
     def _images(
         self, shown: tuple[str, bool], X_WO: Array, X_WC: Array, scale: Array
     ) -> tuple[Array, NDArray[np.int16]]:
-        """Colours (H, W, 3) and labels (H, W) of one object."""
+        """Renders colours (H, W, 3) and labels (H, W) of one object."""
         hidden_pose = RigidTransform([0.0, 0.0, -1e4])  # Beyond the camera's range.
         poses = FramePoseVector()
         for key, frame in self._frames.items():
@@ -232,11 +233,11 @@ class ObjectRenderer:
 
 
 def explosion_offsets(hulls: Sequence[Array], share: float) -> list[Array]:
-    """By how much (3,) to move each of several convex pieces so that gaps open between them.
+    """Displacements (3,) of convex pieces that open gaps between them.
 
     Args:
-        hulls: (N, 3) corners of each [m].
-        share: of a piece's distance from the middle of all.
+        hulls: (N, 3) corners of each piece [m].
+        share: displacement as a share of a piece's distance from the middle of all.
     """
     if len(hulls) < 2:
         return [np.zeros(3) for _ in hulls]

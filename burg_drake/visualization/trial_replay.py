@@ -21,7 +21,7 @@ PREFERRED_HEADING = (0.73, -0.68)
 CAMERA_DISTANCE = 0.80
 """Horizontal distance of the camera from the grasp, in metres. Farther objects do not hide it."""
 SIGHT_CLEARANCE = 0.10
-"""Preferred distance of other objects from the line of sight, in metres."""
+"""Preferred clearance of other objects from the line of sight, in metres."""
 REPLAY_MARGINS = display_order(
     (
         *("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "others_turned"),
@@ -48,10 +48,10 @@ def record_trial(
     mass: float | None = None,
     lift: float | None = None,
 ) -> TrialResult:
-    """Executes a grasp once more and leaves the recording in Meshcat, where it plays in a loop.
+    """Executes a grasp again and records it in Meshcat, where it plays in a loop.
 
-    A grasp whose open hand collides leaves a still picture of that, where it does: at the grasp, or
-    where the approach begins.
+    If the open hand collides, shows it instead, at the pose in collision: the grasp, or the start
+    of the approach.
 
     Args:
         trial: as that to be shown, and in `meshcat`. With `Engine.whole_trial` it is shown to its
@@ -62,7 +62,7 @@ def record_trial(
         friction, mass, lift: as in the trial to be shown.
 
     Returns:
-        What became of the trial; the same as without a picture.
+        Result of the trial, the same as without recording.
 
     Raises:
         InvalidInputError: as `HandTrial.run`.
@@ -92,7 +92,7 @@ def _recording(meshcat: Meshcat) -> Iterator[None]:
 
 
 def _publish_loop(meshcat: Meshcat) -> None:
-    """Publishes what was recorded."""
+    """Publishes the recording as a loop."""
     recording = meshcat.get_mutable_recording()
     recording.set_autoplay(True)
     recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
@@ -101,7 +101,7 @@ def _publish_loop(meshcat: Meshcat) -> None:
 
 
 def camera_offset(X_WG: Array, p_WB: Array) -> Array:
-    """From the grasp towards the eye (3,) in the axes of the world [m].
+    """Displacement (3,) of the camera from the grasp, in the axes of the world [m].
 
     Looks across the closing direction, not from behind the hand, past other objects (M, 3), and
     otherwise from about `PREFERRED_HEADING`.
@@ -128,7 +128,7 @@ def _count_view_blockers(p_WG: Array, heading: Array, p_WB: Array) -> int:
 
 
 def describe_trial(result: TrialResult) -> list[str]:
-    """The outcome and its margins as lines for people."""
+    """Lines of text with the outcome and its margins."""
     min_displacement = 5e-5  # Metres. Smaller displacements are not listed.
     margins = result.margins
     lines = [result.outcome.value.replace("_", " ")]
@@ -147,8 +147,8 @@ def describe_trial(result: TrialResult) -> list[str]:
 
 
 def _start_pose(trial: HandTrial | MujocoTrial, instance: str, X_WG: Array) -> Array:
-    """Where (4, 4) the hand is seen before the trial: at the grasp, or where the approach begins if
-    it is clear at the grasp, but not there."""
+    """Pose (4, 4) of the hand to show before the trial: the grasp; or the start of the approach if
+    the hand collides only there."""
     X_WF = trial.X_WG_start(X_WG)
     at_grasp, at_start = (trial.clearance.check(instance, X).outcome for X in (X_WG, X_WF))
     return X_WF if at_grasp is None and at_start is not None else X_WG
@@ -174,7 +174,7 @@ def record_arm_trial(
     friction: float | None = None,
     mass: float | None = None,
 ) -> TrialResult:
-    """Executes a plan once more and leaves the recording in Meshcat, where it plays in a loop.
+    """Executes a plan again and records it in Meshcat, where it plays in a loop.
 
     Args:
         trial: as that to be shown, and in `meshcat`. With `transfer` the arm is shown from its home
@@ -182,12 +182,12 @@ def record_arm_trial(
             outcome was decided.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
-        plan: leads to it.
-        meshcat: where the trial is shown.
+        plan: plan to the grasp.
+        meshcat: Meshcat to record in.
         friction, mass: as in the trial to be shown.
 
     Returns:
-        What became of the trial.
+        Result of the trial.
 
     Raises:
         InvalidInputError: as `ArmTrial.run`.
@@ -206,7 +206,7 @@ def record_arm_trial(
 
 
 def _side_view_direction(p_WA: Array, p_WG: Array) -> Array:
-    """Direction (3,) in which arm base and grasp are seen from the side, neither hiding the
+    """Viewing direction (3,) from the side of arm base and grasp, so that neither hides the
     other."""
     slope = 0.37  # Downward over horizontal part of the direction of view.
     ahead = (p_WG - p_WA)[:2]
@@ -218,8 +218,8 @@ def _side_view_direction(p_WA: Array, p_WG: Array) -> Array:
 
 
 def _motion_points(trial: ArmTrial, plan: Plan) -> Array:
-    """(N, 3) points around the robot on its planned way [m]."""
-    max_postures = 25  # Of the planned motion that have to be in view.
+    """(N, 3) points around the robot along its planned motion [m]."""
+    max_postures = 25  # Of the planned motion, to have in view.
     built = trial.diagram
     context = built.diagram.CreateDefaultContext()
     plant_context = built.plant.GetMyMutableContextFromRoot(context)

@@ -1,4 +1,4 @@
-"""What the tests of the live view look at."""
+"""Images for the tests of the live view."""
 
 from __future__ import annotations
 

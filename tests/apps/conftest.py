@@ -1,4 +1,4 @@
-"""A mesh, a scene and a finished run for the verbs to work on."""
+"""A mesh, a scene and a finished run as inputs of commands."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p
 
 @pytest.fixture(scope="module", autouse=True)
 def _judged_here(judged_here: None, measured_once: None, no_pose_mistakes: None) -> None:
-    """What the verbs say and write is not about processes; `tests/evaluation` has those."""
+    """Judges in this process; `tests/evaluation` tests the worker processes."""
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def mesh(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
-    """A sound scene, to be damaged."""
+    """A valid scene, to be damaged."""
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE)
     return path
@@ -61,7 +61,7 @@ def scene_file(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Three grasps on the box with known outcomes; the arm is not asked."""
+    """Three grasps on the box with known outcomes, without arm."""
     return box_run(tmp_path_factory.mktemp("run") / "box", "screening")
 
 

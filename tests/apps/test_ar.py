@@ -1,4 +1,4 @@
-"""`burg-drake ar`: scripts, their words, results and exit codes."""
+"""`burg-drake ar`: output, results and exit codes of scripts."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def test_the_end_finishes_the_recording(files: Path, tmp_path: Path) -> None:
 
 
 def test_sigterm_is_as_ctrl_c(files: Path) -> None:
-    """All that follows is the same, so that one of them is enough for the test above."""
+    """All later steps are the same, so that the test above needs only one of them."""
     before = signal.getsignal(signal.SIGTERM)
     with sigterm_as_interrupt():
         for each in (signal.SIGTERM, signal.SIGINT):
@@ -210,7 +210,7 @@ def test_the_end_waits_for_a_placement_check(tmp_path: Path) -> None:
 def test_simulated_camera_from_end_to_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """All stands as the scene says, so that nothing is off."""
+    """All objects stand as in the scene, so that all errors are zero."""
     (tmp_path / "two.yaml").write_text(TWO)
     command = [
         "ar",

@@ -276,7 +276,7 @@ def test_more_connections_than_are_served_are_told_why(server: ViewServer) -> No
 
 
 def test_a_flood_of_connections_takes_no_threads(server: ViewServer) -> None:
-    """Those that ask for nothing make room for the next ones."""
+    """Connections without a request make room for the next ones."""
     small = ViewServer(server.live, server.actions, port=0, connections=1)
     small.start()
     before = threading.active_count()

@@ -1,4 +1,4 @@
-"""`burg-drake camera locate`: a station's camera, located by its own picture."""
+"""`burg-drake camera locate`: a station's camera, located from its own picture."""
 
 from __future__ import annotations
 

@@ -186,7 +186,7 @@ def test_the_nearest_of_what_is_misspelt_is_named(
 
 
 def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
-    """Exit code of a verb that ends with an error."""
+    """Exit code of a command that ends with an error."""
 
     def fail(arguments: object) -> int:
         raise error

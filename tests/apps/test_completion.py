@@ -1,4 +1,4 @@
-"""Completion as a shell asks for it: the line in the environment, the answer in a file."""
+"""Shell completion: the line in the environment, the answer in a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`demo`: a run, its best grasp in 3D, and where to look."""
+"""`demo`: a run, its best grasp in 3D, and the list of its files."""
 
 from __future__ import annotations
 

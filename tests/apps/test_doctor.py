@@ -1,4 +1,4 @@
-"""`doctor`: what is there, what is broken, and how this copy of burg_drake gets more."""
+"""`doctor`: installed and broken features, and commands to install missing ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REQUIREMENTS = [
 
 @pytest.fixture
 def declared(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Made-up requirements; what it is given is installed."""
+    """Sets made-up requirements; the given packages are installed."""
     installed: dict[str, str] = {}
 
     def version(package: str) -> str:

@@ -16,7 +16,7 @@ Capture = pytest.CaptureFixture[str]
 
 @pytest.fixture(autouse=True)
 def wide(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A terminal that has room for the tables."""
+    """A terminal wide enough for the tables."""
     monkeypatch.setenv("COLUMNS", "200")
 
 
@@ -47,7 +47,7 @@ def test_some_formats_for_another_hand(capsys: Capture) -> None:
 
 
 def test_text_and_help_do_not_load_drake() -> None:
-    """Nor what else takes long."""
+    """Nor other slow modules."""
     code = (
         "import sys; from burg_drake.apps.cli import main\n"
         "try: main(sys.argv[1:])\n"

@@ -37,11 +37,11 @@ QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
 
 @pytest.fixture(scope="module")
 def no_pose_mistakes() -> None:
-    """Here they are looked for."""
+    """Enables the checks for common mistakes."""
 
 
 def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
-    """The results of evaluating on a scene of two objects."""
+    """The results of an evaluation on a scene of two objects."""
     (folder / "two.yaml").write_text(TWO)
     options = ["-o", str(folder / "run"), *QUICK]
     assert main(["evaluate", str(folder / "two.yaml"), *arguments, *options]) == 0
@@ -175,7 +175,7 @@ def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
 
 
 def test_another_file_of_grasps_of_scenes_is_not_taken_for_the_first(tmp_path: Path) -> None:
-    """Grasps in the frame of a scene are read scene by scene: what they come from has to tell."""
+    """Grasps in the frame of a scene are read scene by scene; a hash of file and options counts."""
     station, parser = load_station("panda_tabletop"), build_parser()
 
     def given(name: str, height: float, *options: str) -> GraspsLike | None:

@@ -1,4 +1,4 @@
-"""Options about grasp files: each verb that reads one takes the hand and the link of its grasps."""
+"""Options about grasp files: each command that reads one takes hand and link of its grasps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BOX = GraspSet.create(
 
 @pytest.fixture
 def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The grasp as a file that calls the hand's body `fr3_hand`."""
+    """A file with the grasp in which the hand's body is called `fr3_hand`."""
     monkeypatch.chdir(tmp_path)
     write_grasp_file(
         BOX, "a.yaml", "isaac_grasp", dataclasses.replace(PANDA_GRIPPER, body="fr3_hand")

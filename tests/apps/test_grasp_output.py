@@ -1,4 +1,4 @@
-"""Where verbs write grasps: what is checked before there are any, and what is said afterwards."""
+"""Outputs of grasps: checks before there are grasps, and messages after writing."""
 
 from __future__ import annotations
 

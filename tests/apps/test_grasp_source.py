@@ -1,4 +1,4 @@
-"""Where the objects of a grasp file are found."""
+"""How the objects of a grasp file are found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`grasps convert` from the command line: what it writes, what it says, what it refuses."""
+"""`grasps convert` from the command line: files, messages and errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One station for all tests of sessions, without an arm, which would take a while."""
+"""One station for all tests of sessions, without an arm, which would be slow to load."""
 
 from __future__ import annotations
 

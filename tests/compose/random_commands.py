@@ -51,7 +51,7 @@ poses = st.builds(
 
 
 def of_some(command: Callable[..., Command], *arguments: st.SearchStrategy[Any]) -> Any:
-    """Commands on up to four of the instances."""
+    """A strategy for commands on up to four instances."""
 
     def make(chosen: list[int], rest: tuple[Any, ...]) -> Make:
         return lambda names: command(_picked(chosen, names), *rest)

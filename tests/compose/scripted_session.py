@@ -43,7 +43,7 @@ def begun(reference: str, folder: str) -> ComposeSession:
 
 
 def fill_the_disk(session: ComposeSession, folder: str) -> None:
-    """Goes on with a file that was saved, when no file may grow beyond 200 bytes any more."""
+    """Edits a saved scene with a limit of 200 bytes on the size of files."""
     session.save("breakfast")
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, resource.RLIM_INFINITY))
     view = session.do(AddObject("marble"))

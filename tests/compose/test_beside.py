@@ -1,5 +1,5 @@
-"""What is done beside a session's editing: settling, another library, a library that changes, the
-printout, drags from several threads."""
+"""Sessions beyond editing: settling, another library, a changed library, the printout, drags from
+several threads."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def library(tmp_path: Path) -> Path:
 
 
 def only(library: str, *names: str) -> str:
-    """The text of a library with these objects alone."""
+    """The document of a library with these objects only."""
     head, _, objects = library.partition("objects:\n")
     entries: dict[str, list[str]] = {}
     for line in objects.splitlines(keepends=True):

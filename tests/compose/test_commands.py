@@ -1,4 +1,4 @@
-"""What commands do to poses, measured on the objects' surfaces."""
+"""Effects of commands on poses, measured on the objects' surfaces."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def center_of_mass(view: SessionView, name: str) -> Array:
 
 @pytest.fixture
 def three(session: ComposeSession) -> ComposeSession:
-    """A box, a can and a marble, apart from one another on an A2 board."""
+    """A box, a can and a marble, separate on an A2 board."""
     session.do(SetBoard(Board(size=board_size("A2"))))
     session.do(AddObject("box", position=(0.15, 0.15), yaw_deg=20.0))
     session.do(AddObject("can", position=(0.33, 0.2)))

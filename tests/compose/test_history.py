@@ -1,4 +1,4 @@
-"""Whatever is done can be undone, done again, and found in the journal."""
+"""Every step can be undone, redone, and found in the journal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ actions = st.tuples(
 
 
 class Steps:
-    """What the history should be, by what the session shows: documents and a place among them."""
+    """The expected history: the documents that the session showed, and a position."""
 
     def __init__(self, first: SceneDocument) -> None:
         self.documents = [first]
@@ -34,7 +34,7 @@ class Steps:
         return self.documents[self.at]
 
     def do(self, session: ComposeSession, action: Any) -> None:
-        """Does the same as the session, which refuses what cannot be done."""
+        """Applies the same operation as the session, which may refuse it."""
         before = session.view
         try:
             if action == SAVE:

@@ -1,4 +1,4 @@
-"""What is left of a session that ends otherwise than by `close`, and what is done with it."""
+"""Recovery of sessions that ended without `close`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def start(reference: str, folder: Path, what: str) -> subprocess.Popen[str]:
 
 
 def test_killed_sessions_go_on_where_they_were(station: Station, tmp_path: Path) -> None:
-    """One that was never saved and one that was, in a process; another one is sent to it."""
+    """An unsaved and a saved session in a process that is then killed."""
     process = start("household", tmp_path, "work")
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     saved = tmp_path / "saved" / "breakfast.yaml"
@@ -88,7 +88,7 @@ def test_a_torn_last_line_is_left_out(station: Station, left: Path) -> None:
 
 
 def damaged(journal: Path, line: int, old: str, new: str) -> bytes:
-    """Replaces a text in one line of a journal; gives what the file holds then."""
+    """Replaces a text in one line of a journal; returns the new content of the file."""
     lines = journal.read_text().splitlines()
     assert old in lines[line]
     lines[line] = lines[line].replace(old, new)
@@ -170,7 +170,7 @@ def test_what_is_no_journal_is_no_obstacle(station: Station, left: Path, content
 
 
 def test_a_journal_of_the_version_before_is_read(station: Station, left: Path) -> None:
-    """It says neither which numbers a line gives nor where among the steps it is."""
+    """Its lines have neither the numbers of instances nor the position of the step."""
     lines = []
     for line in map(json.loads, left.read_text().splitlines()):
         line.pop("from", None)

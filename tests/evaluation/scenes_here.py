@@ -28,7 +28,7 @@ class ScenesHere:
     def ready(self) -> bool:
         return True
 
-    def prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
+    def next_prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
         for item in self._work:
             try:
                 return item, self._preparer(item)

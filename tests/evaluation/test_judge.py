@@ -86,13 +86,13 @@ def test_an_error_is_the_outcome_of_the_stage_it_came_from() -> None:
 def test_what_was_screened_before_is_not_asked_again() -> None:
     judge = Scripted([ValueError("asked"), Decision(), Decision(), Decision(Outcome.LIFTED)])
     asked: list[Stage] = []
-    passed = ScreenAnswers().then(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
+    passed = ScreenAnswers().with_decision(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
     verdict = judge_grasp(judge, GRASP, passed, asked.append)
     assert asked == list(Stage)[1:]
     assert verdict.outcome is Outcome.LIFTED and verdict.margins == {"overlap": 0.0}
     assert list(verdict.cpu) == list(Stage) and verdict.cpu[Stage.CLEAR] == 2.5e-5
 
-    rejected = ScreenAnswers().then(
+    rejected = ScreenAnswers().with_decision(
         Stage.CLEAR, Decision(Outcome.COLLISION_TABLE, blocker="table"), 2.5e-5
     )
     verdict = judge_grasp(judge, GRASP, rejected, asked.append)

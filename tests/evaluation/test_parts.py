@@ -57,7 +57,7 @@ def require_true(campaign: Campaign, truth: Columns | None = None) -> None:
 
 def refresh(campaign: Campaign) -> PartWriter:
     writer = PartWriter(campaign)
-    writer.catch_up()
+    writer.add_new_rows()
     writer.close()
     return writer
 

@@ -174,7 +174,7 @@ def test_a_thousand_scenes_stay_a_readable_page(
     import pyarrow
 
     scenes, each = 1000, campaign.rows(None).counts
-    mine = campaign.document.mine
+    mine = campaign.document.assigned_scenes
     entries = [dataclasses.replace(mine[k % 3], name=f"scene_{k:04d}") for k in range(scenes)]
     many = Campaign(campaign.path, dataclasses.replace(campaign.document, scenes=tuple(entries)))
     counts, rows_of_three = np.resize(each, scenes), Campaign.rows

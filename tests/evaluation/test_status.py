@@ -106,10 +106,10 @@ def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatc
         failed = encode_verdict(id, replace(verdict, outcome=Outcome.SIMULATION_FAILED))
         journal.write_bytes(b"".join([failed, *rest]))
         if journal.parent.name == "three":  # and judged again after it went to a part
-            PartWriter(campaign).catch_up()
+            PartWriter(campaign).add_new_rows()
             journal.write_bytes(journal.read_bytes() + first)
     writer = PartWriter(campaign)
-    writer.catch_up(["cubes", "moved"])
+    writer.add_new_rows(["cubes", "moved"])
     writer.flush()
     tails = read_journal_tails(campaign)
     for name in ("cubes", "moved"):

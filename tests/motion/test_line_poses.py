@@ -39,7 +39,7 @@ def test_after_a_retreat_the_lift_begins_back_on_the_approach() -> None:
     np.testing.assert_allclose(grasp_in_world(0.08, lines), back, atol=1e-12)
     np.testing.assert_allclose(grasp_in_world(0.28, lines), aside, atol=1e-12)
     np.testing.assert_allclose(lines.layers[[0, lines.at_retreated, -1]], [-0.1, 0.08, 0.28])
-    carried = lines.carried(inverse(X_WA) @ X_WG, np.array((-0.1, 0.0, 0.28))[:, None])
+    carried = lines.target_displacement(inverse(X_WA) @ X_WG, np.array((-0.1, 0.0, 0.28))[:, None])
     np.testing.assert_allclose(
         carried[:, 0], [np.zeros(3), np.zeros(3), aside[:3, 3] - X_WG[:3, 3]], atol=1e-12
     )

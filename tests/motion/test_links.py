@@ -57,5 +57,5 @@ def test_poses_between_frames(tmp_path: Path) -> None:
         X_WF[:3], X_WF[3, 3] = table.swapaxes(0, 1), 1.0
         X_WF = np.moveaxis(X_WF, (0, 1), (-2, -1))
         for first, last in ((0, 2), (1, 2), (1, 1), (0, 3)):
-            X = links.between(tuple(range(first, last)), q[:, first:last])
+            X = links.relative_poses(tuple(range(first, last)), q[:, first:last])
             np.testing.assert_allclose(X_WF[first] @ X, X_WF[last], atol=1e-6)

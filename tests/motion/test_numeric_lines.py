@@ -69,7 +69,7 @@ class Arm:
             self.home,
             SETTINGS,
             solutions=solutions,
-            beyond=beyond,
+            unlimited_solutions=beyond,
         )
 
     def X_AG(self, X_WG: np.ndarray) -> np.ndarray:

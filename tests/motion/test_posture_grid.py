@@ -135,7 +135,7 @@ def test_postures_between_deep_ones_are_taken_for_blocked(grid: PostureGrid) -> 
     grid.upper[:] = np.random.default_rng(7).uniform(
         -3.0 * DEEP_PENETRATION, DEEP_PENETRATION, grid.upper.shape
     )
-    fine.take_over(1, grid, 1, [0, 3])
+    fine.copy_deep_collisions(1, grid, 1, [0, 3])
     taken = np.isfinite(fine.upper)
     np.testing.assert_array_equal(taken, np.isfinite(fine.lower))
     assert taken[[0, 3], 1].any() and not taken[[1, 2, 4]].any() and not taken[:, [0, 2]].any()

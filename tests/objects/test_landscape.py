@@ -30,28 +30,28 @@ def test_height_is_the_support_function() -> None:
 
 def test_every_direction_leads_to_the_face_below() -> None:
     box = PotentialLandscape(np.asarray(trimesh.creation.box(SIZE).vertices), np.zeros(3))
-    np.testing.assert_allclose(box.basin(around(X, -Z, 0.3)), -Z, atol=1e-12)
-    np.testing.assert_allclose(box.basin(around(X, -Y, 0.1)), -Y, atol=1e-12)
+    np.testing.assert_allclose(box.minimum_below(around(X, -Z, 0.3)), -Z, atol=1e-12)
+    np.testing.assert_allclose(box.minimum_below(around(X, -Y, 0.1)), -Y, atol=1e-12)
 
 
 def test_a_cylinder_rolls_on_its_side_only() -> None:
     points = np.asarray(trimesh.creation.cylinder(0.03, 0.1, sections=48).vertices)
     cylinder = PotentialLandscape(points, np.zeros(3))
-    lying = cylinder.neutral(X)
-    assert lying.span == pytest.approx(np.pi, abs=0.2)
+    lying = cylinder.neutral_equilibrium(X)
+    assert lying.max_angle == pytest.approx(np.pi, abs=0.2)
     for turn in np.linspace(0.0, 6.0, 13):
         rolled = np.array([np.cos(turn), np.sin(turn), 0.0])
         assert lying.angle(rolled) == pytest.approx(0.0, abs=1e-6)
         lifted = np.cos(0.1) * rolled + np.sin(0.1) * Z
         assert lying.angle(lifted) == pytest.approx(0.1, abs=1e-3)
-    assert cylinder.neutral(Z).span < np.deg2rad(1.0)
+    assert cylinder.neutral_equilibrium(Z).max_angle < np.deg2rad(1.0)
 
 
 def test_a_sphere_is_level_everywhere() -> None:
     sphere = PotentialLandscape(
         np.asarray(trimesh.creation.icosphere(3, 0.02).vertices), np.zeros(3)
     )
-    level = sphere.neutral(Z)
+    level = sphere.neutral_equilibrium(Z)
     rng = np.random.default_rng(0)
     for down in rng.normal(size=(20, 3)):
         assert level.angle(down / np.linalg.norm(down)) == 0.0

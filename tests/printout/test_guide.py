@@ -118,7 +118,7 @@ def test_an_object_has_its_name_on_every_page_that_shows_it() -> None:
         X_SO = scene.X_SO(name)
         p_SV = points @ X_SO[:3, :3].T + X_SO[:3, 3]
         for tile, text in zip(printout.tiling.tiles, texts, strict=True):
-            (left, bottom), (right, top) = tile.core
+            (left, bottom), (right, top) = tile.visible_corners
             inset = 8e-3
             inside = (p_SV[:, 0] > left + inset) & (p_SV[:, 0] < right - inset)
             inside &= (p_SV[:, 1] > bottom + inset) & (p_SV[:, 1] < top - inset)

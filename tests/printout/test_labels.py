@@ -9,8 +9,8 @@ from burg_drake.printout import FreeSpace
 
 def test_words_stand_beside_what_they_name_and_on_nothing_else() -> None:
     space = FreeSpace((0.2, 0.1))
-    space.take((0.09, 0.04), (0.11, 0.06), clear=1e-3)
-    at = space.cell((0.1, 0.05))
+    space.occupy((0.09, 0.04), (0.11, 0.06), clear=1e-3)
+    at = space.cell_mask((0.1, 0.05))
     extent, boxes = (0.02, 0.004), []
     for _ in range(6):
         corner = space.place(extent, at)
@@ -28,10 +28,10 @@ def test_words_stand_beside_what_they_name_and_on_nothing_else() -> None:
 
 def test_no_room() -> None:
     space = FreeSpace((0.2, 0.1))
-    at = space.cell((0.1, 0.05))
+    at = space.cell_mask((0.1, 0.05))
     assert space.place((0.3, 0.01), at) is None
-    space.take_beyond((0.05, 0.04), (0.15, 0.06))
+    space.occupy_outside((0.05, 0.04), (0.15, 0.06))
     assert space.place((0.05, 0.025), at) is None
     assert space.place((0.05, 0.015), at) is not None
-    space.take((0.0, 0.0), (0.2, 0.1))
+    space.occupy((0.0, 0.0), (0.2, 0.1))
     assert space.place((0.01, 0.01), at) is None

@@ -70,8 +70,8 @@ def test_tug_to_the_limit_of_statics(tugged: HoldForces, direction: str) -> None
 
 def test_units_and_the_weakest_direction(tugged: HoldForces) -> None:
     assert tugged.weight == pytest.approx(WEIGHT, rel=1e-6)
-    assert tugged.weakest == ("+z", tugged.accelerations["+z"])
-    assert tugged.weakest[1] == pytest.approx((CARRIED - WEIGHT) / WEIGHT, rel=0.03)
+    assert tugged.lowest_limit == ("+z", tugged.accelerations["+z"])
+    assert tugged.lowest_limit[1] == pytest.approx((CARRIED - WEIGHT) / WEIGHT, rel=0.03)
 
 
 def test_any_order_gives_the_same_bits(trial: HandTrial, tugged: HoldForces) -> None:
@@ -84,7 +84,7 @@ def test_a_trial_after_a_tug_is_as_if_there_had_been_none(trial: HandTrial) -> N
     scene, station = trial.diagram.scene, trial.diagram.station
     fresh = HandTrial(scene, station, engine=QUICK).run("block", CENTRE)
     grip = grip_of(trial)
-    assert not grip.withstands(lambda t: np.array([0.0, 0.0, 1e3]), 0.2, 0.005)
+    assert not grip.bears_load(lambda t: np.array([0.0, 0.0, 1e3]), 0.2, 0.005)
     assert repr(trial.run("block", CENTRE)) == repr(fresh)  # NaN is not equal to itself
 
 

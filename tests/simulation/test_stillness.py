@@ -87,7 +87,7 @@ def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
     assert foretold.doubtful == {"one", "beside"}
     assert foretold.X_WO.keys() == scene.instances.keys()
     assert (foretold.X_WO["other"] == built.X_WO("other")).all()
-    assert foretold.pace == pytest.approx(
+    assert foretold.relative_speed == pytest.approx(
         foretold.moving["one"].turning * 5.0 / StillnessLimits.angle
     )
     assert predict_drift(built, among=["other"]).moving.keys() == {"other"}

@@ -27,7 +27,7 @@ ARGUMENTS = (
     "--enable-unsafe-swiftshader",
 )
 BROWSER_TIMEOUT_MS = 1000.0 * HANG_GUARD
-"""For one thing that a browser is to do or to show; the slowest takes 3 s on an idle machine."""
+"""Timeout for one action of a browser; the slowest takes 3 s on an idle machine."""
 SIZE = {"width": 1280, "height": 800}
 LAST_WORDS = 3000
 """Characters of a page's text in the report of a test that failed."""
@@ -53,7 +53,7 @@ def playwright(chromium: str) -> Iterator[sync_api.Playwright]:
 
 @pytest.fixture(scope="session")
 def browser(playwright: sync_api.Playwright, chromium: str) -> Iterator[sync_api.Browser]:
-    """One a process, which all tests share; each has cookies of its own by `page`."""
+    """One browser per process, shared by all tests; `page` gives each its own cookies."""
     browser = playwright.chromium.launch(
         executable_path=chromium, args=list(ARGUMENTS), timeout=BROWSER_TIMEOUT_MS
     )
@@ -82,7 +82,7 @@ def lamps_alone() -> Iterator[None]:
 
 @contextlib.contextmanager
 def open_page(browser: sync_api.Browser, size: dict[str, int]) -> Iterator[sync_api.Page]:
-    """A fresh tab of a fresh profile; an error if a script of the page has one."""
+    """A new tab in a new profile; raises an error that a script of the page raises."""
     with browser.new_context(viewport=size) as context:
         sync_api.expect.set_options(timeout=BROWSER_TIMEOUT_MS)
         context.set_default_timeout(BROWSER_TIMEOUT_MS)
@@ -108,7 +108,7 @@ def page(browser: sync_api.Browser) -> Iterator[sync_api.Page]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
-    """Adds to the report of a test that failed what its pages show, and said on their consoles."""
+    """Adds the text and the console output of pages to the report of a failed test."""
     report = yield
     if report.failed:
         for page, said in _open_pages.items():

@@ -1,4 +1,4 @@
-"""A page without a browser: it sends what viser's page sends, and keeps what it is told to show.
+"""A page without a browser: it sends the messages of viser's page, and keeps the shown content.
 
 It costs next to nothing where a real browser draws every frame in software.
 """
@@ -41,7 +41,7 @@ CAMERA = {
 
 
 def coming_in(door: ServedPage) -> ClientConnection:
-    """A connection as a page has it."""
+    """A connection like that of a page."""
     return connect(
         f"ws://127.0.0.1:{door.port}/",
         origin=Origin(f"http://127.0.0.1:{door.port}"),
@@ -57,14 +57,14 @@ def send(connection: ClientConnection, kind: str, **fields: Any) -> None:
 
 
 def unpacked(raw: str | bytes) -> bytes:
-    """What viser sent, in MessagePack."""
+    """Decodes a message of viser from MessagePack."""
     assert isinstance(raw, bytes)
     size = int.from_bytes(raw[8:16], "little")
     return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
 
 
 class PageClient:
-    """A page that is open.
+    """An open page.
 
     Args:
         door: of the page.
@@ -107,20 +107,20 @@ class PageClient:
         self._thread.join(HANG_GUARD)
 
     def report_camera(self, **changes: Any) -> None:
-        """Says where the camera is, after it was moved or the room for the scene has changed."""
+        """Reports the camera, as after a movement or a change of the window's size."""
         self.camera.update(changes)
         send(self._connection, "ViewerCameraMessage", **self.camera)
 
     def value(self, folder: str, label: str) -> Any:
-        """What stands in a field of a folder."""
+        """The value of a field in a folder."""
         return self._control(folder, label)["value"]
 
     def options(self, folder: str, label: str) -> list[str]:
-        """What a field offers."""
+        """The choices of a field."""
         return list(self._control(folder, label)["options"])
 
     def shown(self, folder: str, label: str) -> bool:
-        """Whether a field can be seen."""
+        """Whether a field is visible."""
         return bool(self._control(folder, label)["visible"])
 
     def text(self, folder: str) -> str:
@@ -139,11 +139,11 @@ class PageClient:
         self.give(folder, label, True)
 
     def press(self, key: str, modifier: str | None = None) -> None:
-        """Presses a key, as viser calls it."""
+        """Presses a key, by its name in viser."""
         send(self._connection, "CommandTriggerMessage", uuid=self._commands[key, modifier])
 
     def upload(self, folder: str, label: str, name: str, content: bytes) -> None:
-        """Gives a file to a button that asks for one."""
+        """Uploads a file with a button."""
         ids = {
             "source_component_uuid": self._control(folder, label)["uuid"],
             "transfer_uuid": name,
@@ -174,7 +174,7 @@ class PageClient:
         return found[0]
 
     def _folder(self, control: dict[str, Any]) -> str:
-        """The name of the folder around a control; that of a folder without one is around it."""
+        """The name of the folder around a control; skips folders without a name."""
         around = self._controls.get(control.get("container_uuid", ""), {})
         if not around:
             return ""

@@ -74,7 +74,7 @@ def test_what_is_typed_is_one_step_and_what_is_refused_is_set_back(page: SetupPa
     page.actions.submit(lambda: None)  # as Enter does
     settle(page)
     assert session.view.selection == ("glass",) and field.handle.value == "glass"
-    position = page._object._numbers._position
+    position = page._object._pose_fields._position
     _, y, z = position.handle.value
     press(position, (210.0, y, z))
     page.actions.submit(lambda: None)

@@ -94,7 +94,7 @@ def test_a_page_has_the_stated_view_whatever_it_shows_while_it_loads(
     client.report_camera(image_width=400)
     until(lambda: given(400 / 480), "the stated view of an even narrower one")
     client.report_camera()
-    views = page._views._given
+    views = page._views._assigned
     client.report_camera(position=[0.3, -0.5, 0.4])
     until(lambda: not views, "that somebody has moved the camera")
     client.press("F")

@@ -53,7 +53,7 @@ class Setup:
     def has_view(self) -> bool:
         """Whether the newest page has reported the view that was given for its canvas of now."""
         clients = self.door.server.get_clients()
-        given = self.page._views._given.get(max(clients, default=0))
+        given = self.page._views._assigned.get(max(clients, default=0))
         if given is None or not given.arrived:
             return False
         box = self.tab.locator("canvas").first.bounding_box()
@@ -414,7 +414,7 @@ def test_all_of_the_board_is_in_view_beside_the_panels(
     setup.tab.locator("canvas").first.wait_for()
 
     def covered() -> list[str]:
-        if not setup.page._views._given:
+        if not setup.page._views._assigned:
             return ["no page yet"]
         found = []
         for x in (0.0, setup.view.document.board.size[0]):

@@ -88,13 +88,13 @@ def _add_result_options(parser: Any) -> None:
 
 
 def run_ar(arguments: argparse.Namespace) -> int:
-    """Looks at frames until told to end; 1 if a script's frames had no pose."""
+    """Processes frames until stopped; returns 1 if no frame of a script gave a pose."""
     from burg_drake.scene import load_scene
 
     scene = load_scene(arguments.scene)
     _require_writable_outputs(arguments)
     intrinsics = options.intrinsics_from_options(arguments)
-    size = (intrinsics.width, intrinsics.height)  # a camera of this computer gives what was asked
+    size = (intrinsics.width, intrinsics.height)  # cameras of this computer deliver this size
     source = cameras.open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
     with sigterm_as_interrupt():
         try:
@@ -128,7 +128,7 @@ def _run_live_view(
             print(file=sys.stderr)
         with ignore_interrupts():
             closing.close()
-        actions.wait_for_check()  # OpenCV must not be at work when Python ends
+        actions.wait_for_check()  # OpenCV must not be running when Python ends
     if scripted or arguments.check or arguments.snapshot:
         finish_script(live, actions, check=arguments.check, snapshot=arguments.snapshot)
     if interrupted and (arguments.frames or arguments.seconds):
@@ -137,7 +137,7 @@ def _run_live_view(
 
 
 def _print_how_to_stop(arguments: argparse.Namespace, live: cameras.LiveSession) -> None:
-    """Of a script that looks at a source without end, until somebody ends it."""
+    """Prints how to stop a script whose frame source has no end."""
     limited = arguments.frames or arguments.seconds
     if arguments.no_browser and live.source.live and not limited:
         print(
@@ -147,7 +147,7 @@ def _print_how_to_stop(arguments: argparse.Namespace, live: cameras.LiveSession)
 
 
 def _is_scripted(arguments: argparse.Namespace) -> bool:
-    """Frames are counted or timed, or looked at without a page."""
+    """Whether there is no page, or the number of frames or the time is limited."""
     return bool(arguments.no_browser or arguments.frames or arguments.seconds)
 
 
@@ -196,7 +196,7 @@ def _create_session(
 
 
 def _require_writable_outputs(arguments: argparse.Namespace) -> None:
-    """Refuses results that cannot be written, before anything else is done."""
+    """Refuses outputs that cannot be written, before any work."""
     from burg_drake.core import ensure_writable_folder
 
     if arguments.record is not None:

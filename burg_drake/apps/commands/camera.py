@@ -14,7 +14,7 @@ from burg_drake.apps.terminal import print_remark, show_progress
 
 
 def print_intrinsics(intrinsics: cameras.Intrinsics) -> None:
-    """Prints a camera's figures."""
+    """Prints the parameters of a camera."""
     import numpy as np
 
     k = intrinsics
@@ -49,7 +49,7 @@ def print_intrinsics(intrinsics: cameras.Intrinsics) -> None:
 
 
 def field_of_view(intrinsics: cameras.Intrinsics) -> tuple[float, float, float]:
-    """Angle between what opposite edges see, across and down, and opposite corners [rad]."""
+    """Angles between opposite edges, horizontally and vertically, and between corners [rad]."""
     import numpy as np
 
     k = intrinsics
@@ -58,7 +58,7 @@ def field_of_view(intrinsics: cameras.Intrinsics) -> tuple[float, float, float]:
     ends = [((-0.5, cy), (w, cy)), ((cx, -0.5), (cx, h)), ((-0.5, -0.5), (w, h))]
     rays = k.rays(np.array(ends, dtype=float))
     between = np.arccos(np.clip((rays[:, 0] * rays[:, 1]).sum(axis=-1), -1.0, 1.0))
-    # Of a fisheye it may be more than half a turn.
+    # The angle of a fisheye camera may exceed 180 degrees.
     beyond = np.arccos(rays[..., 2]).sum(axis=1) > np.pi
     angles = np.where(beyond, 2.0 * np.pi - between, between).tolist()
     return angles[0], angles[1], angles[2]
@@ -114,7 +114,7 @@ def add_camera_calibrate_options(calibrate: options.Parser) -> None:
 
 
 def run_camera_calibrate(arguments: argparse.Namespace) -> int:
-    """Calibrates; 1 if the result is of little use."""
+    """Calibrates a camera; returns 1 if the result is of little use."""
     if bool(arguments.images) == bool(arguments.camera):
         raise core.InvalidInputError("give images of the target, or --camera; not both")
     for output in (arguments.output, arguments.report):
@@ -132,20 +132,20 @@ def run_camera_calibrate(arguments: argparse.Namespace) -> int:
     lines = cameras.calibration_advice(calibration)
     for line in lines:
         print_remark(line)
-    useless = cameras.is_useless(calibration)
+    is_useless = cameras.is_useless(calibration)
     if arguments.report:
         from burg_drake.visualization import write_calibration_report
 
         write_calibration_report(calibration, lines, arguments.report)
         print(f"report  {arguments.report}")
-    if useless and not arguments.keep:
+    if is_useless and not arguments.keep:
         print_remark(
             "no file was written: the views do not determine the camera well enough;"
             " take more, or give --keep"
         )
     else:
         _save_calibration(calibration, arguments)
-    return 1 if useless else 0
+    return 1 if is_useless else 0
 
 
 def _save_calibration(calibration: cameras.Calibration, arguments: argparse.Namespace) -> None:
@@ -163,7 +163,7 @@ def _save_calibration(calibration: cameras.Calibration, arguments: argparse.Name
 def _views_from_photos(
     source: cameras.FrameSource, target: cameras.CharucoTarget
 ) -> tuple[list[cameras.CharucoView], list[tuple[str, str]]]:
-    """Looks for the target in photos."""
+    """Finds the target in photos; also returns the reasons for rejected ones."""
     views, rejected = [], []
     with show_progress("looking for the target", "images") as pace:
         while True:
@@ -186,12 +186,12 @@ def _views_from_photos(
 def _views_from_camera(
     source: cameras.FrameSource, target: cameras.CharucoTarget, arguments: argparse.Namespace
 ) -> tuple[list[cameras.CharucoView], list[tuple[str, str]]]:
-    """Takes views from a camera until there are enough, it ends, or Ctrl-C."""
+    """Collects views from a camera until there are enough, its end, or Ctrl-C."""
     from pathlib import Path
 
     folder = arguments.save_views and core.ensure_writable_folder(arguments.save_views)
     collector = cameras.ViewCollector(target)
-    said, enough = "", False
+    last_line, enough = "", False
     try:
         while len(collector.views) < arguments.views:
             try:
@@ -206,9 +206,9 @@ def _views_from_camera(
                     number = len(collector.views)
                     cameras.write_image(Path(folder) / f"view_{number:03d}.png", frame.image)
             line = f"{len(collector.views)} of {arguments.views} views: {word}"
-            if line != said:
+            if line != last_line:
                 print(line, file=sys.stderr, flush=True)
-            said = line
+            last_line = line
             if collector.enough and not enough:
                 print("more views make it better; Ctrl-C ends", file=sys.stderr, flush=True)
             enough = collector.enough
@@ -218,7 +218,7 @@ def _views_from_camera(
 
 
 def _print_calibration(calibration: cameras.Calibration) -> None:
-    """Prints views, what was left out, parameters and where the image was covered."""
+    """Prints views, rejected views, parameters, and the coverage of the image."""
     table = core.TextTable("views").names("image")
     table.numbers("corners", "rms [px]", "worst [px]", "tilt [deg]", "blur [px]")
     for used in calibration.views:

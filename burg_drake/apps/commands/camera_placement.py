@@ -38,7 +38,7 @@ def add_camera_locate_options(parser: options.Parser) -> None:
 
 
 def run_camera_locate(arguments: argparse.Namespace) -> int:
-    """Prints the camera's lines, and to stderr how far they can be trusted."""
+    """Prints the camera's pose as document lines, and warnings about its accuracy to stderr."""
     import numpy as np
 
     from burg_drake.scene import load_scene
@@ -102,7 +102,7 @@ def add_camera_placement_options(parser: options.Parser) -> None:
 
 
 def run_camera_placement(arguments: argparse.Namespace) -> int:
-    """Measures, prints a line an object, and writes what is asked for."""
+    """Measures placement errors, prints one line per object, and writes the outputs."""
     from burg_drake.scene import load_scene
 
     for path in filter(None, (arguments.output, arguments.overlay)):
@@ -134,7 +134,7 @@ def run_camera_placement(arguments: argparse.Namespace) -> int:
 def _check_photo(
     path: str, scene: Scene, intrinsics: cameras.Intrinsics, arguments: argparse.Namespace
 ) -> cameras.PlacementCheck:
-    """The check of one photo."""
+    """The placement check of one photo."""
     photo = cameras.read_image(path)
     intrinsics.require_size(photo.shape[1], photo.shape[0], path)
     depth = None
@@ -158,13 +158,13 @@ def _check_photo(
     if estimate.reason:
         print_warning(f"{path}: {estimate.reason}")
     seen, markers = len(estimate.ids), len(scene.board.layout.ids)
-    if seen < 4:  # the camera's pose is doubtful
+    if seen < 4:  # the camera's pose may be wrong
         print_warning(f"{path}: only {seen} of {markers} markers are seen; show more of them")
     return check
 
 
 def placement_table(placements: Mapping[str, cameras.Placement]) -> core.TextTable:
-    """How far each object is off, a row an object."""
+    """Table of placement errors, one row per object."""
     table = core.TextTable().names("object")
     table.numbers("off by\n[mm]", "x\n[mm]", "y\n[mm]", "±\n[mm]", "turned\n[deg]", "±\n[deg]")
     table.texts("remark")
@@ -175,7 +175,7 @@ def placement_table(placements: Mapping[str, cameras.Placement]) -> core.TextTab
 
 
 def extra_object_line(extra: cameras.ExtraObject) -> str:
-    """What to do about something that is no object of the scene."""
+    """Advice on something on the board that is not an object of the scene."""
     x, y = (1e3 * c for c in extra.position)
     return (
         f"something stands at x {x:.0f} mm, y {y:.0f} mm, {1e3 * extra.width:.0f} mm wide, that is"
@@ -184,7 +184,7 @@ def extra_object_line(extra: cameras.ExtraObject) -> str:
 
 
 def _placement_cells(placement: cameras.Placement) -> list[str]:
-    """What a placement says, in millimetres and degrees."""
+    """Table cells of a placement, in millimetres and degrees."""
     if placement.displacement is None or placement.displacement_sd is None:
         return ["-"] * 6 + [f"not seen: {placement.reason}"]
     x, y = (1e3 * d for d in placement.displacement)

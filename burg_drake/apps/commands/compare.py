@@ -12,7 +12,7 @@ TRIALS_SUFFIXES = (".yaml", ".yml")  # Suffixes of trials files.
 
 
 def add_rejudge_options(parser: options.Parser) -> None:
-    """Adds the options."""
+    """Adds the options for judging trials again."""
     group = parser.add_argument_group("evaluate again")
     group.add_argument(
         "--rejudge",
@@ -29,13 +29,13 @@ def add_rejudge_options(parser: options.Parser) -> None:
 
 
 def rejudge_trials(arguments: argparse.Namespace) -> experiment.Rejudging | None:
-    """Judges again what --rejudge asks for; nothing if it does not.
+    """Judges trials again as --rejudge requests; None without that option.
 
     Args:
-        arguments: those of `compare`.
+        arguments: of `compare`.
 
     Raises:
-        InvalidInputError: there are no trials; and see `rejudge`.
+        InvalidInputError: there are no trials; see also `rejudge`.
     """
     if arguments.rejudge is None:
         return None
@@ -113,7 +113,7 @@ def add_compare_options(parser: options.Parser) -> None:
 
 
 def run_compare(arguments: argparse.Namespace) -> int:
-    """Compares."""
+    """Compares a run with trials or with another run."""
     second, trials = _split_compared_paths(arguments.run_folder, arguments.others)
     if arguments.html is not None:
         core.require_writable(arguments.html)
@@ -157,7 +157,7 @@ def _print_comparison(
 
 
 def _split_compared_paths(first: str, paths: list[str]) -> tuple[str, str | None]:
-    """What the run is compared with, and the trials if that is another run."""
+    """Path to compare the run with; if that is another run, also the path of the trials."""
     if len(paths) > 2:
         raise core.InvalidInputError(
             f"{len(paths) + 1} things to compare; give RUN TRIALS, RUN RUN, or RUN RUN TRIALS"

@@ -19,7 +19,7 @@ BUILTIN_DATA_FOLDERS = {
     "source": ("scenes", "models"),
     "scene_or_library": ("scenes", "models"),
 }
-"""Folders of built-in data that an argument may name, by its name in the parsed arguments."""
+"""Folders of built-in data that an argument may refer to, by its name in the parsed arguments."""
 
 
 def add_completion_options(parser: options.Parser) -> None:
@@ -45,7 +45,7 @@ def run_completion(arguments: argparse.Namespace) -> int:
 
 
 def complete_line(parser: options.Parser) -> None:
-    """Answers a shell that asks for completions, and ends the process.
+    """Prints completions for a shell, and ends the process.
 
     Args:
         parser: of the whole command.
@@ -77,7 +77,7 @@ class _NameCompleter:
 
 
 def _split_line(line: str) -> list[str]:
-    """The words of a line, whose last quote may be open."""
+    """The words of a command line, whose last quote may be open."""
     try:
         return shlex.split(line)[1:]
     except ValueError:
@@ -85,7 +85,7 @@ def _split_line(line: str) -> list[str]:
 
 
 def _parsers_of_line(parser: options.Parser, words: Iterable[str]) -> Iterable[options.Parser]:
-    """The parsers of the commands that a line names, from that of the whole command on."""
+    """The parsers of `burg-drake` and of the groups and commands in a line, in that order."""
     yield parser
     for word in words:
         for action in parser._actions:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def warn_of_damage(samples: ReadableSamples) -> bool:
-    """Whether samples were left out; a line on stderr then names each damaged shard or file."""
+    """Prints each damaged shard or file to stderr; returns whether samples were left out."""
     for message, count in samples.damaged.items():
         left_out = f"{count} sample{'s are' if count > 1 else ' is'} left out"
         print_warning(f"{left_out}: {message}")
@@ -57,7 +57,7 @@ def add_dataset_show_options(parser: options.Parser) -> None:
 
 
 def run_dataset_show(arguments: argparse.Namespace) -> int:
-    """Shows a sample in 3D, or writes a sheet; those that are damaged are left out, and named."""
+    """Shows a sample in 3D, or writes a sheet; leaves out damaged samples, and lists them."""
     from burg_drake.apps.terminal import open_view, present_view, print_legend
     from burg_drake.dataset import (
         ReadableSamples,
@@ -99,7 +99,7 @@ EXPORT_FORMATS = {
     "graspnet": ("sensor_depth",),
     "webdataset": ("depth_unit",),
 }
-"""Export formats, and the depth options that each takes."""
+"""Depth options by export format."""
 
 
 def add_dataset_export_options(parser: options.Parser) -> None:
@@ -127,8 +127,8 @@ def add_dataset_export_options(parser: options.Parser) -> None:
 
 
 def run_dataset_export(arguments: argparse.Namespace) -> int:
-    """Writes a data set in another format; what that cannot carry goes to stderr. 1 if some
-    samples are damaged, and left out."""
+    """Writes a data set in another format; prints what the format cannot store to stderr. Returns
+    1 if damaged samples were left out."""
     from burg_drake.dataset import (
         ReadableSamples,
         load_dataset,
@@ -343,7 +343,7 @@ def _parse_sample_option(
 
 
 def run_dataset_check(arguments: argparse.Namespace) -> int:
-    """Prints what is wrong with a data set; 1 if anything is."""
+    """Prints the errors of a data set; returns 1 if there are any."""
     from burg_drake.dataset import check_generated, load_dataset
 
     found = check_generated(arguments.data)

@@ -9,13 +9,13 @@ from pathlib import Path
 from burg_drake.apps import options
 
 DEMO_SCENE = "tabletop_six"
-DEMO_FOLDER = "runs/demo"  # Folder of the demo's run, if no other is given.
+DEMO_FOLDER = "runs/demo"  # Default folder of the demo's run.
 DEMO_FILES = {
     "report.html": "the report: how the grasps of each object ended",
     "replay.html": "the best grasp in 3D, as it was simulated",
     "results.csv": "the table: one row for each grasp",
 }
-"""Files that the demo points out, and what they contain."""
+"""Files that the demo lists, and their content."""
 
 
 def add_demo_options(parser: options.Parser) -> None:
@@ -48,7 +48,7 @@ def add_demo_options(parser: options.Parser) -> None:
 
 
 def run_demo(arguments: argparse.Namespace) -> int:
-    """Evaluates and replays, as these verbs do; 1 if one of them has failures to report."""
+    """Runs `evaluate` and `replay`; returns 1 if one of them has failures to report."""
     tutorial_url = "https://burg-drake.github.io/burg_drake/tutorials/own_object.html"
     count = arguments.grasps_per_object
     ending = "" if count == 100 else f"_{count}"

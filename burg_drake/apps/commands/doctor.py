@@ -70,10 +70,10 @@ def import_error(modules: str) -> str | None:
 
 
 def unmet_requirements(extra: str = "") -> list[str]:
-    """What burg_drake, or an extra of it, needs and this environment does not have.
+    """Requirements of burg_drake or one of its extras that this environment does not meet.
 
     Returns:
-        Such as `mujoco>=3.10` and `viser<1.2,>=1.1 (1.3.0 is installed)`.
+        Texts such as `mujoco>=3.10` and `viser<1.2,>=1.1 (1.3.0 is installed)`.
     """
     unmet = []
     for requirement in _requirements(extra):
@@ -86,7 +86,7 @@ def unmet_requirements(extra: str = "") -> list[str]:
 
 
 def _requirements(extra: str) -> list[Requirement]:
-    """What is declared for an extra, or for all if it is empty; none in a checkout on the path."""
+    """The declared requirements of an extra, or of the package if empty; none if not installed."""
     from packaging.requirements import Requirement
 
     try:
@@ -102,11 +102,11 @@ def _requirements(extra: str) -> list[Requirement]:
 
 
 def install_command(extra: str, installed: list[str]) -> str:
-    """The command that brings an extra into the environment that this process runs in.
+    """The command that installs an extra into the environment of this process.
 
     Args:
         extra: such as `mujoco`.
-        installed: extras that are there, and that uv would remove.
+        installed: installed extras, which uv would else remove.
     """
     if _is_pipx_environment():
         quoted = [f"'{requirement}'" for requirement in _requirements(extra)]
@@ -117,7 +117,7 @@ def install_command(extra: str, installed: list[str]) -> str:
 
 
 def pip_install() -> str:
-    """The command that installs packages into the environment that this process runs in."""
+    """The command that installs packages into the environment of this process."""
     if _is_pipx_environment():
         return f"pipx runpip {PACKAGE_NAME} install"
     if _is_uv_tool_environment():
@@ -136,23 +136,23 @@ def _is_uv_tool_environment() -> bool:
 Finding = Literal["ok", "missing", "broken", "low"]
 
 COMPILED_MODULES = "numpy, cv2, coacd, embreex, manifold3d, h5py"
-"""Required modules with compiled code. Modules in pure Python hardly ever fail to import."""
+"""Required modules with compiled code; modules in pure Python rarely fail to import."""
 BYTES_PER_GIB = 1 << 30
 LIMIT_FILES = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
-"""Of control groups, versions 2 and 1."""
-QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")  # Of control groups, version 2.
+"""Files with the memory limit of control groups, versions 2 and 1."""
+QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")  # CPU quota of control groups, version 2.
 
 
 @dataclass(frozen=True)
 class FeatureCheck:
-    """What was found about one feature.
+    """The state of one feature.
 
     Attributes:
-        feature: what a person wants.
-        state: ok, missing, broken (it is installed, and does not work), or low.
-        found: version, path or number; why it does not work.
-        remedy: what to do, if anything.
-        required: `burg-drake evaluate` needs it.
+        feature: its purpose.
+        state: ok, missing, broken (installed, but does not work), or low.
+        found: version, path or number, or why it does not work.
+        remedy: what to do; empty if nothing.
+        required: whether `burg-drake evaluate` needs it.
     """
 
     feature: str
@@ -169,13 +169,13 @@ class FeatureCheck:
 
 @dataclass(frozen=True)
 class OptionalFeature:
-    """An optional part: packages that an extra of burg_drake brings.
+    """An optional feature, installed by an extra of burg_drake.
 
     Attributes:
         name: of the extra.
-        feature: what it is for.
-        package: whose version is told.
-        modules: tried by an import: those that are compiled, which break most and load fast.
+        feature: its purpose.
+        package: whose version is shown.
+        modules: imported as a test: compiled ones, which fail most often and load fast.
     """
 
     name: str
@@ -199,10 +199,10 @@ BLENDER_EXTRA = OptionalFeature("blender", "photorealistic images (Blender)", "b
 
 
 def all_checks() -> list[FeatureCheck]:
-    """Everything, in the order in which it is shown."""
+    """All checks, in the order of the table."""
     installed = [extra for extra in OPTIONAL_FEATURES if installed_version(extra.package)]
     tried = ["pydrake.common", COMPILED_MODULES, *(extra.modules for extra in installed)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # each starts a process; results are cached
         list(pool.map(import_error, tried))
     names = [extra.name for extra in installed]
     gpu = "NVIDIA" if Path("/dev/nvidia0").exists() else "no NVIDIA card"
@@ -251,7 +251,7 @@ def _check_packages() -> FeatureCheck:
 
 
 def _check_cores_and_memory() -> FeatureCheck:
-    min_memory = 2.0  # GiB. A worker takes 0.3 to 0.5.
+    min_memory = 2.0  # GiB. A worker takes 0.3 to 0.5 GiB.
     memory = usable_memory() / BYTES_PER_GIB
     found = f"{usable_cores():g} cores, {memory:.1f} GiB of memory"
     if memory < min_memory:
@@ -275,7 +275,7 @@ def _check_disk() -> FeatureCheck:
 def _check_cache() -> FeatureCheck:
     try:
         from burg_drake.core import BurgError, cache_folder
-    except ImportError as error:  # numpy is broken, which another check tells
+    except ImportError as error:  # numpy is broken; another check reports it
         return FeatureCheck("cache", "broken", str(error))
     remedy = "set BURG_DRAKE_CACHE to a folder"
     try:
@@ -387,7 +387,7 @@ def _check_browser() -> FeatureCheck:
 
 
 def doctor_summary(checks: list[FeatureCheck]) -> Iterator[str]:
-    """What it comes to, in a line or two."""
+    """The summary of all checks, in one or two lines."""
     prevented = [check.feature for check in checks if check.prevents_evaluation]
     missing = [check.feature for check in checks if check.state != "ok" and not check.required]
     if prevented:
@@ -399,7 +399,7 @@ def doctor_summary(checks: list[FeatureCheck]) -> Iterator[str]:
 
 
 def usable_cores() -> float:
-    """Processors that this process may use: of the machine, its affinity, its control group."""
+    """Number of cores that this process may use, by machine, affinity and control group."""
     cores = float(len(os.sched_getaffinity(0))) if sys.platform == "linux" else os.cpu_count() or 1
     try:
         quota, period = QUOTA_FILE.read_text().split()
@@ -409,7 +409,7 @@ def usable_cores() -> float:
 
 
 def usable_memory() -> int:
-    """Memory that this process may use [bytes]: of the machine, or of its control group."""
+    """Memory that this process may use [bytes], by machine and control group."""
     found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for path in LIMIT_FILES:
         try:
@@ -420,14 +420,14 @@ def usable_memory() -> int:
 
 
 def can_write_in(folder: Path) -> bool:
-    """Whether files can be made in a folder, or the folder in the nearest one that there is."""
+    """Whether files can be created in a folder, or the folder in its nearest existing parent."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
 def folder_bytes(folder: Path) -> int:
-    """Size of the files that lie directly in a folder."""
+    """Total size of the files directly in a folder."""
     total = 0
     for entry in folder.iterdir() if folder.is_dir() else ():
         try:
@@ -449,7 +449,7 @@ def add_doctor_options(parser: options.Parser) -> None:
 
 
 def run_doctor(arguments: argparse.Namespace) -> int:
-    """Prints the table; 1 if something that `evaluate` needs is missing."""
+    """Prints the table of checks; returns 1 if something that `evaluate` needs is missing."""
     checks = all_checks()
     if arguments.json:
         found = {"burg_drake": __version__, "checks": [asdict(check) for check in checks]}

@@ -33,11 +33,11 @@ def add_rejudge_contested(parser: options.Parser) -> None:
 
 
 def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) -> Engine | str:
-    """The engine that judges all grasps: with --rejudge that of the run in the folder, and standard
-    of a new one.
+    """The engine that judges all grasps; with --rejudge that of the run in the folder, or the
+    standard one for a new run.
 
     Raises:
-        InvalidInputError: a shard is asked for; and see `require_second_engine`, also for other
+        InvalidInputError: a shard is requested; see `require_second_engine` for this and other
             errors.
     """
     from burg_drake.station import DEFAULT_ENGINE, ENGINES
@@ -57,7 +57,7 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) ->
 
 
 def second_opinion_line(columns: evaluation.Columns) -> str:
-    """How many verdicts another engine has settled, and how many of them changed.
+    """Text on how many verdicts another engine has decided, and how many of them changed.
 
     Args:
         columns: `SECOND_OPINION_COLUMNS` of a run.
@@ -84,7 +84,7 @@ def second_opinion_line(columns: evaluation.Columns) -> str:
 
 
 def print_campaign(campaign: evaluation.Campaign) -> None:
-    """Prints the tables of a run over many scenes, and where what is."""
+    """Prints the tables of a run over many scenes, and the paths of its files."""
     from rich.console import Console
 
     summary = evaluation.summarize(campaign)
@@ -105,7 +105,7 @@ def print_campaign(campaign: evaluation.Campaign) -> None:
 
 
 def campaign_exit_code(campaign: evaluation.Campaign) -> int:
-    """Says what could not be judged; the exit code."""
+    """Prints which scenes could not be judged; returns the exit code."""
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
     for name, why in campaign.failed.items():
@@ -120,8 +120,8 @@ def campaign_exit_code(campaign: evaluation.Campaign) -> int:
 
 
 def _scene_table(summary: evaluation.Summary) -> Any:
-    """The scenes in which the smallest share of the executed grasps was lifted."""
-    max_rows = 20  # Scenes with a row of their own.
+    """Table of the scenes with the smallest share of lifted among executed grasps."""
+    max_rows = 20  # Maximum number of scenes in the table.
 
     def share(group: Any) -> float:
         return group.lifted / group.executed if group.executed else -1.0
@@ -144,8 +144,8 @@ def _scene_table(summary: evaluation.Summary) -> Any:
 def _grasps_from_file(
     arguments: argparse.Namespace, station: Station
 ) -> evaluation.GraspsLike | None:
-    """The grasps of the file: those in the frames of their objects as a set for all scenes."""
-    from burg_drake.apps.options.grasp_files import POSE_FRAMES, gripper_for
+    """The grasps of the file: one set for all scenes if they are in object frames."""
+    from burg_drake.apps.options.grasp_files import POSE_FRAMES, gripper_from_options
     from burg_drake.formats import read_poses, with_objects_renamed
 
     if arguments.grasps is None:
@@ -153,7 +153,7 @@ def _grasps_from_file(
     imported = evaluation.read_input(
         arguments.grasps,
         arguments.grasps_format,
-        gripper_for(arguments, station),
+        gripper_from_options(arguments, station),
         arguments.correction,
     )
     print_note_lines(imported.notes)
@@ -168,14 +168,14 @@ def _grasps_from_file(
 
 @dataclass(frozen=True)
 class _SceneGraspFile:
-    """Grasps in the frame of a scene or camera: each scene gets those that a file has of it, by
-    the column `scene_id`.
+    """Grasps of a file in the frame of a scene or camera, selected for each scene by the column
+    `scene_id`.
 
     Attributes:
-        arguments: of the verb.
-        station: has the hand.
-        content: hash of the grasps and of what places them.
-        correction: with which they are read.
+        arguments: of the command.
+        station: with the hand.
+        content: hash of the grasps and of the poses that place them.
+        correction: applied when reading.
     """
 
     arguments: argparse.Namespace
@@ -197,7 +197,7 @@ class _SceneGraspFile:
             ) from error
 
 
-RUNS_FOLDER = "runs"  # Parent folder of runs for which no folder is given.
+RUNS_FOLDER = "runs"  # Default parent folder of runs.
 
 
 def add_evaluate_options(parser: options.Parser) -> None:
@@ -230,9 +230,9 @@ def add_evaluate_options(parser: options.Parser) -> None:
         f"folder of the run (default: {RUNS_FOLDER}/SCENE; required for several scenes)",
         required=False,
     )
-    which = parser.add_mutually_exclusive_group()
-    options.add_sampling_options(parser, 100, which)
-    options.add_grasp_file_options(parser, which)
+    source_group = parser.add_mutually_exclusive_group()
+    options.add_sampling_options(parser, 100, source_group)
+    options.add_grasp_file_options(parser, source_group)
     options.add_settings_options(
         parser,
         evaluation.EvaluationSettings,
@@ -258,7 +258,7 @@ def add_evaluate_options(parser: options.Parser) -> None:
 
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
-    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated."""
+    """Evaluates grasps; returns 1 if scenes or grasps could not be judged."""
     from burg_drake.scene import load_scene, scene_references
     from burg_drake.station import load_station
 
@@ -305,7 +305,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
 def _grasps_of_scene(
     arguments: argparse.Namespace, scene: Scene, station: Station, mode: core.Mode
 ) -> Mapping[str, core.GraspSet] | None:
-    """The grasps of the file on the instances of one scene, whose faults are told."""
+    """The grasps of the file on the instances of one scene; prints the issues of the scene."""
     from burg_drake.motion import require_usable_arm
     from burg_drake.station import require_valid_scene
 
@@ -329,7 +329,7 @@ def _evaluate(
     settings: evaluation.EvaluationSettings,
     grasps: evaluation.GraspsLike | None,
 ) -> evaluation.Run | evaluation.Campaign:
-    """Evaluates on this machine or a cluster, and contested grasps again if that is asked for."""
+    """Evaluates on this machine or a cluster; judges contested grasps again with --rejudge."""
     with options.cluster_from_options(arguments) as executor:
         found = evaluation.evaluate(
             scenes,
@@ -354,7 +354,7 @@ def _evaluate(
 
 
 def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> None:
-    """The tables of a run, where its files are, and what has failed."""
+    """Prints the tables of a run, the paths of its files, and failures."""
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
@@ -387,7 +387,7 @@ def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> N
 
 
 def _print_motion(motion: GraspMotion) -> None:
-    """How the hand moves, unless as usual."""
+    """Prints the motion of the hand, unless it is the default."""
     from burg_drake.station import GraspMotion
 
     if motion != GraspMotion():

@@ -45,9 +45,9 @@ def add_gap_options(parser: options.Parser) -> None:
         help="last step before objects are displaced (default: arm, or hand without an arm)",
     )
     _add_placement_noise_options(parser)
-    which = parser.add_mutually_exclusive_group()
-    options.add_sampling_options(parser, 20, which)
-    options.add_grasp_file_options(parser, which)
+    source_group = parser.add_mutually_exclusive_group()
+    options.add_sampling_options(parser, 20, source_group)
+    options.add_grasp_file_options(parser, source_group)
     options.add_settings_options(
         parser, evaluation.EvaluationSettings, "engine", unset=True, shown_default=DEFAULT_ENGINE
     )
@@ -69,7 +69,7 @@ def _add_placement_noise_options(parser: options.Parser) -> None:
 
 
 def run_gap(arguments: argparse.Namespace) -> int:
-    """Judges step by step and reports; 1 if some grasps could not be simulated."""
+    """Judges grasps step by step and reports; returns 1 if some could not be simulated."""
     sheet = None if arguments.trials is None else experiment.load_trials(arguments.trials)
     of_run = (Path(arguments.source) / evaluation.RUN_FILE).is_file()
     if evaluation.is_campaign(arguments.source):
@@ -81,7 +81,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     if sheet is not None and run is not None:
         experiment.tried_grasps(
             sheet, arguments.trials, run
-        )  # refuses other grasps before any work
+        )  # refuses unsuitable grasps before any work
     with options.cluster_from_options(arguments) as cluster:
         measured = _measure_gap(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
@@ -153,19 +153,19 @@ def _measure_gap(
             grasps_per_object=options.grasps_per_object(arguments),
             only=arguments.only,
             motion=options.motion_from_options(arguments, station),
-            mode=None,  # that of a step
+            mode=None,  # each step has its own
         ),
         **shared,
     )
 
 
 def _refuse_scene_options(arguments: argparse.Namespace, run: evaluation.Run) -> None:
-    """Refuses options that the run answers itself.
+    """Refuses options whose values come from the run.
 
     Raises:
-        InvalidInputError: names the option.
+        InvalidInputError: such an option is given; the message names it.
     """
-    # A run has its own values of these.
+    # A run has its own values of these options.
     scene_options = (
         "station",
         "grasps_per_object",

@@ -23,7 +23,7 @@ def add_choice_options(show: options.Parser) -> None:
     show.add_argument(
         "--outcome",
         metavar="A,B",
-        type=lambda text: options.some_of(text, [o.value for o in core.Outcome], "an outcome"),
+        type=lambda text: options.known_names(text, [o.value for o in core.Outcome], "an outcome"),
         help="only grasps with these outcomes, such as lifted,slipped,no_ik",
     )
     count = show.add_mutually_exclusive_group()
@@ -44,9 +44,9 @@ def choose_grasps(
     column: str | None,
     arguments: argparse.Namespace,
 ) -> tuple[list[int], int | None, str]:
-    """Indices of the grasps to be drawn, which of these has the gripper, and what people are told
-    about the choice. Of each object those with the highest number in `column` come first; where it
-    has no numbers, the best."""
+    """Indices of the grasps to draw, the index among these of the grasp with the gripper, and a
+    caption. The grasps of an object are sorted by falling numbers in `column`; if it has no
+    numbers, by rank."""
     import numpy as np
 
     instances = grasps.columns.get("instance")
@@ -56,8 +56,8 @@ def choose_grasps(
     if not keep.any():
         raise core.InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
     most = None if arguments.all else arguments.most
-    holder = np.array(object_or_instance_names(grasps))
-    chosen = evaluation.best_of_each(holder, keep, ranking, most)
+    names = np.array(object_or_instance_names(grasps))
+    chosen = evaluation.best_of_each(names, keep, ranking, most)
     caption = f"{len(chosen):,} of {len(grasps):,} grasps shown"
     if len(chosen) < keep.sum():
         by = ranking.by
@@ -67,22 +67,22 @@ def choose_grasps(
     if arguments.select is not None:
         index = evaluation.grasp_index(grasps, arguments.select, arguments.file)
         if index not in chosen:
-            same = [k for k, other in enumerate(chosen) if holder[other] == holder[index]]
+            same = [k for k, other in enumerate(chosen) if names[other] == names[index]]
             chosen.insert(same[-1] + 1 if same else len(chosen), index)
     values = None if column is None else grasps.column(column)
     if values is not None and values.dtype.kind in "fiu":
-        objects = list(dict.fromkeys(holder[chosen].tolist()))
-        chosen.sort(key=lambda k: (objects.index(holder[k]), *_descending_order(float(values[k]))))
+        objects = list(dict.fromkeys(names[chosen].tolist()))
+        chosen.sort(key=lambda k: (objects.index(names[k]), *_descending_order(float(values[k]))))
     return chosen, None if index is None else chosen.index(index), caption
 
 
 def _descending_order(value: float) -> tuple[bool, float]:
-    """Sorts numbers down, NaN last."""
+    """Sort key for descending numbers, with NaN last."""
     return value != value, 0.0 if value != value else -value
 
 
 def object_or_instance_names(grasps: core.GraspSet) -> list[str]:
-    """The instance of each grasp, or without a scene the object."""
+    """The instance of each grasp, or its object if there is no scene."""
     return list(grasps.column("instance" if "instance" in grasps.columns else "object").tolist())
 
 
@@ -125,12 +125,12 @@ def add_grasps_show_options(show: options.Parser) -> None:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DisplayedGrasps:
-    """What there is to show.
+    """The content of the view.
 
     Attributes:
-        grasps: all of them; with the column `instance` where there is a scene.
-        source: where their objects are.
-        station: for the hand, and where the scene is.
+        grasps: all grasps; with the column `instance` if there is a scene.
+        source: objects of the grasps.
+        station: of the hand and the scene.
         ranking: of the grasps.
         title: of the page.
     """
@@ -143,7 +143,7 @@ class DisplayedGrasps:
 
 
 def run_grasps_show(arguments: argparse.Namespace) -> int:
-    """Shows grasps among the objects that they belong to."""
+    """Shows grasps on their objects."""
     from burg_drake.apps.terminal import open_view, present_view, print_legend
 
     content = _load_content(arguments)
@@ -182,7 +182,7 @@ def run_grasps_show(arguments: argparse.Namespace) -> int:
 
 
 def _finger_widths(grasps: core.GraspSet, widest: float) -> core.Array:
-    """(N,) at which fingers are drawn [m]: at their contacts, else as they arrive, else open."""
+    """(N,) widths of the drawn hands [m]: at contact if known, else of the pregrasp, else open."""
     import numpy as np
 
     from burg_drake.formats import PREGRASP_WIDTH_COLUMN
@@ -199,8 +199,8 @@ def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
     path = Path(arguments.file)
     if path.is_dir():
         return _load_run_content(arguments)
-    station = options.station_for(arguments, arguments.file)
-    gripper, format = options.gripper_for(arguments, station), arguments.source
+    station = options.station_from_options(arguments, arguments.file)
+    gripper, format = options.gripper_from_options(arguments, station), arguments.source
     objects = dict(arguments.rename)
     imported = evaluation.read_input(path, format, gripper, arguments.correction)
     grasps = imported.grasps
@@ -237,7 +237,7 @@ def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
 
 
 def _print_mistakes(grasps: core.GraspSet, source: options.GraspSource, station: Station) -> None:
-    """Says which usual mistake grasps from elsewhere show."""
+    """Prints which common mistake imported grasps show."""
     named = grasps.object if source.scene is None else grasps.column("instance")
     by_name = {name: grasps.select(named == name) for name in dict.fromkeys(named.tolist())}
     for note in evaluation.mistake_notes(
@@ -264,7 +264,7 @@ def _load_run_content(arguments: argparse.Namespace) -> DisplayedGrasps:
 
 
 def _list_labels(grasps: core.GraspSet, column: str | None, by: str) -> tuple[list[str], str]:
-    """What a list says of each grasp, its colour's meaning and its identifier, and the title."""
+    """Labels of the grasps in the list (meaning of the colour and identifier), and its title."""
     import numpy as np
 
     ids = evaluation.shown_ids(grasps)

@@ -38,7 +38,7 @@ def add_grasps_convert_options(parser: options.Parser) -> None:
 
 
 def _add_selection_options(parser: options.Parser) -> None:
-    """Options about which grasps are written, and of what."""
+    """Adds options that select grasps and objects."""
     options.add_only(parser, "write grasps")
     options.add_renaming(parser)
     parser.add_argument(
@@ -50,7 +50,7 @@ def _add_selection_options(parser: options.Parser) -> None:
 
 
 def _add_frame_options(parser: options.Parser) -> None:
-    """Options about frames."""
+    """Adds options about frames."""
     group = parser.add_argument_group(
         "frames", "For files whose poses are in the frame of a scene or a camera."
     )
@@ -69,9 +69,9 @@ def _add_frame_options(parser: options.Parser) -> None:
 
 
 def run_grasps_convert(arguments: argparse.Namespace) -> int:
-    """Reads, changes what is asked for, writes, and says what got lost on the way."""
+    """Converts a grasp file, and prints what the target format cannot store."""
     output = options.grasp_output(arguments.output, arguments.target)
-    gripper = options.gripper_for(arguments, path=arguments.input)
+    gripper = options.gripper_from_options(arguments, path=arguments.input)
     imported = _read_grasps(arguments, output.format, gripper)
     _print_import(arguments, imported)
     grasps = _select_grasps(imported.grasps, arguments)
@@ -83,7 +83,7 @@ def run_grasps_convert(arguments: argparse.Namespace) -> int:
 def _read_grasps(
     arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper
 ) -> ImportedGrasps:
-    """The grasps in the frame that the target wants."""
+    """The grasps in the frame of the target format."""
     from burg_drake.formats import read_poses
     from burg_drake.scene import load_scene
 
@@ -131,7 +131,7 @@ def _print_import(arguments: argparse.Namespace, imported: ImportedGrasps) -> No
 
 
 class _ListFormats(argparse.Action):
-    """Lists the formats and ends, whatever else is given."""
+    """Lists the formats and ends the command, whatever other options are given."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         from burg_drake.formats import GRASP_FORMATS
@@ -141,7 +141,7 @@ class _ListFormats(argparse.Action):
 
 
 def _print_formats(formats: Sequence[GraspFormat]) -> None:
-    """Prints each format in a few lines; lengths are those of the Panda."""
+    """Prints each format in a few lines, with the lengths of the Panda hand."""
     from burg_drake.formats import PANDA_GRIPPER, convention_of
 
     for format in formats:
@@ -199,7 +199,7 @@ def run_frames(arguments: argparse.Namespace) -> int:
     gripper = options.gripper_by_name(arguments.hand)
     hand, model, _ = locate_hand(arguments.hand)
     meshcat = open_view(arguments)
-    # ours is in every picture
+    # our frame is in every picture
     shown = [
         formats[name]
         for name in arguments.names or formats

@@ -69,7 +69,7 @@ def _add_sampling_settings(parser: options.Parser) -> None:
 
 
 def run_grasps_sample(arguments: argparse.Namespace) -> int:
-    """Samples and writes a file; 1 if there are no grasps at all."""
+    """Samples grasps and writes a file; returns 1 if there are no grasps."""
     from burg_drake.station import load_station, station_gripper
 
     output = options.grasp_output(arguments.output, arguments.target, frame="object")
@@ -100,7 +100,7 @@ def run_grasps_sample(arguments: argparse.Namespace) -> int:
 
 
 def _objects_to_sample(only: list[str] | None, source: options.GraspSource) -> list[str]:
-    """The objects that are to be sampled on, of a scene one for each instance."""
+    """The objects to sample grasps on; for a scene one entry per instance."""
     if source.scene is None:
         return list(dict.fromkeys(only or source.library.objects))
     return [
@@ -116,7 +116,7 @@ def _sample_objects(
     station: Station,
     settings: evaluation.SamplingSettings,
 ) -> tuple[dict[str, core.GraspSet], dict[str, float]]:
-    """Grasps, and how long they took [s], by instance or object."""
+    """Grasps and sampling times [s], by instance or object."""
     seed, only = arguments.seed, arguments.only
     if source.scene is None:
         stream = evaluation.sample_library(source.library, station, n, seed, settings, only)
@@ -140,7 +140,7 @@ def _sample_objects(
 def sampling_table(
     sampled: Mapping[str, core.GraspSet], seconds: Mapping[str, float], asked: int
 ) -> core.TextTable:
-    """What sampling came to, by instance or object."""
+    """Table of sampling results by instance or object."""
     table = core.TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
     for name, grasps in sampled.items():
         counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
@@ -204,14 +204,14 @@ def add_grasps_score_options(parser: options.Parser) -> None:
 
 
 def run_grasps_score(arguments: argparse.Namespace) -> int:
-    """Scores, prints a table and writes a file."""
+    """Scores grasps, prints tables and writes a file."""
     from burg_drake.formats import with_objects_renamed
 
     output = None
     if arguments.output is not None:
         output = options.grasp_output(arguments.output, arguments.target, frame="object")
-    station = options.station_for(arguments, arguments.file)
-    gripper = options.gripper_for(arguments, station)
+    station = options.station_from_options(arguments, arguments.file)
+    gripper = options.gripper_from_options(arguments, station)
     imported = evaluation.read_input(arguments.file, arguments.source, gripper)
     if imported.frame != "object":
         raise core.InvalidInputError(
@@ -240,7 +240,7 @@ def run_grasps_score(arguments: argparse.Namespace) -> int:
 
 
 def _print_score_tables(grasps: core.GraspSet) -> None:
-    """Quantiles of each metric by object, and what the hand collides with."""
+    """Prints quantiles of each metric by object, and the bodies that the hand collides with."""
     import numpy as np
 
     from burg_drake.apps.commands.grasp_tables import TABLE_QUANTILES, print_numbers

@@ -1,4 +1,4 @@
-"""`burg-drake grasps stats`: figures of a set of grasps, and how it compares with another set."""
+"""`burg-drake grasps stats`: figures of a set of grasps, and its comparison with another set."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def add_grasps_stats_options(parser: options.Parser) -> None:
 
 
 def run_grasps_stats(arguments: argparse.Namespace) -> int:
-    """Prints the figures of one set or two."""
+    """Prints the figures of one set or of two sets."""
     from burg_drake.apps.commands.grasp_tables import print_comparison, print_ranking, print_summary
     from burg_drake.evaluation import read_input
 
@@ -59,7 +59,7 @@ def run_grasps_stats(arguments: argparse.Namespace) -> int:
     tolerance, column = options.settings_from(arguments, grasping.Tolerance), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
     given = arguments.hand or arguments.gripper_link
-    gripper = options.gripper_for(arguments) if given else None
+    gripper = options.gripper_from_options(arguments) if given else None
     sets = [read_input(path, arguments.source, gripper, arguments.correction) for path in paths]
     sets = _rename_objects(sets, dict(arguments.rename))
     _require_same_frames(paths, sets)
@@ -86,7 +86,7 @@ def run_grasps_stats(arguments: argparse.Namespace) -> int:
 
 
 def _rename_objects(sets: list[ImportedGrasps], names: dict[str, str]) -> list[ImportedGrasps]:
-    """The sets with other names of their objects; one that no set has is refused."""
+    """The sets with renamed objects; refuses a name that no set has."""
     from burg_drake.formats import with_objects_renamed
 
     known = [set(imported.grasps.object.tolist()) for imported in sets]
@@ -94,9 +94,9 @@ def _rename_objects(sets: list[ImportedGrasps], names: dict[str, str]) -> list[I
     found = []
     for imported, own in zip(sets, known, strict=True):
         others = everywhere - own  # may be in one set only
-        mine = {theirs: ours for theirs, ours in names.items() if theirs not in others}
+        own_names = {theirs: ours for theirs, ours in names.items() if theirs not in others}
         found.append(
-            dataclasses.replace(imported, grasps=with_objects_renamed(imported.grasps, mine))
+            dataclasses.replace(imported, grasps=with_objects_renamed(imported.grasps, own_names))
         )
     return found
 
@@ -111,7 +111,7 @@ def _require_same_frames(paths: list[str], sets: list[ImportedGrasps]) -> None:
 
 
 def _json_value(value: Any) -> Any:
-    """JSON values: shares with their value, null for what is not finite."""
+    """The value for JSON: shares with their ratio, null for numbers that are not finite."""
     if isinstance(value, grasping.TopPrecision):
         figures = {"ap": value.ap, "attainable": value.attainable, "kept": len(value.kept)}
         by_criterion = value.by_criterion.tolist()

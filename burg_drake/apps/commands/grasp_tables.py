@@ -23,22 +23,22 @@ TABLE_QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)  # Quantiles in tables of grasp co
 
 
 DISPLAY_UNITS = {"m": ("mm", 1e-3), "m2": ("mm2", 1e-6), "rad": ("deg", math.radians(1.0))}
-"""Units in which SI quantities are printed, and their size. Other units stay."""
+"""Display unit and its size by SI unit; other units are printed unchanged."""
 
 
 NumberRows = Mapping[str, tuple[int, Mapping[str, float]]]
 
 
 def print_numbers(title: str, rows: NumberRows, frame: str = "object") -> None:
-    """Prints figures of columns of grasps; a narrow terminal gets fewer of them.
+    """Prints figures of columns of grasps; fewer of them on a narrow terminal.
 
     Args:
         title: of the table.
-        rows: by column, how many of its values are known, and figures by name in SI units; the
-            same names in every row.
-        frame: what x, y and z are measured in.
+        rows: number of known values and figures by name in SI units, by column; the same names in
+            every row.
+        frame: of x, y and z.
     """
-    optional_heads = ("5%", "95%")  # Columns that a narrow terminal omits.
+    optional_heads = ("5%", "95%")  # Columns that are left out on a narrow terminal.
     if not rows:
         return
     heads = list(next(iter(rows.values()))[1])
@@ -53,7 +53,7 @@ def print_numbers(title: str, rows: NumberRows, frame: str = "object") -> None:
 def number_table(
     title: str, heads: list[str], rows: NumberRows, frame: str = "object"
 ) -> core.TextTable:
-    """The table of some of the figures; see `print_numbers`."""
+    """The table with the figures in `heads`; see `print_numbers`."""
     table = core.TextTable(title).names("column").numbers("known", *heads)
     if {"x", "y", "z"} & set(rows):
         where = "the frame of its object" if frame == "object" else f"the {frame} frame"
@@ -79,10 +79,10 @@ def print_summary(
     """Prints the figures of one set: by object, then by column.
 
     Args:
-        title: names the set.
-        summary: its figures.
-        notes: what was left behind as it was read.
-        frame: what its poses are measured in.
+        title: of the set.
+        summary: figures of the set.
+        notes: on values that were not read.
+        frame: of the poses.
     """
     summary_table(title, summary).show()
     numbers = {name: values for name, values in summary.numbers.items() if values.count}
@@ -117,7 +117,7 @@ def summary_table(title: str, summary: SetSummary) -> core.TextTable:
 
 
 def comparison_table(comparison: SetComparison) -> core.TextTable:
-    """How two sets compare, by object."""
+    """Table of the comparison of two sets, by object."""
     table = (
         core.TextTable("A and B")
         .names("object")
@@ -148,7 +148,7 @@ def comparison_table(comparison: SetComparison) -> core.TextTable:
 
 
 def ranking_table(ranking: Ranking) -> core.TextTable:
-    """Average precision, by criterion."""
+    """Table of the average precision, by criterion."""
     top = ranking.top
     table = core.TextTable(f"scores judged by {ranking.column}").names("good if")
     table.numbers("good", "AP", f"AP of the top {len(top.precision)}")
@@ -162,7 +162,7 @@ def ranking_table(ranking: Ranking) -> core.TextTable:
 
 
 def print_comparison(comparison: SetComparison) -> None:
-    """Prints how two sets compare, by object."""
+    """Prints the comparison of two sets, by object."""
     comparison_table(comparison).show()
     overall = comparison.overall
     print(f"coverage: B has {core.format_percent(overall.coverage.value)} of A")
@@ -187,7 +187,7 @@ def print_ranking(ranking: Ranking) -> None:
 
 
 def _rows_with_total(objects: dict[str, Row], overall: Row) -> list[tuple[str, Row]]:
-    """Rows by object, and one of all if there are several."""
+    """Rows by object, and a row of all objects if there are several."""
     rows = list(objects.items())
     return rows if len(rows) == 1 else [*rows, ("all", overall)]
 
@@ -210,7 +210,7 @@ def _tolerance_text(tolerance: Tolerance) -> str:
 
 
 def _value_counts_text(counts: dict[str, int]) -> str:
-    max_values = 6  # Distinct values of a text column that are printed.
+    max_values = 6  # Maximum number of distinct values printed of a text column.
     shown = [f"{name or '(none)'} {count:,}" for name, count in list(counts.items())[:max_values]]
     more = len(counts) - len(shown)
     return ", ".join(shown) + (f" and {more:,} more" if more else "")

@@ -37,7 +37,7 @@ def run_library_list(arguments: argparse.Namespace) -> int:
 
 
 def run_library_check(arguments: argparse.Namespace) -> int:
-    """Prints what is wrong with a library; 1 if there are errors."""
+    """Prints errors and warnings of a library; returns 1 if there are errors."""
     from burg_drake.objects import load_library
 
     library = load_library(arguments.library)
@@ -74,7 +74,11 @@ def run_library_show(arguments: argparse.Namespace) -> int:
     legend = show_library(library, meshcat, arguments.only)
     count = len(arguments.only or library.objects)
     present_view(
-        meshcat, arguments, title=library.name, caption=[f"{count} objects"], legend=legend
+        meshcat,
+        arguments,
+        title=library.name,
+        caption=[core.count_with_noun(count, "object")],
+        legend=legend,
     )
     return 0
 
@@ -91,8 +95,8 @@ def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> 
 
 
 def print_contact_geometry(library: ObjectLibrary, names: Iterable[str]) -> None:
-    """Prints what gripper pads touch of objects: not of those of which a check or build says more,
-    that they touch pieces for a reason, or that a file is missing or damaged."""
+    """Prints the geometry of objects that gripper pads touch. Leaves out objects with a
+    problem, which check and build report."""
     from burg_drake.objects import describe_pad_contact
 
     for name in names:
@@ -102,7 +106,7 @@ def print_contact_geometry(library: ObjectLibrary, names: Iterable[str]) -> None
 
 
 def library_table(objects: Mapping[str, ObjectEntry]) -> core.TextTable:
-    """Objects by name."""
+    """Table of objects by name."""
     table = core.TextTable().names("object")
     table.numbers("mass [g]", "size [mm]", "mu", "pieces", "poses")
     for name, entry in objects.items():
@@ -121,13 +125,13 @@ def library_table(objects: Mapping[str, ObjectEntry]) -> core.TextTable:
 
 
 def run_library_build(arguments: argparse.Namespace) -> int:
-    """Builds a library; 1 if some objects could not be built, an error if none could."""
+    """Builds a library; returns 1 if some objects could not be built, raises if none could."""
     sources, name = mesh_sources(arguments)
     return _build_library(sources, arguments.output, arguments.name or name, arguments)
 
 
 def run_library_add(arguments: argparse.Namespace) -> int:
-    """Adds an object to a library that exists."""
+    """Adds an object to an existing library."""
     from burg_drake.objects import LIBRARY_FILE, load_library
 
     folder = Path(arguments.library)
@@ -149,28 +153,29 @@ def run_library_add(arguments: argparse.Namespace) -> int:
 
 
 def run_library_import_burg(arguments: argparse.Namespace) -> int:
-    """Builds what a library of BURG-Toolkit lists, and tells how the stable poses agree."""
+    """Builds the objects of a BURG-Toolkit library, and compares their stable poses with the
+    recorded ones."""
     from burg_drake.formats import read_burg_library
     from burg_drake.objects import load_library
 
-    burg = read_burg_library(arguments.file)
-    names = pipeline.burg_names(burg)
+    toolkit = read_burg_library(arguments.file)
+    names = pipeline.burg_names(toolkit)
     values = named_values(arguments, set(names.values()))
     sources = pipeline.burg_sources(
-        burg,
+        toolkit,
         values.masses,
         density=arguments.density,
         friction=values.common_friction,
         skip=arguments.skip,
     )
-    for note in (*burg.notes, pipeline.fixed_note(burg, sources)):
+    for note in (*toolkit.notes, pipeline.fixed_note(toolkit, sources)):
         if note:
             print(note)
     sources = with_frictions(sources, values)
-    name = arguments.name or (core.make_name(burg.name) if burg.name else None)
-    code = _build_library(sources, arguments.output, name, arguments)
+    library_name = arguments.name or (core.make_name(toolkit.name) if toolkit.name else None)
+    code = _build_library(sources, arguments.output, library_name, arguments)
     library = load_library(arguments.output)
-    for item in burg.objects:
+    for item in toolkit.objects:
         name = names[item.identifier]
         if item.stable_poses and name in library.objects and not library.entry(name).is_fixed:
             recorded = [pose.X_SO for pose in item.stable_poses]
@@ -204,14 +209,15 @@ def _build_library(
     with show_progress("building", "objects", len(sources), quiet=arguments.quiet) as pace:
 
         def progress(name: str, state: str, done: int, total: int) -> None:
-            """Objects that are up to date come first, and cost nothing."""
+            """Counts an object; cached ones come first and take no time."""
             count = pace.skip if state == "cached" else pace.step
             count(1, note=f"{name} {state}")
 
         by_name = {source.name: source for source in sources}
 
         def on_failure(name: str, message: str, error: BaseException) -> None:
-            """Told at once, as the others may take long; an only object's ends the command."""
+            """Prints the error at once, as the other objects may take long; for a single object
+            the error ends the command."""
             if len(sources) > 1:
                 units = error.units if isinstance(error, core.MeshError) else ()
                 hint = f"; for this mesh alone --unit {name}={units[0]}" if units else ""
@@ -273,11 +279,11 @@ objects.yaml takes all settings of an object:
     rack: {mesh: scans/rack.stl, mass: 0.4, decomposition: {threshold: 0.02}}
     chair: {mesh: chair.obj, mass: 0.9, pieces: [seat.obj, back.obj]}
 
-A smaller decomposition.threshold (0.01 to 1) makes finer convex pieces; where none is given and\
- the pieces of 0.05 are coarse, 0.02 and 0.01 are tried. `pieces` names convex pieces of your own.
+A smaller decomposition.threshold (0.01 to 1) makes finer convex pieces. Without it, 0.05 is used,\
+ then 0.02 and 0.01 if the pieces are too coarse. `pieces` names convex pieces of your own.
 
-Meshes may have 512 MB and 2,000,000 triangles, with openings 1,000,000; textures 8192 x 8192\
- pixels."""
+Meshes may have 512 MB and 2,000,000 triangles, or 1,000,000 if they are not closed; textures\
+ 8192 x 8192 pixels."""
 """Help text about objects.yaml and the limits of meshes."""
 
 
@@ -299,8 +305,8 @@ def add_library_build_options(build: options.Parser) -> None:
         " objects.yaml",
     )
     _add_output(build)
-    _add_named_values(build)
-    _add_common_values(build)
+    _add_values_by_object(build)
+    _add_build_options(build)
 
 
 def add_library_add_options(add: options.Parser) -> None:
@@ -323,26 +329,26 @@ def add_library_add_options(add: options.Parser) -> None:
         help=f"friction coefficient (default: {DEFAULT_FRICTION:g})",
     )
     add.add_argument("--description", metavar="TEXT", help="a note for people")
-    _add_common_values(add)
+    _add_build_options(add)
 
 
-def add_library_import_burg_options(burg: options.Parser) -> None:
+def add_library_import_burg_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake library import-burg`."""
-    burg.epilog = options.examples_text(
+    parser.epilog = options.examples_text(
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake library import-burg object_library.yaml -o my_library --mass table=4",
     )
-    burg.add_argument(
+    parser.add_argument(
         "file", metavar="FILE", help="object_library.yaml of BURG-Toolkit, version 1.0"
     )
-    burg.add_argument(
+    parser.add_argument(
         "--skip",
         metavar="NAME",
         action="append",
         default=[],
         help="leave out this object; repeatable",
     )
-    _add_shared_import_options(burg, " (default: such objects stay fixed, as background)")
+    _add_shared_import_options(parser, " (default: such objects stay fixed, as background)")
 
 
 def add_library_import_ycb_options(ycb: options.Parser) -> None:
@@ -352,10 +358,10 @@ def add_library_import_ycb_options(ycb: options.Parser) -> None:
     _add_shared_import_options(ycb)
 
 
-def _add_shared_import_options(parser: options.Parser, without: str = "") -> None:
+def _add_shared_import_options(parser: options.Parser, help_suffix: str = "") -> None:
     _add_output(parser)
-    _add_named_values(parser)
-    _add_density(parser, without)
+    _add_values_by_object(parser)
+    _add_density(parser, help_suffix)
     _add_build_run_options(parser)
 
 
@@ -403,7 +409,7 @@ def _add_output(parser: options.Parser) -> None:
     parser.add_argument("--name", help="name of the library (default: that of its folder)")
 
 
-def _add_named_values(parser: options.Parser) -> None:
+def _add_values_by_object(parser: options.Parser) -> None:
     from burg_drake.objects import DEFAULT_FRICTION
 
     parser.add_argument(
@@ -430,16 +436,16 @@ def _add_named_values(parser: options.Parser) -> None:
     )
 
 
-def _add_density(parser: options.Parser, without: str = "") -> None:
+def _add_density(parser: options.Parser, help_suffix: str = "") -> None:
     parser.add_argument(
         "--density",
         metavar="KG/M3",
         type=options.positive,
-        help=f"density of objects without a mass{without}",
+        help=f"density of objects without a mass{help_suffix}",
     )
 
 
-def _add_common_values(parser: options.Parser) -> None:
+def _add_build_options(parser: options.Parser) -> None:
     from burg_drake.objects import CONTACT_KINDS, UNITS, Openings
 
     _add_density(parser)
@@ -466,7 +472,7 @@ def _add_common_values(parser: options.Parser) -> None:
     parser.add_argument(
         "--openings",
         choices=get_args(Openings),
-        help="large openings in a mesh: make the surface a wall (default), or close them",
+        help="large openings in a mesh: treat the surface as a thin wall (default), or close them",
     )
     parser.add_argument(
         "--contact", choices=CONTACT_KINDS, help="collision geometry (default: chosen by the shape)"

@@ -20,7 +20,8 @@ _T = TypeVar("_T")
 
 
 def mesh_sources(arguments: argparse.Namespace) -> tuple[list[pipeline.ObjectSource], str | None]:
-    """What the arguments of `library build` ask for, and the library's name if a recipe has one."""
+    """The objects to build by the arguments of `library build`, and the name in a recipe, if
+    any."""
     sources: list[pipeline.ObjectSource] = []
     name: str | None = None
     for argument in arguments.meshes:
@@ -39,7 +40,7 @@ def mesh_sources(arguments: argparse.Namespace) -> tuple[list[pipeline.ObjectSou
 
 
 def _with_unique_names(sources: Sequence[pipeline.ObjectSource]) -> list[pipeline.ObjectSource]:
-    """Sources of which those that share a name also go by their file's suffix."""
+    """Sources with unique names: equal names are extended by the suffix of the file."""
     shared = {name for name, count in Counter(s.name for s in sources).items() if count > 1}
     return [
         replace(s, name=pipeline.object_name(f"{s.name}_{Path(str(s.mesh)).suffix}"))
@@ -52,7 +53,7 @@ def _with_unique_names(sources: Sequence[pipeline.ObjectSource]) -> list[pipelin
 def with_common_values(
     sources: Sequence[pipeline.ObjectSource], arguments: argparse.Namespace
 ) -> list[pipeline.ObjectSource]:
-    """Sources with what the arguments say of all objects."""
+    """Sources with the values that the arguments give for all objects."""
     from burg_drake.objects import unit_scale
 
     units = _values_by_name(arguments.unit, {s.name for s in sources}, "unit")
@@ -70,12 +71,12 @@ def with_common_values(
 
 @dataclass(frozen=True)
 class NamedValues:
-    """What the arguments say of single objects.
+    """Values that the arguments give for single objects.
 
     Attributes:
         masses: by object name [kg].
         frictions: by object name.
-        common_friction: of all others, if given.
+        common_friction: of all other objects; None if not given.
     """
 
     masses: dict[str, float]
@@ -91,8 +92,8 @@ def named_values(arguments: argparse.Namespace, names: set[str]) -> NamedValues:
         names: of all objects.
 
     Raises:
-        UnknownNameError: a value for another object.
-        DocumentError: the file of masses cannot be used.
+        UnknownNameError: a value is for an unknown object.
+        DocumentError: the file of masses is invalid.
     """
     masses = {} if arguments.masses is None else _read_masses(Path(arguments.masses), names)
     masses.update(_values_by_name(arguments.mass, names, "mass"))
@@ -103,7 +104,7 @@ def named_values(arguments: argparse.Namespace, names: set[str]) -> NamedValues:
 def with_frictions(
     sources: Sequence[pipeline.ObjectSource], values: NamedValues
 ) -> list[pipeline.ObjectSource]:
-    """Sources with the friction that is given for them by name."""
+    """Sources with the friction coefficients that are given by name."""
     return [
         replace(source, friction=values.frictions.get(source.name, source.friction))
         for source in sources
@@ -113,7 +114,7 @@ def with_frictions(
 def _with_values(
     source: pipeline.ObjectSource, values: NamedValues, density: float | None
 ) -> pipeline.ObjectSource:
-    """A source with what the arguments say of it; a mass goes before any density."""
+    """A source with the values from the arguments; a mass takes precedence over a density."""
     mass = values.masses.get(source.name, source.mass)
     common = source.friction if values.common_friction is None else values.common_friction
     return replace(
@@ -125,7 +126,7 @@ def _with_values(
 
 
 def _mesh_files(path: Path) -> list[Path]:
-    """A file as it is given; of a folder all meshes in it."""
+    """The file itself, or all meshes in a folder."""
     from burg_drake.objects import MESH_FORMATS
 
     if not path.is_dir():
@@ -137,8 +138,8 @@ def _mesh_files(path: Path) -> list[Path]:
 
 
 def _values_by_name(pairs: Iterable[tuple[str, _T]], names: set[str], what: str) -> dict[str, _T]:
-    """Values by object name, without the value for all, which has no name; the name of the mesh
-    file's stem is as good."""
+    """Values by object name, without the value for all objects, which has no name; the stem of the
+    mesh file is accepted as a name."""
     values: dict[str, _T] = {}
     for given, value in pairs:
         if not given:

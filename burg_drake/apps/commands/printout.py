@@ -36,13 +36,13 @@ def add_printout_options(parser: options.Parser) -> None:
 
 
 def require_pdf(path: str) -> None:
-    """Refuses names of other files."""
+    """Refuses a path without the suffix of a PDF."""
     if not path.lower().endswith(".pdf"):
         raise core.InvalidInputError(f"{path}: only PDF is written; end the name with .pdf")
 
 
 def run_printout(arguments: argparse.Namespace) -> int:
-    """Writes the PDF; what is not on it as in the scene goes to stderr."""
+    """Writes the PDF; prints differences from the scene to stderr."""
     from burg_drake.printout import PAPER_SIZES, PrintSettings, print_board
     from burg_drake.scene import load_scene
 
@@ -88,7 +88,7 @@ def add_camera_target_options(target: options.Parser) -> None:
 
 
 def add_target_board_options(parser: Any) -> None:
-    """The options about the board."""
+    """Adds the options about the calibration board."""
     board = parser.add_argument_group(
         "calibration board", "The defaults are those of `burg-drake camera target`."
     )
@@ -96,7 +96,7 @@ def add_target_board_options(parser: Any) -> None:
 
 
 def target_from_options(arguments: argparse.Namespace) -> cameras.CharucoTarget:
-    """The board that the options tell."""
+    """The calibration board from options."""
     return options.settings_from(arguments, cameras.CharucoTarget)
 
 

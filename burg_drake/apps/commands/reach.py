@@ -1,4 +1,4 @@
-"""`burg-drake reach`: which grasps the arm can execute, and what hinders it at the others."""
+"""`burg-drake reach`: which grasps the arm can execute, and what is in the way of the others."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 def print_reach_tables(
     grasps: core.GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
 ) -> None:
-    """Counts by object and by outcome, what was in the way, objects without a clear or reachable
-    grasp, and how fast that was found out.
+    """Prints counts by object and by outcome with the obstacles, objects without a clear or
+    reachable grasp, and the speed of the computation.
 
     Args:
-        grasps: as `reach` has judged them.
-        asked: objects that it was asked about, of which some may have no grasp.
+        grasps: judged by `reach`.
+        asked: requested objects, some of which may have no grasp.
         motion: of the hand.
         given: whether the grasps are the user's own.
     """
@@ -49,7 +49,7 @@ def print_reach_tables(
 def reach_table(
     by_object: Mapping[str, Counter[core.Outcome]], total: Counter[core.Outcome]
 ) -> core.TextTable:
-    """How many grasps of each object the arm can execute."""
+    """Table of the number of grasps that the arm can execute, by object."""
     table = core.TextTable("Grasps that the arm can execute").names("object")
     table.numbers("grasps", "clear", "reachable", "of clear")
     rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
@@ -78,7 +78,7 @@ def outcome_table(
     by_object: Mapping[str, Counter[core.Outcome]],
     total: Counter[core.Outcome],
 ) -> core.TextTable:
-    """Outcomes by object where they fit, with what was mostly in the way."""
+    """Table of outcomes with the most frequent obstacles, and by object if there is room."""
     max_blockers = 3  # Most frequent bodies listed for each outcome.
     from rich.console import Console
 
@@ -97,7 +97,11 @@ def outcome_table(
         share = core.format_percent(total[outcome] / len(grasps))
         in_the_way = ", ".join(f"{name} ({core.format_count(n)})" for name, n in blockers)
         table.row(outcome.value, *counts, core.format_count(total[outcome]), share, in_the_way)
-    failed = [one for one in core.Outcome if one in total and one is not core.Outcome.REACHABLE]
+    failed = [
+        outcome
+        for outcome in core.Outcome
+        if outcome in total and outcome is not core.Outcome.REACHABLE
+    ]
     table.caption = "\n".join(f"{outcome}: {outcome.meaning}" for outcome in failed)
     return table
 
@@ -116,9 +120,9 @@ def add_reach_options(parser: options.Parser) -> None:
         " simulated; `evaluate` does that.",
     )
     options.add_scene(parser)
-    which = parser.add_mutually_exclusive_group()
-    options.add_sampling_options(parser, 100, which)
-    options.add_grasp_file_options(parser, which)
+    source_group = parser.add_mutually_exclusive_group()
+    options.add_sampling_options(parser, 100, source_group)
+    options.add_grasp_file_options(parser, source_group)
     options.add_station(parser)
     options.add_motion_options(parser)
     options.add_output(
@@ -151,7 +155,7 @@ def add_reach_options(parser: options.Parser) -> None:
 
 
 def run_reach(arguments: argparse.Namespace) -> int:
-    """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
+    """Judges grasps, prints tables and writes outputs; returns 1 if some could not be judged."""
     from burg_drake.motion import require_usable_arm
     from burg_drake.scene import load_scene
     from burg_drake.station import load_station, require_valid_scene
@@ -195,7 +199,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
 
 
 def _require_consistent_options(arguments: argparse.Namespace) -> None:
-    """Refuses options without those that they belong to, and a folder that cannot be written to.
+    """Refuses options whose required other option is missing, and a read-only folder.
 
     Raises:
         InvalidInputError: names the option or the folder.
@@ -216,7 +220,7 @@ def _require_consistent_options(arguments: argparse.Namespace) -> None:
 def _print_answers(
     judged: core.GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
 ) -> None:
-    """The tables, and what one has to know to read them."""
+    """Prints the tables with notes."""
     from burg_drake.station import GraspMotion
 
     names = [scene.instance(n).object for n in evaluation.chosen_instances(scene, arguments.only)]
@@ -232,22 +236,22 @@ def _print_answers(
 
 
 def _judged_mask(judged: core.GraspSet) -> Any:
-    """(N,) bool, which grasps could be judged."""
+    """(N,) bool, grasps that could be judged."""
     return judged.column("outcome") != ""
 
 
 def _reachable_mask(judged: core.GraspSet) -> Any:
-    """(N,) bool, which grasps the arm can execute."""
+    """(N,) bool, grasps that the arm can execute."""
     return judged.column("outcome") == core.Outcome.REACHABLE
 
 
 def _unplanned_mask(judged: core.GraspSet) -> Any:
-    """(N,) bool, which of those have no plan though one was wanted."""
+    """(N,) bool, reachable grasps without a plan although one was requested."""
     return _reachable_mask(judged) & (judged.column("reason") != "")
 
 
 def _report_failures(judged: core.GraspSet, arguments: argparse.Namespace) -> int:
-    """Says of which grasps the computation has failed; 1 if there are any."""
+    """Prints the grasps whose computation has failed; returns 1 if there are any."""
     answered, unplanned = _judged_mask(judged), _unplanned_mask(judged)
     failed = judged.select(~answered)
     retry = f"; {options.retry_advice(0, len(failed))}" if arguments.plans else ""
@@ -257,7 +261,7 @@ def _report_failures(judged: core.GraspSet, arguments: argparse.Namespace) -> in
 
 
 def _print_failures(failed: core.GraspSet, what: str, total: int, retry: str = "") -> None:
-    """A line about grasps whose computation has failed, if there are any."""
+    """Prints a line about grasps whose computation has failed, if there are any."""
     if len(failed):
         reason = failed.column("reason")[0].removeprefix("no plan: ")
         id = f"{failed.column('instance')[0]}-{failed.id[0]}"
@@ -278,7 +282,7 @@ def _load_or_sample_grasps(
 def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> dict[str, core.GraspSet]:
-    """Grasps by instance as the options ask for them; says what is missing."""
+    """Sampled grasps by instance, as requested by options; prints shortfalls."""
     settings = evaluation.SamplingSettings(
         approach_angle_deg=arguments.approach_angle, blind=arguments.blind
     )
@@ -296,8 +300,8 @@ def sampled_grasps(
 
 
 def _reach_output(arguments: argparse.Namespace) -> Path | options.GraspOutput | None:
-    """Where to write: a table, a grasp file, or nowhere; a place that cannot be written to is
-    refused before any work."""
+    """The output: the path of a table, a grasp file, or None; refuses an unwritable path before any
+    work."""
     table_suffixes = (".csv", ".parquet")  # Tables have one row per grasp and no provenance.
     if arguments.output is None:
         return None

@@ -11,10 +11,10 @@ from burg_drake.apps.terminal import print_warning
 
 
 def warn_without_colors(consequence: str) -> bool:
-    """Whether colours cannot be rendered here; a line on stderr then says what to install.
+    """Whether colours cannot be rendered here; if so, prints to stderr what to install.
 
     Args:
-        consequence: begins the line, such as `the data set has no colours`.
+        consequence: start of the line, such as `the data set has no colours`.
     """
     from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
@@ -27,11 +27,11 @@ def warn_without_colors(consequence: str) -> bool:
 def without_unavailable_colors(
     recipe: dataset.DatasetRecipe, folder: Path
 ) -> dataset.DatasetRecipe:
-    """A recipe without colours where they cannot be rendered, which a line on stderr says.
+    """The recipe, without colours if they cannot be rendered; a line on stderr says so.
 
     Args:
-        recipe: as asked for.
-        folder: of the data set, which may be there.
+        recipe: as requested.
+        folder: of the data set, which may exist.
 
     Raises:
         MissingDependencyError: the folder has samples with colours, and cannot be continued here.
@@ -83,7 +83,7 @@ def add_render_options(parser: options.Parser) -> None:
 
 
 def run_render(arguments: argparse.Namespace) -> int:
-    """Writes the images; 1 if there is none that can be made."""
+    """Writes the images; returns 1 if none can be rendered."""
     import numpy as np
 
     from burg_drake.scene import load_scene

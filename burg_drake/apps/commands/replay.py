@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReplaySource:
-    """What is to be replayed."""
+    """The recorded trial to replay, with its origin and inputs."""
 
     trial: evaluation.RecordedTrial
     origin: evaluation.TrialOrigin
@@ -38,12 +38,12 @@ def add_replay_options(parser: options.Parser) -> None:
     parser.add_argument(
         "results", metavar="RESULTS", help="folder of a run, or table of results (.csv, .parquet)"
     )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--grasp", metavar="ID", help="id of the grasp")
-    which.add_argument(
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--grasp", metavar="ID", help="id of the grasp")
+    choice.add_argument(
         "--row", metavar="N", type=options.positive_int, help="row of the table, from 1"
     )
-    which.add_argument(
+    choice.add_argument(
         "--best",
         action="store_true",
         help="the lifted grasp with the most room around the open hand",
@@ -58,7 +58,7 @@ def add_replay_options(parser: options.Parser) -> None:
 
 
 def run_replay(arguments: argparse.Namespace) -> int:
-    """Executes a trial once more, recorded; 1 if it ends unlike the record."""
+    """Simulates a trial again and shows it; returns 1 if the verdict differs from the record."""
     from burg_drake.apps.terminal import open_view, present_view
 
     if arguments.only and not arguments.best:
@@ -96,10 +96,10 @@ def run_replay(arguments: argparse.Namespace) -> int:
 def _simulate_trial(
     source: ReplaySource, meshcat: Any
 ) -> tuple[core.Verdict, simulation.TrialResult, str]:
-    """The verdict as the row's engine gives it, and the whole trial as shown, of what.
+    """The verdict of the row's engine, the whole trial to show, and a text on what is shown.
 
-    An engine that ends trials early is run twice: as recorded, and to the end for the picture. So
-    is a trial of the arm, which is shown from its home posture on.
+    With an engine that ends trials early, the trial is simulated twice: as recorded, and to the end
+    for the view. So is a trial of the arm, which is shown from its home posture on.
     """
     trial, origin = source.trial, source.origin
     if evaluation.decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
@@ -144,7 +144,7 @@ def _show_arm(source: ReplaySource, plan: Plan, meshcat: Any) -> simulation.Tria
 
 
 def _shared_trial_options(source: ReplaySource, meshcat: Any) -> dict[str, Any]:
-    """What trials of both kinds take to be as recorded, but shown and to the end."""
+    """Options of both kinds of trials: as recorded, but shown and to the end."""
     engine = replace(source.origin.engine, whole_trial=True)
     return {"engine": engine, "settings": source.origin.settings(), "meshcat": meshcat}
 
@@ -179,7 +179,7 @@ def _source_from_table(path: Path, arguments: argparse.Namespace) -> ReplaySourc
 
 
 def _choose_row(columns: evaluation.Columns, path: Path, arguments: argparse.Namespace) -> int:
-    """Index of the row that is asked for."""
+    """Index of the requested row."""
     ids = columns["id"].tolist()
     if not ids:
         raise core.InvalidInputError(f"{path} has no rows")

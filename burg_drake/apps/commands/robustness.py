@@ -24,15 +24,15 @@ def add_robustness_options(parser: options.Parser) -> None:
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")
     parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument(
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument(
         "--grasp",
         metavar="ID",
         nargs="+",
         action="extend",
         help="ids of lifted grasps, from the table of results",
     )
-    which.add_argument(
+    choice.add_argument(
         "--best",
         metavar="N",
         type=options.positive_int,
@@ -44,7 +44,7 @@ def add_robustness_options(parser: options.Parser) -> None:
     parser.add_argument(
         "--tests",
         metavar="LIST",
-        type=lambda text: tuple(options.some_of(text, evaluation.ROBUSTNESS_TESTS, "a test")),
+        type=lambda text: tuple(options.known_names(text, evaluation.ROBUSTNESS_TESTS, "a test")),
         default=evaluation.ROBUSTNESS_TESTS,
         help=f"some of {','.join(evaluation.ROBUSTNESS_TESTS)} (default: all)",
     )
@@ -66,7 +66,7 @@ def add_robustness_options(parser: options.Parser) -> None:
 
 
 def run_robustness(arguments: argparse.Namespace) -> int:
-    """Tests; 1 if something could not be simulated."""
+    """Tests the robustness of grasps; returns 1 if something could not be simulated."""
     from pathlib import Path
 
     from rich.console import Console

@@ -84,7 +84,7 @@ def run_ros(arguments: argparse.Namespace) -> int:
         rectified=arguments.rectified,
         print_scale=options.print_scale_from_options(arguments),
     )
-    with sigterm_as_interrupt():  # launchers end nodes by it where SIGINT did not
+    with sigterm_as_interrupt():  # launchers send SIGTERM if SIGINT did not end the node
         link = start_ros_node(version, names, with_camera_info=intrinsics is None)
         try:
             link.log(f"{scene.name}: ROS {version}, images from {names.image}")

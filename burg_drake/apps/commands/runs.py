@@ -25,8 +25,8 @@ def add_status_options(parser: options.Parser) -> None:
 
 
 def run_status(arguments: argparse.Namespace) -> int:
-    """Prints the status; 1 if scenes could not be judged."""
-    poll_interval = 1.0  # Seconds between two reads of a run's state.
+    """Prints the status; returns 1 if scenes could not be judged."""
+    poll_interval = 1.0  # Seconds between reads of a run's state.
 
     watch = evaluation.RunWatch(arguments.run_folder)
     status = watch.look()
@@ -57,8 +57,8 @@ def _print_status(status: evaluation.Status, as_json: bool, *, again: bool = Fal
 
 
 def status_lines(status: evaluation.Status) -> list[str]:
-    """The status for people; always as many lines for the same run, but for its failures."""
-    max_named = 8  # Scenes.
+    """The status as text; except for failures, always the same number of lines for a run."""
+    max_named = 8  # Maximum number of scenes listed by name.
 
     share = f" ({core.format_percent(status.judged / status.total)})" if status.total else ""
     about = "about " if status.kind == "campaign" and not status.complete else ""
@@ -124,7 +124,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     print_summary(run)
     if not run.complete:
         print(
-            f"{run.rows().count} of {len(run.mine)} grasps are judged; the same"
+            f"{run.rows().count} of {len(run.assigned_ids)} grasps are judged; the same"
             " `evaluate` command continues"
         )
     print(f"report  {run.report_path}")
@@ -139,7 +139,7 @@ def add_merge_options(parser: options.Parser) -> None:
 
 
 def run_merge(arguments: argparse.Namespace) -> int:
-    """Merges runs and prints what is in them; 1 if grasps could not be simulated."""
+    """Merges runs and prints their tables; returns 1 if grasps could not be simulated."""
     from burg_drake.apps.commands.evaluate import campaign_exit_code, print_campaign, print_summary
 
     merged = evaluation.merge_folders(arguments.runs, arguments.output)

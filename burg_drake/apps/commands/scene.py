@@ -42,7 +42,7 @@ def add_scene_export_options(parser: options.Parser) -> None:
 
 
 def run_scene_export(arguments: argparse.Namespace) -> int:
-    """Writes the folder of an export, however faulty the scene; what is wrong goes to stderr."""
+    """Writes the folder of an export, also of a faulty scene; prints its issues to stderr."""
     from burg_drake.export import export_scene
     from burg_drake.scene import load_scene, validate_scene
     from burg_drake.station import check_scene, load_station
@@ -114,7 +114,7 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
 
 
 def _propose_station(scene: Scene, output: str | None) -> None:
-    """Says which station fits, and writes it if that is asked for."""
+    """Prints which station fits, and writes it if requested."""
     from burg_drake.motion import find_built_in, propose_station
 
     if output is None:
@@ -200,7 +200,7 @@ def add_scene_settle_options(settle: options.Parser) -> None:
 
 
 def run_scene_show(arguments: argparse.Namespace) -> int:
-    """Shows a scene, however faulty; what is wrong goes to stderr."""
+    """Shows a scene, also a faulty one; prints its issues to stderr."""
     from burg_drake.apps.terminal import open_view, present_view
     from burg_drake.scene import load_scene
     from burg_drake.station import check_scene, load_station
@@ -222,7 +222,7 @@ def run_scene_show(arguments: argparse.Namespace) -> int:
 
 
 def run_scene_validate(arguments: argparse.Namespace) -> int:
-    """Prints what is wrong with a scene."""
+    """Prints the issues of a scene."""
     from burg_drake.scene import load_scene
     from burg_drake.station import check_scene, load_station
 
@@ -244,7 +244,7 @@ def run_scene_validate(arguments: argparse.Namespace) -> int:
 
 
 def run_scene_settle(arguments: argparse.Namespace) -> int:
-    """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
+    """Settles a scene; returns 1 if an object still moves, has fallen off, or is misplaced."""
     from burg_drake.scene import load_scene, save_scene
     from burg_drake.station import check_scene, load_station
 
@@ -279,7 +279,7 @@ def run_scene_settle(arguments: argparse.Namespace) -> int:
 
 
 def displacement_table(displacements: Mapping[str, simulation.Displacement]) -> core.TextTable:
-    """How far each object has come."""
+    """Table of the displacement of each object."""
     table = core.TextTable().names("object").numbers("moved [mm]", "turned [deg]")
     for name, moved in displacements.items():
         table.row(
@@ -293,7 +293,7 @@ def displacement_table(displacements: Mapping[str, simulation.Displacement]) -> 
 def _settling_faults(
     settled: simulation.SettledScene, time_limit: float, *, kept: bool
 ) -> list[str]:
-    """What keeps a scene from being settled, a line each."""
+    """Reasons why a scene is not settled, one line each."""
     lines = []
     if settled.moving:
         moving = ", ".join(

@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
 
 def require_another_file(scene: Path, output: str) -> None:
-    """Refuses to write over the scene that is read.
+    """Refuses to overwrite the scene that is read.
 
     Raises:
-        InvalidInputError: the files are one.
+        InvalidInputError: both paths are the same file.
     """
     if os.path.realpath(output) == os.path.realpath(scene):
         raise core.InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 
 def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
-    """How a scene file in `folder` refers to a library so that it is found from there: the name of
-    a built-in one, else package:// or the relative path."""
+    """The reference to a library for a scene file in `folder`: the name of a built-in one, else
+    package:// or the relative path."""
     return (
         given
         if given in core.builtin_names("models")
@@ -40,7 +40,7 @@ def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
 
 
 def station_reference(given: str, station: Station, folder: Path) -> str:
-    """The same for a station."""
+    """The reference to a station for a scene file in `folder`; see `library_reference`."""
     return (
         given
         if given in core.builtin_names("stations")
@@ -49,7 +49,7 @@ def station_reference(given: str, station: Station, folder: Path) -> str:
 
 
 def add_recipe_options(parser: Any) -> None:
-    """Adds the options that make up a recipe."""
+    """Adds the options of a recipe."""
     _add_object_options(parser)
     _add_layout_options(parser)
     _add_rule_options(parser)
@@ -93,14 +93,14 @@ def _add_layout_options(parser: Any) -> None:
         help="size of the board: A4 to A0, or WxH in mm (default: %(default)s)",
     )
     group.add_argument("--portrait", action="store_true", help="board in portrait format")
-    how = group.add_mutually_exclusive_group()
-    how.add_argument(
+    layout_group = group.add_mutually_exclusive_group()
+    layout_group.add_argument(
         "--spacing",
         choices=[name for name in LAYOUT_NAMES if name not in other_layouts],
         help="space between objects: 40 mm, 2 to 10 mm, or contact (default: random)",
     )
-    how.add_argument("--packed", action="store_true", help="pack objects side by side")
-    how.add_argument("--heap", action="store_true", help="drop objects in a heap")
+    layout_group.add_argument("--packed", action="store_true", help="pack objects side by side")
+    layout_group.add_argument("--heap", action="store_true", help="drop objects in a heap")
     options.add_settings_options(group, SceneRecipe, "tries", "fewer", "settle")
 
 
@@ -117,7 +117,7 @@ def _add_rule_options(parser: Any) -> None:
 def recipe_from_options(
     arguments: argparse.Namespace, library: ObjectLibrary, station: Station, folder: Path
 ) -> SceneRecipe:
-    """The recipe that the options ask for, with references that start from a folder."""
+    """The recipe from options, with references relative to a folder."""
     max_objects = 1000
     from burg_drake.scene import Board, SceneRecipe
 
@@ -139,7 +139,7 @@ def recipe_from_options(
 
 
 def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
-    """Extents along x and y of a board [m]: A4 to A0, across unless upright, or WxH in mm.
+    """Extents of a board along x and y [m]: A4 to A0, landscape unless upright, or WxH in mm.
 
     Raises:
         UnknownNameError: there is no such size.
@@ -193,7 +193,7 @@ def add_scene_sample_options(parser: options.Parser) -> None:
 
 
 def run_scene_sample(arguments: argparse.Namespace) -> int:
-    """Writes scenes; 1 if not all were accepted."""
+    """Writes random scenes; returns 1 if not all were accepted."""
     from burg_drake.objects import load_library
     from burg_drake.station import load_station
 
@@ -222,7 +222,7 @@ def run_scene_sample(arguments: argparse.Namespace) -> int:
 def _sample_one(
     arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> int:
-    """Writes one file."""
+    """Samples one scene and writes its file."""
     from burg_drake.scene import save_scene
 
     core.require_writable(arguments.output)
@@ -244,7 +244,7 @@ def _sample_one(
 def _sample_many(
     arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> int:
-    """Fills a folder."""
+    """Samples many scenes into a folder."""
     with core.Reporter(not arguments.quiet) as reporter:
         paces: list[core.ProgressMeter] = []
 
@@ -289,10 +289,10 @@ def _print_folder(found: generation.SampledFolder, arguments: argparse.Namespace
 
 
 def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
-    """Refuses options of a recipe beside --again, which has that of its scene.
+    """Refuses options of a recipe with --again, which uses the recipe of its scene.
 
     Raises:
-        InvalidInputError: there is one.
+        InvalidInputError: such an option is given.
     """
     parser = argparse.ArgumentParser(add_help=False)
     add_recipe_options(parser)
@@ -305,7 +305,7 @@ def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
 
 
 def _reproduce_scene(arguments: argparse.Namespace) -> int:
-    """Makes a scene again, and says whether it is the same."""
+    """Reproduces a scene, and prints whether it is the same."""
     from burg_drake.scene import load_scene, save_scene
 
     scene = load_scene(arguments.again)
@@ -329,7 +329,7 @@ def _reproduce_scene(arguments: argparse.Namespace) -> int:
 def _with_references(
     again: generation.ReproducedScene, scene: Scene, folder: Path
 ) -> SceneDocument:
-    """A scene's document whose references start from a folder."""
+    """A scene's document with references relative to a folder."""
     from dataclasses import replace
 
     document, origin = scene.document, scene.document.origin
@@ -341,13 +341,13 @@ def _with_references(
 
 
 def _print_refused(refused: Counter[str]) -> None:
-    """Says on standard error how many attempts were refused, and why."""
+    """Prints to standard error how many attempts were refused, and why."""
     for reason, count in refused.most_common():
         print_remark(f"{count} refused: {reason}")
 
 
 def _refusal_text(sampled: generation.SampledScene, recipe: SceneRecipe) -> str:
-    """Why no attempt was accepted, and what helps."""
+    """Text on why no attempt was accepted, with advice."""
     text = f"none of {sampled.attempts} attempts was accepted"
     if sampled.missing:
         text += "; an object found no place (--fewer accepts scenes without it)"

@@ -47,10 +47,10 @@ def add_setup_options(parser: options.Parser) -> None:
 
 
 def run_setup(arguments: argparse.Namespace) -> int:
-    """Serves the page until told to end."""
+    """Serves the page until Ctrl-C."""
     from burg_drake.ui import require_viser
 
-    require_viser()  # before anything that takes time
+    require_viser()  # before steps that take time
     limit_picture_size()
     with sigterm_as_interrupt():
         closing = contextlib.ExitStack()
@@ -61,10 +61,10 @@ def run_setup(arguments: argparse.Namespace) -> int:
             station = load_station(arguments.station)
             session = closing.enter_context(ComposeSession.open(arguments.what, station))
             closing.callback(_print_unsaved, session)
-            door = _serve_setup_page(arguments, session, closing)
-            _print_opened(door, session)
+            served = _serve_setup_page(arguments, session, closing)
+            _print_opened(served, session)
             if arguments.open:
-                open_in_browser(door.url)
+                open_in_browser(served.url)
             wait_for_interrupt()
         except KeyboardInterrupt:
             print(file=sys.stderr)
@@ -75,7 +75,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
 
 
 def limit_picture_size() -> None:
-    """Has OpenCV refuse larger pictures; it looks when it is imported."""
+    """Limits the size of pictures that OpenCV reads; to be called before its import."""
     max_pixels = 1 << 27  # OpenCV's own limit of 2**30 would allow three gigabytes.
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(max_pixels))
 
@@ -86,23 +86,23 @@ def _serve_setup_page(
     """Serves the page until all is closed."""
     from burg_drake.ui import SetupPage, serve_page
 
-    door = closing.enter_context(
+    served = closing.enter_context(
         serve_page(arguments.host, arguments.port, title="burg_drake: setup")
     )
-    closing.callback(SetupPage(door.server, session).close)
-    session.announce(door.address)
-    door.admission.on_admitted = lambda address: print(
-        f"opened by {address}; another browser: open {door.url}", flush=True
+    closing.callback(SetupPage(served.server, session).close)
+    session.announce(served.address)
+    served.admission.on_admitted = lambda address: print(
+        f"opened by {address}; another browser: open {served.url}", flush=True
     )
-    return door
+    return served
 
 
-def _print_opened(door: ServedPage, session: ComposeSession) -> None:
+def _print_opened(served: ServedPage, session: ComposeSession) -> None:
     view = session.view
     count = len(view.instances)
     objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
     where = view.path or f"not saved yet, to be saved in {session.folder}"
-    print(f"{view.document.name} ({objects}, {where}): open {door.url} in a browser", flush=True)
+    print(f"{view.document.name} ({objects}, {where}): open {served.url} in a browser", flush=True)
     for notice in view.notices:
         print_remark(notice)
     print("Press Ctrl-C to end.", flush=True)

@@ -65,7 +65,7 @@ def run_station_list(arguments: argparse.Namespace) -> int:
 
 
 def run_station_check(arguments: argparse.Namespace) -> int:
-    """Prints what a station can do; what makes it useless is an error."""
+    """Prints the properties of a station; raises an error if it cannot be used."""
     station, scene, report = _inspect_station(arguments)
     print(f"{station.name}: {station.path} can be used")
     table = core.TextTable().texts("", "")
@@ -78,7 +78,7 @@ def run_station_check(arguments: argparse.Namespace) -> int:
 
 
 def run_station_show(arguments: argparse.Namespace) -> int:
-    """Shows a station; what its author should know goes to stderr."""
+    """Shows a station; prints notes for its author to stderr."""
     from burg_drake.apps.terminal import open_view, present_view
     from burg_drake.visualization import show_station
 
@@ -111,7 +111,7 @@ def _inspect_station(
 
     station = load_station(arguments.station)
     if getattr(arguments, "camera", None) is not None:
-        station.camera(arguments.camera)  # before all that takes time
+        station.camera(arguments.camera)  # checks the name before steps that take time
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     return station, scene, motion.inspect_station(station, scene)
 
@@ -119,7 +119,7 @@ def _inspect_station(
 def _station_lines(
     station: Station, scene: Scene | None, report: motion.StationReport
 ) -> list[tuple[str, str]]:
-    """What is printed about a station, by name."""
+    """The printed lines about a station, with their names."""
     from burg_drake.evaluation import motion_text
 
     low, high = (round(1e3 * width) + 0 for width in report.hand.opening)
@@ -207,7 +207,7 @@ def run_hand_list(arguments: argparse.Namespace) -> int:
 
 
 def run_hand_check(arguments: argparse.Namespace) -> int:
-    """Prints what a hand does and measures; what does not fit is an error."""
+    """Prints motion and sizes of a hand; raises an error if its document does not fit its model."""
     from burg_drake.station import check_hand, locate_hand
 
     hand, model, path = locate_hand(arguments.hand)

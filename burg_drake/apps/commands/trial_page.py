@@ -20,7 +20,7 @@ from burg_drake.apps.terminal import print_remark, sigterm_as_interrupt, wait_fo
 if TYPE_CHECKING:
     from burg_drake.scene import Scene
 
-SECRET_LENGTH = 24  # Random bytes of the secret of admitted browsers.
+SECRET_LENGTH = 24  # Random bytes of the secret for cookies of admitted browsers.
 
 
 def add_trials_serve_options(parser: options.Parser) -> None:
@@ -95,15 +95,15 @@ def _open_lab_camera(
     )
     trials = lab.sheet().trials
     first = next((trial for trial in trials if trial.outcome is None), trials[0])
-    camera.watch(first.number)  # what does not work is said now
+    camera.watch(first.number)  # reports errors now
     return camera
 
 
 def _load_or_create_secret(plan: str) -> str | None:
-    """The secret of the browsers that were let in to these trials, so that they need no new address
-    when the page is started again; None if it cannot be kept.
+    """The secret for cookies of browsers admitted to these trials, so that they stay valid when the
+    page is started again; None if it cannot be stored.
 
-    It lies in the user's cache, for the user alone to read.
+    It is in the user's cache, readable by the user only.
     """
     from burg_drake.core import InvalidInputError, atomic_write, cache_folder
 

@@ -39,7 +39,7 @@ def add_trials_plan_options(parser: options.Parser) -> None:
 
 
 def run_trials_plan(arguments: argparse.Namespace) -> int:
-    """Chooses, writes, and prints what was chosen and what it will tell."""
+    """Chooses grasps for trials, writes them, and prints the choice and its expected precision."""
     core.require_writable(arguments.output)
     sheet = experiment.plan_trials(
         arguments.runs,
@@ -56,7 +56,7 @@ def run_trials_plan(arguments: argparse.Namespace) -> int:
 
 
 def _print_choice(sheet: experiment.TrialSheet) -> None:
-    """Chosen grasps by object and stratum, summed over the runs."""
+    """Prints the number of chosen grasps by object and stratum, summed over the runs."""
     chosen: Counter[tuple[str, str]] = Counter()
     there: Counter[tuple[str, str]] = Counter()
     for stratum in sheet.strata.values():
@@ -151,7 +151,7 @@ def add_trials_export_options(parser: options.Parser) -> None:
 
 
 def run_trials_export(arguments: argparse.Namespace) -> int:
-    """Plans and writes; 1 if a trial could not be judged."""
+    """Plans and writes robot motions; returns 1 if a trial could not be judged."""
     rows = experiment.export_trials(
         arguments.trials,
         arguments.output,
@@ -179,7 +179,7 @@ def run_trials_export(arguments: argparse.Namespace) -> int:
 
 
 def _print_unplanned_trials(rows: list[experiment.ExportedMotion]) -> None:
-    """Trials that the arm cannot execute, and why."""
+    """Prints the trials that the arm cannot execute, and why."""
     hindered = [row for row in rows if not row.file and not row.reason]
     if not hindered:
         return

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def add_trials_argument(parser: options.Parser) -> None:
-    """The argument TRIALS."""
+    """Adds the argument TRIALS."""
     parser.add_argument("trials", metavar="TRIALS", help="trials file of `trials plan`")
 
 
 def add_moved_run_option(parser: options.Parser) -> None:
-    """The option --run, for folders that have moved."""
+    """Adds the option --run, for folders that have moved."""
     parser.add_argument(
         "--run",
         dest="moved",
@@ -39,11 +39,11 @@ def add_moved_run_option(parser: options.Parser) -> None:
 
 
 def add_show_simulated_option(parser: options.Parser, more: str = "") -> None:
-    """The option --show-simulated, of verbs that operators look at.
+    """Adds the option --show-simulated, for commands whose output operators see.
 
     Args:
-        parser: gets it.
-        more: is hidden, too, after "the simulated outcomes".
+        parser: to add the option to.
+        more: text after "the simulated outcomes" on what else is hidden.
     """
     parser.add_argument(
         "--show-simulated",
@@ -91,9 +91,9 @@ def add_trials_record_options(parser: options.Parser) -> None:
     robot.add_argument("--effort-n", metavar="N", type=options.not_negative, help="gripping force")
     _add_photo_options(parser.add_argument_group("photo of the scene before the trial"))
     add_moved_run_option(parser)
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("--correct", action="store_true", help="replace the entry")
-    how.add_argument(
+    mode_group = parser.add_mutually_exclusive_group()
+    mode_group.add_argument("--correct", action="store_true", help="replace the entry")
+    mode_group.add_argument(
         "--again", action="store_true", help="the trial was repeated: replace all its entries"
     )
 
@@ -113,7 +113,7 @@ def _add_photo_options(group: Any) -> None:
 
 
 def run_trials_record(arguments: argparse.Namespace) -> int:
-    """Measures and records; 1 if the photo has no board."""
+    """Measures the placement and records a trial; returns 1 if the photo shows no board."""
     _require_consistent_record_options(arguments)
     if arguments.outcome is not None:
         experiment.parse_real_outcome(arguments.outcome)
@@ -149,15 +149,15 @@ def _record_trial(
     trial: experiment.RealTrial,
     entry: dict[str, Any],
 ) -> experiment.RealTrial:
-    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
-    is the one that the evidence is about, or none."""
-    how = {"correct": arguments.correct, "again": arguments.again}
+    """Records a trial. `next` is the trial that is first open when this is called; with a photo or
+    placement, it must still be the trial that these belong to."""
+    mode = {"correct": arguments.correct, "again": arguments.again}
     if arguments.number != "next":
-        return book.record(trial.number, **how, **entry)
+        return book.record(trial.number, **mode, **entry)
     if not (arguments.photo or arguments.placement):
-        return book.record("next", **how, **entry)
+        return book.record("next", **mode, **entry)
     try:
-        return book.record(trial.number, expected=trial, **how, **entry)
+        return book.record(trial.number, expected=trial, **mode, **entry)
     except experiment.TrialChanged as error:
         kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
         raise core.InvalidInputError(
@@ -179,7 +179,7 @@ def _resolve_trial_number(text: str, sheet: experiment.TrialSheet) -> int | Lite
 
 
 def _parse_moment(text: str) -> str:
-    """A moment, with the zone of this place if there is none, or a day."""
+    """A time, with the local time zone if there is none, or a day."""
     try:
         with contextlib.suppress(ValueError):
             return date.fromisoformat(text).isoformat()
@@ -192,8 +192,8 @@ def _parse_moment(text: str) -> str:
 
 
 def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
-    """Refuses options without those that they belong to, and calls that record nothing."""
-    # Options that are about a photo.
+    """Refuses options whose required other option is missing, and calls that record nothing."""
+    # Options about a photo.
     photo_options = ("intrinsics", "depth", "depth_unit", "scene")
     if not arguments.photo:
         for name in photo_options:
@@ -213,13 +213,13 @@ def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
 
 
 def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the options tell, but for photo and placement."""
+    """The entry from options, without photo and placement."""
 
     def given(*names: str) -> dict[str, Any]:
         return {name: v for name in names if (v := getattr(arguments, name)) is not None}
 
     entry, robot = given("outcome", "note", "operator", "time"), given("width_mm", "effort_n")
-    if not arguments.correct:  # which may replace them by nothing
+    if not arguments.correct:  # a correction may replace them by empty text
         entry = {k: v for k, v in entry.items() if k not in ("note", "operator") or v.strip()}
     return entry | ({"robot": robot} if robot else {})
 
@@ -227,7 +227,7 @@ def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
 def _placement_check(
     arguments: argparse.Namespace, sheet: experiment.TrialSheet, trial: experiment.RealTrial
 ) -> PlacementCheck | None:
-    """The placement check, of a file or of the photo, if one is wanted."""
+    """The placement check from a file or the photo; None if not requested."""
     if arguments.placement:
         from burg_drake.cameras import load_placement
 
@@ -259,7 +259,7 @@ def _placement_check(
 def _warn_of_width(
     arguments: argparse.Namespace, sheet: experiment.TrialSheet, trial: experiment.RealTrial
 ) -> None:
-    """Says that a width is beyond what the hand opens, where the run can tell."""
+    """Prints a warning if a width exceeds the opening of the hand, if the run is available."""
     with contextlib.suppress(core.BurgError):
         run = experiment.load_source_run(
             sheet, arguments.trials, trial.run, moved=dict(arguments.moved)
@@ -305,7 +305,7 @@ def add_trials_show_options(parser: options.Parser) -> None:
 
 
 def run_trials_show(arguments: argparse.Namespace) -> int:
-    """Prints; 1 if entries are missing, or the journal is damaged."""
+    """Prints the trials; returns 1 if entries are missing, or the journal is damaged."""
     book = experiment.TrialBook(arguments.trials)
     sheet = book.sheet()
     for key, run in sheet.runs.items():
@@ -313,18 +313,18 @@ def run_trials_show(arguments: argparse.Namespace) -> int:
     if arguments.all:
         _print_trials(sheet.trials, arguments.show_simulated)
     _print_progress(sheet, arguments.show_simulated)
-    begun = any(trial.carried_out for trial in sheet.trials)
-    print_note_lines(() if begun or not arguments.show_simulated else sheet.notes)
+    has_results = any(trial.carried_out for trial in sheet.trials)
+    print_note_lines(() if has_results or not arguments.show_simulated else sheet.notes)
     if sheet.next is not None:
         print(f"next is {sheet.next.number}: {sheet.next.grasp}")
-    lacking = book.missing_values()
-    _print_missing_entries(arguments.trials, lacking)
+    missing = book.missing_values()
+    _print_missing_entries(arguments.trials, missing)
     damage = print_damage(book)
-    return 1 if damage or any(found.values for found in lacking) else 0
+    return 1 if damage or any(found.values for found in missing) else 0
 
 
 def _print_progress(sheet: experiment.TrialSheet, simulated: bool) -> None:
-    """How many trials of each object are done, and how they ended."""
+    """Prints the number of finished trials and their outcomes, by object."""
     table = core.TextTable().names("object")
     table.numbers("trials", "done", "tried")
     table.numbers(*(["success\nin simulation"] if simulated else []), "success\non the robot")
@@ -361,9 +361,9 @@ def _print_trials(trials: Sequence[experiment.RealTrial], simulated: bool) -> No
     table.show()
 
 
-def _print_missing_entries(path: str, lacking: Sequence[experiment.MissingValues]) -> None:
-    """What the journal has and the file has not."""
-    for found in lacking:
+def _print_missing_entries(path: str, missing: Sequence[experiment.MissingValues]) -> None:
+    """Prints the entries of the journal that are missing in the file."""
+    for found in missing:
         if found.values:
             text = ", ".join(
                 f"{name} {value}" if isinstance(value, str) else name
@@ -372,7 +372,7 @@ def _print_missing_entries(path: str, lacking: Sequence[experiment.MissingValues
             print_remark(f"trial {found.number} lacks what was recorded: {text}")
         if found.edited:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")
-    if any(found.values for found in lacking):
+    if any(found.values for found in missing):
         print_remark(
             f"`burg-drake trials restore {path}` brings it back; with --keep the file"
             " stays as it is"
@@ -402,7 +402,7 @@ def add_trials_restore_options(parser: options.Parser) -> None:
 
 
 def run_trials_restore(arguments: argparse.Namespace) -> int:
-    """Restores, and says what; 1 if the journal is damaged."""
+    """Restores entries from the journal and prints them; returns 1 if it is damaged."""
     book = experiment.TrialBook(arguments.trials)
     for number in arguments.number or ():
         book.trial(number)

@@ -1,6 +1,6 @@
 "use strict";
 
-// The live picture, and how far the objects stand from their places.
+// The live picture, and the placement errors of the objects.
 
 async function showFrames() {
   let number = 0, epoch = 0;
@@ -61,13 +61,13 @@ function renderCamera() {
   $("checked").textContent = refused || (!mine ? [otherText(check), keptText()].filter(Boolean).join(" ") : check.problem || (check.kept ? "Saved with this trial." : "Not saved; press “Check placement” to save it."));
   const rows = mine ? Object.entries(check.objects) : Object.entries((entries.get(current) || {}).placement || {});
   $("objects").replaceChildren(...rows.flatMap(([name, placed]) => placeRow(name, placed)));
-  const slow = check && check.seconds > QUICK;
+  const slow = check && check.seconds > MAX_QUICK_CHECK_TIME;
   if ($("always").checked && !checking && !slow && camera.valid && view === "camera") {
     post("check", { number: current, keep: false });
   }
 }
 
-// Of a check that was begun while another trial was shown.
+// For a check that was started while another trial was shown.
 function otherText(check) {
   if (!check) return "";
   if (check.kept) return `Measurement saved with trial ${check.number}.`;

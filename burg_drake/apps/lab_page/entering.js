@@ -1,20 +1,20 @@
 "use strict";
 
-// What the viewer enters, and takes back.
+// Entering and undoing outcomes.
 
 function enter(outcome) {
-  if (!current || performance.now() - shownSince < SETTLE) return;  // a second tap of the same
+  if (!current || performance.now() - shownSince < CLICK_GUARD_TIME) return;  // a second tap of the same
   if (!requireWidth()) return;
   const number = current;
   put(number, fields(outcome));
   show(firstOpen(number));
 }
 
-// The width as it was typed [mm]; null if nothing was, NaN if it is no number that can be one.
+// The typed width [mm]; null if the field is empty, NaN if it is not a valid width.
 function typedWidth() {
   const text = $("width").value.trim().replace(/\s*mm$/, "").replace(",", ".");
   if (!text) return null;
-  return /^\d*\.?\d+$|^\d+\.$/.test(text) && Number(text) <= WIDEST ? Number(text) : Number.NaN;
+  return /^\d*\.?\d+$|^\d+\.$/.test(text) && Number(text) <= MAX_WIDTH ? Number(text) : Number.NaN;
 }
 
 function renderWidth() {
@@ -58,7 +58,7 @@ function undo() {
   show(last.number);
 }
 
-function now() {  // as people here write the time, with its zone
+function now() {  // local time with its zone
   const moment = new Date(), zone = -moment.getTimezoneOffset();
   const local = new Date(moment.getTime() + 60000 * zone).toISOString().slice(0, 19);
   const two = (value) => String(Math.floor(Math.abs(value))).padStart(2, "0");

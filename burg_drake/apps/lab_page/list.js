@@ -1,6 +1,6 @@
 "use strict";
 
-// All trials with what was entered for them, block by block.
+// All trials with their entries, block by block.
 
 const chips = new Map(), bars = new Map();
 

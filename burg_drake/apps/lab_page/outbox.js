@@ -1,15 +1,15 @@
 "use strict";
 
-// Entries that the program has not acknowledged yet. They are in the browser's storage before
-// anything else happens, and are sent until the program says that they are on its disk.
+// Entries that the program has not acknowledged yet. They are first written to the browser's
+// storage, and are sent until the program confirms that they are on its disk.
 
-const STUCK = 4000;  // an entry may be dropped when it is refused for so long [ms]
+const DROP_TIMEOUT = 4000;  // ms of refusals after which the user may drop an entry
 
 class Outbox {
   constructor(plan, changed) {
     this.prefix = `burg-drake entry ${plan} `;
     this.changed = changed;   // called with the acknowledged item and the trial's entry, or nothing
-    this.stored = true;       // whether the browser keeps them
+    this.stored = true;       // whether the browser stores the entries
     this.problem = "";        // why the last attempt failed
     this.count = 0;
     this.items = this.load();
@@ -39,7 +39,7 @@ class Outbox {
     try { localStorage.removeItem(this.prefix + item.id); } catch { /* it was never there */ }
   }
 
-  // entry: fields of the request; state: of the trial that it replaces, as the program told it.
+  // entry: fields of the request; state: of the trial that it replaces, as sent by the program.
   add(entry, state, before) {
     const earlier = this.of(entry.number).at(-1);
     const moment = String(Date.now()).padStart(14, "0");
@@ -62,8 +62,8 @@ class Outbox {
 
   get troubled() { return this.items.filter((item) => item.trouble); }
 
-  // Those that are refused again and again; they are still sent, as the reason may pass.
-  get stuck() { return this.items.filter(({ refused }) => refused && refused.at - refused.since >= STUCK); }
+  // Items that are refused repeatedly; they are still sent, as the reason may be temporary.
+  get stuck() { return this.items.filter(({ refused }) => refused && refused.at - refused.since >= DROP_TIMEOUT); }
 
   discard(item) {
     for (const later of this.of(item.entry.number)) {
@@ -89,7 +89,7 @@ class Outbox {
       return numbers.add(number);
     });
     const at = ({ refused }) => (refused ? refused.at : 0);
-    return open.sort((a, b) => at(a) - at(b))[0];  // what was refused waits for the others
+    return open.sort((a, b) => at(a) - at(b))[0];  // refused items wait for the others
   }
 
   async send() {
@@ -136,7 +136,7 @@ class Outbox {
       this.changed(null, data.entry);
       return 0;
     }
-    this.problem = data.error;  // such as a file that somebody is editing: it may pass
+    this.problem = data.error;  // may be temporary, such as a file that somebody is editing
     const at = Date.now();
     item.refused = { text: data.error, since: item.refused ? item.refused.since : at, at };
     return this.nextItem().refused ? 2000 : 0;

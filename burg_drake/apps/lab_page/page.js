@@ -5,14 +5,14 @@ const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 const seen = () => (document.hidden
   ? new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }))
   : Promise.resolve());
-const SETTLE = 600;  // after a trial comes up, clicks on outcomes are ignored for so long [ms]
+const CLICK_GUARD_TIME = 600;  // ms after a trial is shown in which clicks on outcomes are ignored
 const KEYS = [..."1234567890"];  // of the outcomes
-const WIDEST = 10000;  // of widths [mm]
-const QUICK = 5;     // checks that take longer are not made one after the other [s]
+const MAX_WIDTH = 10000;  // mm
+const MAX_QUICK_CHECK_TIME = 5;  // s; slower checks are not repeated automatically
 
 let plan = null;
 let outbox = null;
-const entries = new Map();   // what the program has, by number of the trial
+const entries = new Map();   // entries stored by the program, by trial number
 let version = "";
 let online = false;
 let problem = "";
@@ -20,9 +20,9 @@ let current = 0;
 let shownSince = 0;
 let view = "grasp";
 let camera = null;
-let asked = null;            // for a placement check, which waits for a picture
-let refused = "";            // why the last placement check was not begun
-let history = [];            // own entries that can be undone, the last one at the end
+let asked = null;            // requested placement check, which waits for a picture
+let refused = "";            // why the last placement check was not started
+let history = [];            // entries of this page that can be undone, the last one at the end
 
 // --- Beginning
 
@@ -96,7 +96,7 @@ function onOutbox(item, entry) {
   render();
 }
 
-// A trial as the viewer has entered it, be it on the disk yet or not.
+// A trial with the latest entry, whether or not that is on the disk yet.
 function entryOf(number) {
   const known = entries.get(number);
   const waiting = outbox.of(number).at(-1);
@@ -137,7 +137,7 @@ function show(number) {
   if (plan.camera) post("watch", { number });
   render();
   const next = plan.trials.find((one) => one.number > number);
-  if (next) new Image().src = pictureOf(`grasp/${next.number}`);  // it is kept for later
+  if (next) new Image().src = pictureOf(`grasp/${next.number}`);  // loads it into the cache
 }
 
 function step(by) {

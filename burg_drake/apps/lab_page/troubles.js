@@ -1,6 +1,6 @@
 "use strict";
 
-// Entries that are not saved, why, and what the viewer can do about it.
+// Unsaved entries, the reasons, and what the user can do about them.
 
 function renderTroubles() {
   const { troubled, stuck } = outbox, told = [...troubled, ...stuck];

@@ -9,7 +9,7 @@ let latest = null;  // the last status
 let lastEvent = 0;
 let online = true;
 
-class Refusal extends Error {}  // what the program answers in place of a status
+class Refusal extends Error {}  // an error message of the program in place of a status
 
 // --- What comes from the program
 
@@ -272,7 +272,7 @@ document.addEventListener("keydown", (event) => {
   event.preventDefault();
   actions[name]();
 });
-let before = 0.45;  // opacity, to come back to from outlines only
+let before = 0.45;  // opacity to restore after outlines only
 $("opacity").addEventListener("input", (event) => change({ opacity: Number(event.target.value) }));
 for (const id of ["names", "footprints", "steady"]) {
   $(id).addEventListener("change", (event) => change({ [id]: event.target.checked }));

@@ -51,11 +51,11 @@ from .grasp_files import (
     format_title as format_title,
     grasp_output as grasp_output,
     gripper_by_name as gripper_by_name,
-    gripper_for as gripper_for,
+    gripper_from_options as gripper_from_options,
     load_grasp_source as load_grasp_source,
     open_grasp_source as open_grasp_source,
     print_notes as print_notes,
-    station_for as station_for,
+    station_from_options as station_from_options,
 )
 from .settings_options import (
     add_settings_options as add_settings_options,
@@ -66,6 +66,7 @@ from .values import (
     friction as friction,
     input_file as input_file,
     key_and_value as key_and_value,
+    known_names as known_names,
     named_positive as named_positive,
     names as names,
     not_negative as not_negative,
@@ -73,7 +74,6 @@ from .values import (
     positive as positive,
     positive_int as positive_int,
     seed as seed,
-    some_of as some_of,
     two_numbers as two_numbers,
     unit as unit,
 )

@@ -36,8 +36,8 @@ RULER_LENGTH_MM = 100.0
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
-    """Fits paragraphs to the terminal, and keeps those with columns or an indent, such as lists
-    of verbs and examples, as they are."""
+    """Wraps paragraphs to the width of the terminal, except for those with columns or an indent,
+    such as lists of commands and examples."""
 
     def __init__(self, prog: str, **options: Any) -> None:
         max_width = 100  # Characters. Longer lines are hard to read.
@@ -57,7 +57,7 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
         return f"{', '.join(action.option_strings)} {self.value_text(action)}"
 
     def value_text(self, action: argparse.Action) -> str:
-        """What stands for the value of an option, or for a positional argument."""
+        """The placeholder for the value of an option, or for a positional argument."""
         name = action.dest if not action.option_strings else action.dest.upper()
         if action.choices is not None:
             name = "{" + ",".join(map(str, action.choices)) + "}"
@@ -65,7 +65,7 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """Reports an error in one line. The usage has what must be given; the list has the rest."""
+    """Reports errors in one line. The usage has required arguments only; the list has all."""
 
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", HelpFormatter)
@@ -90,7 +90,7 @@ class Parser(argparse.ArgumentParser):
             add_options(self)
 
     def format_usage(self) -> str:
-        """The usage with all that is required."""
+        """The usage with all required arguments."""
         self.add_deferred_options()
         self.usage = self._required_usage()
         return super().format_usage()
@@ -102,7 +102,7 @@ class Parser(argparse.ArgumentParser):
         return super().format_help()
 
     def _required_usage(self) -> str:
-        """The command with its arguments and the options that it cannot do without."""
+        """The command with its positional arguments and required options."""
         formatter = HelpFormatter(self.prog)
         either = {
             action: " | ".join(
@@ -131,11 +131,11 @@ class Parser(argparse.ArgumentParser):
         return textwrap.fill(usage, formatter.line_width - len("usage: "), subsequent_indent=indent)
 
     def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
-        """Refuses what it does not know, for its verbs, too, which else leave that to the parser
-        of the whole command, whose help knows nothing of them."""
+        """Refuses unknown arguments here, so that the error refers to the help of this command and
+        not to that of `burg-drake`."""
         self.add_deferred_options()
         found, unknown = super().parse_known_args(*arguments, **named)
-        if not hasattr(found, "flags"):  # of the verb, whose parser comes first
+        if not hasattr(found, "flags"):  # the command's parser comes before that of its group
             found.flags = {
                 action.dest: action.option_strings[-1]
                 for action in self._actions
@@ -149,7 +149,7 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Names the nearest of the choices, of verbs among them."""
+        """Refuses an unknown choice or command; the message suggests similar ones."""
         if action.choices is not None and value not in action.choices:
             known = suggest_names(str(value), map(str, action.choices))
             if isinstance(action, argparse._SubParsersAction):
@@ -165,7 +165,7 @@ def examples_text(*lines: str) -> str:
     """Text below the options in the help of a command.
 
     Args:
-        lines: examples, and after an empty one paragraphs of text.
+        lines: examples; after an empty line, paragraphs of text.
     """
     commands = lines[: lines.index("")] if "" in lines else lines
     paragraphs = lines[len(commands) + 1 :]
@@ -184,7 +184,7 @@ class CommandGroup:
         self._list: Any = None
 
     def heading(self, title: str) -> None:
-        """Lists the commands that are added from now on under this title."""
+        """Lists the commands that are added next under this title."""
         self._list = self._parser.add_argument_group(title)
 
     def add_parser(self, name: str, summary: str) -> Parser:
@@ -205,28 +205,28 @@ class CommandGroup:
 
 
 def add_scene(parser: Parser) -> None:
-    """The argument SCENE."""
+    """Adds the argument SCENE."""
     parser.add_argument("scene", metavar="SCENE", help=f"scene file, or built-in: {scene_names()}")
 
 
 def scene_names() -> str:
-    """The built-in scenes, for a help text."""
+    """Names of the built-in scenes, for a help text."""
     return ", ".join(builtin_names("scenes"))
 
 
 def add_output(parser: Any, metavar: str, help: str, *, required: bool = True) -> None:
-    """The option --output, of verbs that write something."""
+    """Adds the option --output."""
     parser.add_argument("-o", "--output", metavar=metavar, required=required, help=help)
 
 
 def add_measured_board(
     parser: Any, help: str = "length of the printed 100 mm rulers along x and y (default: 100)"
 ) -> None:
-    """The option --measured-mm, of verbs that look at a board that was printed already, or print.
+    """Adds the option --measured-mm, for commands that print a board or see a printed one.
 
     Args:
-        parser: gets it.
-        help: what it means to the verb.
+        parser: to add the option to.
+        help: text for this command.
     """
     parser.add_argument(
         "--measured-mm",
@@ -238,7 +238,7 @@ def add_measured_board(
 
 
 def print_scale_from_options(arguments: argparse.Namespace) -> tuple[float, float]:
-    """Size of the print against the document along x and y, by --measured-mm."""
+    """Scale of the print relative to the document along x and y, from --measured-mm."""
     x, y = arguments.measured_mm
     return x / RULER_LENGTH_MM, y / RULER_LENGTH_MM
 
@@ -248,22 +248,22 @@ def add_station(
     help: str = "station: file or name (default: %(default)s)",
     default: str | None = DEFAULT_STATION,
 ) -> None:
-    """The option --station.
+    """Adds the option --station.
 
     Args:
-        parser: gets it.
-        help: what it means to the verb.
-        default: None where something else tells the station, or there need not be one.
+        parser: to add the option to.
+        help: text for this command.
+        default: None if the station comes from elsewhere or is optional.
     """
     parser.add_argument("--station", metavar="STATION", default=default, help=help)
 
 
 def add_only(parser: Parser, what: str) -> None:
-    """The option --only, by which all verbs choose objects.
+    """Adds the option --only, which chooses objects.
 
     Args:
-        parser: gets it.
-        what: is chosen, before "of this object".
+        parser: to add the option to.
+        what: text before "of this object".
     """
     parser.add_argument(
         "--only",
@@ -275,7 +275,7 @@ def add_only(parser: Parser, what: str) -> None:
 
 
 def add_renaming(parser: Parser) -> None:
-    """The option --rename; evaluate, which is not about a file alone, calls it --grasps-object."""
+    """Adds the option --rename; in evaluate it is called --grasps-object."""
     for option, help in (
         ("--rename", "rename an object of the file, or with OURS alone all"),
         ("--grasps-object", argparse.SUPPRESS),
@@ -292,7 +292,7 @@ def add_renaming(parser: Parser) -> None:
 
 
 def add_quiet(parser: Parser) -> None:
-    """The option --quiet of verbs that take long."""
+    """Adds the option --quiet, for commands that take long."""
     parser.add_argument("--quiet", action="store_true", help="do not show progress")
 
 
@@ -301,22 +301,22 @@ def add_workers(
     help: str = "worker processes (default: one for each core)",
     default: int | None = None,
 ) -> None:
-    """The option --workers of verbs that share their work out.
+    """Adds the option --workers, for commands with worker processes.
 
     Args:
-        parser: gets it.
-        help: what it means to the verb.
+        parser: to add the option to.
+        help: text for this command.
         default: None lets the library choose.
     """
     parser.add_argument("--workers", metavar="N", type=workers, default=default, help=help)
 
 
 MAX_PAGE_CONNECTIONS = 32
-"""Connections at a time. A browser opens two to six."""
+"""Maximum number of connections at a time. A browser opens two to six."""
 
 
 def add_view_options(parser: Parser) -> None:
-    """The options of verbs that show something."""
+    """Adds the options of commands that show a 3D view."""
     parser.add_argument("--html", metavar="FILE", help="write one web page instead of a live view")
     parser.add_argument(
         "--port", type=port, metavar="N", help="port of the live view (default: first free)"
@@ -327,11 +327,11 @@ def add_view_options(parser: Parser) -> None:
 
 
 def add_page_options(parser: Any, network: str) -> None:
-    """The options of verbs that serve a page of their own.
+    """Adds the options of commands that serve a page.
 
     Args:
-        parser: gets them.
-        network: who can do what with it if it is not for this computer alone, after "with 0.0.0.0".
+        parser: to add the options to.
+        network: text after "with 0.0.0.0" on what others in the network can do with the page.
     """
     parser.add_argument(
         "--port", type=port, metavar="N", help="port of the page (default: first free)"
@@ -349,12 +349,12 @@ def add_page_options(parser: Any, network: str) -> None:
 def add_intrinsics(
     parser: Any, help: str = "intrinsics of the camera", *, required: bool = False
 ) -> None:
-    """The option --intrinsics.
+    """Adds the option --intrinsics.
 
     Args:
-        parser: gets it.
-        help: what it means to the verb.
-        required: the verb can do nothing without.
+        parser: to add the option to.
+        help: text for this command.
+        required: whether the command needs the option.
     """
     parser.add_argument(
         "--intrinsics", metavar="FILE", type=input_file, required=required, help=help
@@ -362,12 +362,11 @@ def add_intrinsics(
 
 
 def add_live_camera(parser: Any, more: str, default: str | None = None) -> None:
-    """The options --camera, --intrinsics, --fps and --measured-mm, of verbs that follow what a
-    camera sees.
+    """Adds --camera, --intrinsics, --fps and --measured-mm, for commands with a live camera.
 
     Args:
-        parser: gets them.
-        more: follows the kinds of cameras in the help.
+        parser: to add the options to.
+        more: text after the kinds of cameras in the help.
         default: the camera.
     """
     parser.add_argument(
@@ -388,7 +387,7 @@ def add_live_camera(parser: Any, more: str, default: str | None = None) -> None:
 
 
 def add_depth_unit(parser: Any) -> None:
-    """The option --depth-unit, of verbs that take a depth image."""
+    """Adds the option --depth-unit, for commands that read a depth image."""
     parser.add_argument(
         "--depth-unit",
         metavar="M",
@@ -398,10 +397,10 @@ def add_depth_unit(parser: Any) -> None:
 
 
 def intrinsics_from_options(arguments: argparse.Namespace) -> Intrinsics:
-    """Those that --intrinsics names, or that the simulated camera of --camera has.
+    """The intrinsics from --intrinsics, or of the simulated camera of --camera.
 
     Raises:
-        InvalidInputError: neither.
+        InvalidInputError: there are neither.
     """
     from burg_drake.cameras import SIMULATED_PREFIX, load_intrinsics
 
@@ -416,10 +415,10 @@ def intrinsics_from_options(arguments: argparse.Namespace) -> Intrinsics:
 
 
 def add_cluster(group: Any) -> None:
-    """Adds the option.
+    """Adds the option --cluster.
 
     Args:
-        group: of options that exclude each other, as the cluster has its own workers.
+        group: of mutually exclusive options, as the cluster has its own workers.
     """
     group.add_argument(
         "--cluster",
@@ -432,7 +431,7 @@ def add_cluster(group: Any) -> None:
 def cluster_from_options(
     arguments: argparse.Namespace,
 ) -> contextlib.AbstractContextManager[Executor | None]:
-    """The cluster that is asked for, until the block is left; None for this machine's processes."""
+    """Context manager of the cluster of --cluster; None for worker processes of this machine."""
     if arguments.cluster is None:
         return contextlib.nullcontext()
     from burg_drake.evaluation import connect_cluster
@@ -441,11 +440,11 @@ def cluster_from_options(
 
 
 def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Adds --retry-failed.
+    """Adds the option --retry-failed.
 
     Args:
-        parser: of the verb.
-        what: is tried again, in the plural.
+        parser: to add the option to.
+        what: plural noun for the items that are tried again.
     """
     parser.add_argument(
         "--retry-failed", action="store_true", help=f"also retry {what} that could not be simulated"
@@ -453,11 +452,11 @@ def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def retry_advice(interrupted: int, failed: int) -> str:
-    """What to do about failures, in one clause.
+    """One clause that advises what to do about failures.
 
     Args:
-        interrupted: of how many the worker process was ended from outside.
-        failed: how many there are in all.
+        interrupted: number of failures whose worker process was killed from outside.
+        failed: number of all failures.
     """
     if not interrupted:
         return "--retry-failed tries them again"

@@ -13,7 +13,7 @@ from burg_drake.apps.options.grasp_files import (
     POSE_FRAMES,
     add_camera_options,
     add_correction_options,
-    gripper_for,
+    gripper_from_options,
 )
 from burg_drake.apps.options.settings_options import add_settings_options, fields_from_options
 from burg_drake.apps.options.values import input_file, renaming
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from burg_drake.station import GraspMotion, Station
 
 
-def add_sampling_options(parser: Parser, default: int, which: Any = None) -> None:
-    """Adds the options.
+def add_sampling_options(parser: Parser, default: int, source_group: Any = None) -> None:
+    """Adds the options for grasp sampling.
 
     Args:
-        parser: gets them.
+        parser: to add the options to.
         default: number of grasps for each object.
-        which: group in which the number of grasps is an alternative, such as to grasps of a file.
+        source_group: mutually exclusive options for the grasps, such as --grasps; None for none.
     """
     add_settings_options(
-        which or parser,
+        source_group or parser,
         evaluation.EvaluationSettings,
         "grasps_per_object",
         unset=True,
@@ -46,15 +46,15 @@ def add_sampling_options(parser: Parser, default: int, which: Any = None) -> Non
 
 
 def grasps_per_object(arguments: argparse.Namespace) -> int:
-    """How many grasps are asked for."""
+    """The requested number of grasps per object."""
     return int(arguments.grasps_per_object or arguments.default_grasps)
 
 
 def refuse_sampling_options_with_file(arguments: argparse.Namespace) -> None:
-    """Refuses an option about sampling where grasps come from a file.
+    """Refuses options about sampling if the grasps come from a file.
 
     Raises:
-        InvalidInputError: names the option.
+        InvalidInputError: such an option is given; the message names it.
     """
     for name in ("blind", "approach_angle", "until_balanced"):
         if getattr(arguments, name, None) and arguments.grasps is not None:
@@ -64,21 +64,21 @@ def refuse_sampling_options_with_file(arguments: argparse.Namespace) -> None:
 
 
 def print_shortfalls(sampled: Mapping[str, core.GraspSet], asked: int) -> None:
-    """A line for each object with fewer grasps than asked, that says why."""
+    """Prints a line for each object with fewer grasps than requested, with the reason."""
     for name, grasps in sampled.items():
         note = evaluation.shortfall_note(name, asked, grasps.provenance, len(grasps))
         if note:
             print(f"note: {note}")
 
 
-def add_grasp_file_options(parser: Parser, which: Any) -> None:
-    """Adds the options.
+def add_grasp_file_options(parser: Parser, source_group: Any) -> None:
+    """Adds the options for grasps from a file.
 
     Args:
-        parser: gets a group of options.
-        which: group that --grasps is an alternative in.
+        parser: to add a group of options to.
+        source_group: mutually exclusive options that --grasps belongs to.
     """
-    which.add_argument(
+    source_group.add_argument(
         "--grasps",
         metavar="FILE|RUN",
         type=input_file,
@@ -106,10 +106,10 @@ def add_grasp_file_options(parser: Parser, which: Any) -> None:
 
 
 def require_grasp_file(arguments: argparse.Namespace) -> None:
-    """Refuses options about a file where none is given.
+    """Refuses options about a grasp file if no file is given.
 
     Raises:
-        InvalidInputError: names the option.
+        InvalidInputError: such an option is given; the message names it.
     """
     names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
     for name in (*names, "scene_id", "gripper_link", "correction"):
@@ -130,7 +130,7 @@ def read_grasps_from_options(
         return evaluation.read_grasps(
             scene,
             arguments.grasps,
-            gripper_for(arguments, station),
+            gripper_from_options(arguments, station),
             format=evaluation.FileReading(arguments.grasps_format, arguments.correction),
             objects=dict(arguments.grasps_object),
             frame=POSE_FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
@@ -146,7 +146,7 @@ def read_grasps_from_options(
 
 
 def add_motion_options(parser: Parser) -> None:
-    """Adds the options."""
+    """Adds the options for the motion of the hand."""
     from burg_drake.station import GraspMotion
 
     group = parser.add_argument_group(
@@ -157,17 +157,17 @@ def add_motion_options(parser: Parser) -> None:
 
 
 def motion_fields_from_options(arguments: argparse.Namespace) -> dict[str, object]:
-    """The fields of `GraspMotion` that options give."""
+    """The fields of `GraspMotion` that are given by options."""
     from burg_drake.station import GraspMotion
 
     return fields_from_options(arguments, GraspMotion)
 
 
 def motion_from_options(arguments: argparse.Namespace, station: Station) -> GraspMotion:
-    """The motion that options ask for, where the station's is another.
+    """The station's motion, with the fields that options change.
 
     Raises:
-        InvalidInputError: they do not go together; names the option.
+        InvalidInputError: the values are inconsistent; the message names the option.
     """
     given = motion_fields_from_options(arguments)
     try:
@@ -185,10 +185,10 @@ def motion_option(field: str) -> str:
 
 
 def refuse_standoff_without_arm(arguments: argparse.Namespace, mode: str) -> None:
-    """Refuses a standoff where no arm is asked.
+    """Refuses a standoff in a mode without arm.
 
     Raises:
-        InvalidInputError: it is given, and the hand begins at the grasp.
+        InvalidInputError: a standoff is given, but the hand starts at the grasp.
     """
     approaches = mode != "hand" or getattr(arguments, "approach", False)
     if not approaches and arguments.standoff_mm is not None:

@@ -24,7 +24,7 @@ POSE_FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
 
 
 def add_reading_options(parser: Parser, *, in_full: bool = False) -> None:
-    """The options --from, --gripper-link and --correction, by which a file is read."""
+    """Adds the options --from, --gripper-link and --correction, for reading a file."""
     parser.add_argument(
         "--from", dest="source", metavar="FORMAT", help="format to read (default: recognised)"
     )
@@ -32,7 +32,7 @@ def add_reading_options(parser: Parser, *, in_full: bool = False) -> None:
 
 
 def add_correction_options(parser: Any, *, in_full: bool = False) -> None:
-    """The options --gripper-link and --correction."""
+    """Adds the options --gripper-link and --correction."""
     others = " (see burg-drake grasps convert --help)"
     if in_full:
         others = (
@@ -52,7 +52,7 @@ def add_correction_options(parser: Any, *, in_full: bool = False) -> None:
 
 
 def add_hand(parser: Parser, default: str | None = DEFAULT_HAND) -> None:
-    """The option --hand, of verbs that have no station; without a default the file is asked."""
+    """Adds --hand, for commands without a station; the file names the hand if `default` is None."""
     parser.add_argument(
         "--hand",
         metavar="HAND",
@@ -63,7 +63,7 @@ def add_hand(parser: Parser, default: str | None = DEFAULT_HAND) -> None:
 
 
 def add_camera_options(group: Any) -> None:
-    """The options --camera-pose, --object-ids and --scene-id, of files about a scene."""
+    """Adds the options --camera-pose, --object-ids and --scene-id, for files about a scene."""
     group.add_argument(
         "--camera-pose",
         metavar="FILE",
@@ -84,7 +84,7 @@ def add_camera_options(group: Any) -> None:
 
 
 def parse_object_ids(text: str) -> dict[int, str]:
-    """`ID=NAME,ID=NAME`."""
+    """Parses `ID=NAME,ID=NAME`."""
     names: dict[int, str] = {}
     for part in text.split(","):
         number, _, name = part.partition("=")
@@ -94,10 +94,10 @@ def parse_object_ids(text: str) -> dict[int, str]:
     return names
 
 
-def gripper_for(
+def gripper_from_options(
     arguments: argparse.Namespace, station: Station | None = None, path: str | None = None
 ) -> formats.Gripper:
-    """The hand of a station, or else the one that --hand or a file names, with the link of
+    """The hand of the station, else of --hand, else of the file, with the link of
     --gripper-link."""
     if station is None:
         gripper = gripper_by_name(arguments.hand) if arguments.hand else _gripper_of_file(path)
@@ -109,7 +109,7 @@ def gripper_for(
 
 
 def add_file_station(parser: Parser) -> None:
-    """The option --station, of verbs whose files may name one."""
+    """Adds the option --station, for commands whose files may name a station."""
     add_station(
         parser,
         f"station file or built-in name (default: that of the file, else {DEFAULT_STATION})",
@@ -117,11 +117,11 @@ def add_file_station(parser: Parser) -> None:
     )
 
 
-def station_for(arguments: argparse.Namespace, path: str) -> Station:
-    """The station that --station names, or else a file or a run, or else the default.
+def station_from_options(arguments: argparse.Namespace, path: str) -> Station:
+    """The station of --station, else of the file or run, else the default.
 
     Raises:
-        UnknownNameError: it is not there.
+        UnknownNameError: there is no such station.
     """
     from burg_drake.station import load_station
 
@@ -139,7 +139,7 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
 
 
 def gripper_by_name(hand: str) -> formats.Gripper:
-    """What formats know of a hand; of the Panda's without a look into its model."""
+    """Properties of a hand for grasp formats; those of the Panda without loading its model."""
     if hand == DEFAULT_HAND:
         return formats.PANDA_GRIPPER
     from burg_drake.station import gripper_of, locate_hand
@@ -148,7 +148,7 @@ def gripper_by_name(hand: str) -> formats.Gripper:
 
 
 def _gripper_of_file(path: str | None) -> formats.Gripper:
-    """The hand that a file or a run says its grasps are for, else the default."""
+    """The hand named by a grasp file or a run, else the default hand."""
     reference = None if path is None else evaluation.hand_reference(path)
     if reference is None:
         return gripper_by_name(DEFAULT_HAND)
@@ -162,18 +162,18 @@ def _gripper_of_file(path: str | None) -> formats.Gripper:
 
 @dataclass(frozen=True, eq=False)
 class GraspSource:
-    """Objects that grasps refer to.
+    """The objects of grasps.
 
     Attributes:
-        library: has every object.
-        scene: where they stand, if that is known.
+        library: of the objects.
+        scene: of the objects; None if unknown.
     """
 
     library: ObjectLibrary
     scene: Scene | None = None
 
     def reference(self) -> dict[str, str]:
-        """How the provenance of grasps names it; `load_grasp_source` finds it again."""
+        """The entry for the provenance of grasps, which `load_grasp_source` reads."""
         if self.scene is not None:
             return {"scene": str(self.scene.path)}
         return {"library": str(self.library.root)}
@@ -186,7 +186,7 @@ def open_grasp_source(reference: str) -> GraspSource:
         reference: a scene file or a library folder, or the name of a built-in one.
 
     Raises:
-        UnknownNameError: there is neither.
+        UnknownNameError: there is no such scene or library.
         DocumentError: its document does not fit the schema.
     """
     from burg_drake.objects import LIBRARY_FILE, load_library
@@ -207,12 +207,12 @@ def open_grasp_source(reference: str) -> GraspSource:
 
 
 def add_source_options(parser: Parser) -> None:
-    """The options --scene and --library."""
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument(
+    """Adds the options --scene and --library."""
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument(
         "--scene", metavar="SCENE", help="scene of the grasps (default: what the file names)"
     )
-    which.add_argument(
+    choice.add_argument(
         "--library", metavar="LIB", help="library of the grasps (default: what the file names)"
     )
 
@@ -224,13 +224,13 @@ def load_grasp_source(
 
     Args:
         arguments: with the options of `add_source_options`.
-        grasps: the grasps; their provenance is asked where no option is given.
+        grasps: the grasps; their provenance names the objects if no option does.
         path: of the file, for messages.
 
     Raises:
-        InvalidInputError: neither option is given and the file names nothing, or the grasps are
-            far from their objects.
-        UnknownNameError: what is named is not there, or lacks an object of the grasps.
+        InvalidInputError: neither the options nor the file name the objects, or the grasps are far
+            from their objects.
+        UnknownNameError: there is no such scene or library, or it lacks an object of the grasps.
     """
     named = [arguments.scene, arguments.library]
     named += [grasps.provenance.get(key) for key in ("scene", "library")]
@@ -263,12 +263,12 @@ def load_grasp_source(
 
 @dataclass(frozen=True, eq=False)
 class GraspOutput:
-    """A place and a format that go together, known before there are grasps.
+    """Path and format of an output, checked before there are grasps.
 
     Attributes:
         path: file or folder.
         format: of the file, or of each file in the folder.
-        is_folder: which of the two.
+        is_folder: whether `path` is a folder.
     """
 
     path: Path
@@ -276,10 +276,10 @@ class GraspOutput:
     is_folder: bool
 
     def require_fits(self, objects: Collection[str]) -> None:
-        """Refuses grasps of several objects for a file that can hold those of one.
+        """Refuses grasps of several objects for a file format with one object per file.
 
         Raises:
-            InvalidInputError: they do not fit.
+            InvalidInputError: there are several objects.
         """
         names = sorted(set(objects))
         if self.format.one_object and not self.is_folder and len(names) > 1:
@@ -290,16 +290,16 @@ class GraspOutput:
             )
 
     def write(self, grasps: core.GraspSet, gripper: formats.Gripper) -> None:
-        """Writes, and prints what was written and what the format has no place for."""
-        as_what = "" if self.format.name == "burg_drake" else f" as {format_title(self.format)}"
-        said = f"wrote {len(grasps)} grasps to {self.path}{as_what}"
+        """Writes the grasps; prints what was written, and what the format cannot store."""
+        as_format = "" if self.format.name == "burg_drake" else f" as {format_title(self.format)}"
+        message = f"wrote {len(grasps)} grasps to {self.path}{as_format}"
         if not self.is_folder:
             notes = self.format.write(grasps, self.path, gripper)
-            print(said)
+            print(message)
             print_notes(notes)
             return
         written = formats.write_each_object(grasps, self.path, self.format, gripper)
-        print(said)
+        print(message)
         print(f"  {core.list_names([path.name for path in written])}")
         for note in dict.fromkeys(note for notes in written.values() for note in notes):
             files = [path.name for path, notes in written.items() if note in notes]
@@ -308,23 +308,23 @@ class GraspOutput:
 
 
 def add_format_option(parser: Parser) -> None:
-    """The option --to."""
+    """Adds the option --to."""
     parser.add_argument(
         "--to", dest="target", metavar="FORMAT", help="format to write (default: by the suffix)"
     )
 
 
 def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> GraspOutput:
-    """Where to write, checked as far as it can be without grasps.
+    """Path and format of an output, checked as far as possible without grasps.
 
     Args:
-        path: file, or folder: one that is there, or a name that ends in `/` or has no suffix.
-        target: name of the format; None to tell by the suffix.
-        frame: what the grasps are measured in, if nothing can be done about that.
+        path: a file or a folder; a folder exists, or its name ends in `/` or has no suffix.
+        target: name of the format; None to take it from the suffix.
+        frame: frame of the grasps, if it cannot be changed.
 
     Raises:
-        InvalidInputError: the place cannot be written to, the format is not told, or it wants
-            another frame.
+        InvalidInputError: the path cannot be written, the format is unknown, or it needs another
+            frame.
         UnknownNameError: there is no such format.
     """
     out = Path(path)
@@ -345,11 +345,11 @@ def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> 
 
 
 def format_title(format: formats.GraspFormat) -> str:
-    """A format's name and title."""
+    """Name and title of a format."""
     return format.name if format.title == format.name else f"{format.name} ({format.title})"
 
 
 def print_notes(notes: Sequence[str]) -> None:
-    """Prints sentences about the line above."""
+    """Prints notes about the line above."""
     for note in notes:
         print(f"  {note}")

@@ -17,15 +17,15 @@ Settings = TypeVar("Settings")
 def add_settings_options(
     parser: Any, settings: type, *names: str, unset: bool = False, shown_default: Any = None
 ) -> None:
-    """Adds an option for each of some fields.
+    """Adds an option for each of the given fields.
 
     Args:
-        parser: gets them; a parser or a group of one.
+        parser: or group of options, to add the options to.
         settings: the dataclass.
-        names: of the fields; all that are declared if there are none.
-        unset: leave the value None unless one is given, as where it then comes from elsewhere; the
-            help does not tell a default.
-        shown_default: the default that the help tells all the same.
+        names: of the fields; all declared fields if empty.
+        unset: whether the value is None if not given, as the default comes from elsewhere; the
+            help then shows no default.
+        shown_default: default in the help in spite of `unset`.
     """
     known = core.declared_fields(settings)
     options_of = {name: declaration.option(name) for name, (_, declaration) in known.items()}
@@ -44,7 +44,7 @@ def add_settings_options(
 
 
 def _value_options(field: Field[Any], declaration: core.Setting) -> dict[str, Any]:
-    """What `add_argument` has to know of an option that takes a value."""
+    """Keyword arguments of `add_argument` for an option with a value."""
     if declaration.choices:
         return {"choices": declaration.choices}
     found: dict[str, Any] = {"type": _value_parser(field, declaration)}
@@ -56,7 +56,7 @@ def _value_options(field: Field[Any], declaration: core.Setting) -> dict[str, An
 
 
 def default_text(field: Field[Any], declaration: core.Setting) -> Any:
-    """The default of a field as people would give it; None if it has none."""
+    """The default of a field in the unit of its option; None if it has none."""
     value = None if field.default is MISSING else field.default
     if declaration.unit is None or value is None:
         return value
@@ -64,7 +64,7 @@ def default_text(field: Field[Any], declaration: core.Setting) -> Any:
 
 
 def _value_text(value: Any) -> str:
-    """A default as people would type it."""
+    """A default as typed on the command line."""
     if isinstance(value, tuple):
         return "x".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -73,18 +73,18 @@ def _value_text(value: Any) -> str:
 def settings_from(
     arguments: argparse.Namespace, settings: type[Settings], **others: Any
 ) -> Settings:
-    """The settings that options ask for; a field without an option keeps its default.
+    """Settings from options; a field without an option keeps its default.
 
     Args:
-        arguments: as parsed.
+        arguments: parsed arguments.
         settings: the dataclass.
-        others: values of fields that options do not tell, or not alone.
+        others: values of fields that do not come from one option.
     """
     return settings(**(fields_from_options(arguments, settings) | others))
 
 
 def fields_from_options(arguments: argparse.Namespace, settings: type) -> dict[str, Any]:
-    """The values of fields, in SI, that options give."""
+    """The values of fields that are given by options, in SI units."""
     given: dict[str, Any] = {}
     for name, (field, declaration) in core.declared_fields(settings).items():
         destination = core.option_name(settings, name)[2:].replace("-", "_")
@@ -101,7 +101,7 @@ def fields_from_options(arguments: argparse.Namespace, settings: type) -> dict[s
 
 
 def _value_parser(field: Field[Any], declaration: core.Setting) -> Callable[[str], Any]:
-    """What reads the value of an option."""
+    """The parser for the value of an option."""
     kind = str(field.type).partition(" ")[0]
     if kind == "int":
         low, high = int(declaration.low or 0), int(declaration.high or MAX_COUNT)
@@ -114,10 +114,10 @@ def _value_parser(field: Field[Any], declaration: core.Setting) -> Callable[[str
 
 
 def parse_in_range(text: str, declaration: core.Setting) -> float:
-    """A number within the bounds of a setting; finite, unless that may be infinite.
+    """A number within the bounds of a setting; finite, unless the setting may be infinite.
 
     Raises:
-        argparse.ArgumentTypeError: it is something else.
+        argparse.ArgumentTypeError: the text is no such number.
     """
     value = math.inf if declaration.infinite and text.lower() == "inf" else number(text)
     low, above, high = declaration.low, declaration.above, declaration.high

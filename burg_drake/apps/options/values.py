@@ -31,12 +31,12 @@ _PIPE_NAMES: dict[str, str] = {}
 
 def input_file(text: str) -> str:
     """A file to read, `-` for the standard input. Files are read more than once, to recognise their
-    format: what comes through a pipe, as with `<(...)`, is copied to a file first."""
+    format; input from a pipe, as with `<(...)`, is copied to a file first."""
     standard_input = ("-", "/dev/stdin")
     try:
         if text not in standard_input and not stat.S_ISFIFO(Path(text).stat().st_mode):
             return text
-    except (OSError, ValueError):  # whoever opens it says what is wrong
+    except (OSError, ValueError):  # opening the file reports the error
         return text
     name = "stdin" if text in standard_input else Path(text).name
     copy = Path(tempfile.mkdtemp(dir=_pipe_folder().name)).resolve() / name
@@ -49,7 +49,7 @@ def input_file(text: str) -> str:
 
 
 def restore_pipe_names(message: str) -> str:
-    """A message in which copies of what came through pipes go by the names that the user gave."""
+    """A message with the user's names of pipes in place of the paths of their copies."""
     for copy, name in _PIPE_NAMES.items():
         message = message.replace(copy, name)
     return message
@@ -57,12 +57,12 @@ def restore_pipe_names(message: str) -> str:
 
 @cache
 def _pipe_folder() -> tempfile.TemporaryDirectory[str]:
-    """The folder of what came through pipes; it goes when the process ends."""
+    """The folder for copies of input from pipes; deleted when the process ends."""
     return tempfile.TemporaryDirectory(prefix="burg-drake-pipe-")
 
 
 def positive_int(text: str) -> int:
-    """A whole number from 1 that can be counted to."""
+    """A whole number from 1 to `MAX_COUNT`."""
     return whole_number(text, 1, MAX_COUNT)
 
 
@@ -95,12 +95,12 @@ def two_numbers(text: str) -> tuple[int, int]:
 
 
 def seed(text: str) -> int:
-    """A whole number from 0 with at most 64 bits, as documents have it."""
+    """A whole number from 0 with at most 64 bits, as in documents."""
     return whole_number(text, 0, MAX_DOCUMENT_SEED)
 
 
 def port(text: str) -> int:
-    """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
+    """A port that needs no privileges: Drake's Meshcat accepts ports from 1024."""
     return whole_number(text, 1024, 65535)
 
 
@@ -149,7 +149,7 @@ def key_and_value(text: str, form: str) -> tuple[str, str]:
 
     Args:
         text: the value of the option.
-        form: what it should be, for the message, such as `KEY=FOLDER`.
+        form: expected form for the message, such as `KEY=FOLDER`.
     """
     key, _, value = text.partition("=")
     if not key or not value:
@@ -205,13 +205,13 @@ def names(text: str) -> list[str]:
     return found
 
 
-def some_of(text: str, known: Sequence[str], what: str) -> list[str]:
-    """`A` or `A,B`: some of the known names, each once and in their order.
+def known_names(text: str, known: Sequence[str], what: str) -> list[str]:
+    """`A` or `A,B`: names among the known ones, each once and in the order of `known`.
 
     Args:
         text: the value of the option.
-        known: what may be named.
-        what: one of them is, for the message, such as `a test`.
+        known: the valid names.
+        what: noun for the message, such as `a test`.
     """
     given = [name.strip() for name in text.split(",") if name.strip()] or [text]
     for name in given:

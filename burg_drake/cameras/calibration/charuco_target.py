@@ -24,7 +24,7 @@ from burg_drake.core import (
 from burg_drake.scene import marker_dictionary
 
 MIN_CORNERS = 8
-"""Corners of a usable view, at least."""
+"""Least number of corners of a usable view."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,15 +99,15 @@ class CharucoTarget:
 
 @dataclass(frozen=True, eq=False)
 class CharucoView:
-    """What one image shows of a target.
+    """Detected corners of a target in one image.
 
     Attributes:
         name: of the image.
         size: its width and height [pixels].
-        ids: (N,) corners that were seen, rows of the target's `p_TQ`.
-        corners: (N, 2) where they were seen [pixels].
-        blur: standard deviation of the blur that its edges show [pixels].
-        side: length of a square's side in the image, the median [pixels].
+        ids: (N,) indices of the detected corners, rows of the target's `p_TQ`.
+        corners: (N, 2) detected corners [pixels].
+        blur: standard deviation of the blur, measured at edges [pixels].
+        side: median side of a square in the image [pixels].
     """
 
     name: str
@@ -123,11 +123,11 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 
     Args:
         image: (H, W, 3) RGB or (H, W) gray.
-        target: what to look for.
+        target: to detect.
         name: of the image.
 
     Returns:
-        The view; or why there is none, in a few words.
+        The view; or the reason why there is none, in a few words.
     """
     gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     light = srgb_to_linear(gray)
@@ -160,16 +160,16 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 def refine_corners(
     light: Single, corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> Array:
-    """Moves corners to where the edges that meet there cross.
+    """Refine corners to the intersections of their edges.
 
     Args:
         light: (H, W) image in linear light.
         corners: (N, 2) near the corners [pixels].
-        ids: (N,) which corners they are.
-        target: whose they are.
+        ids: (N,) indices of the corners.
+        target: that they belong to.
 
     Returns:
-        (N, 2) pixels.
+        (N, 2) refined corners [pixels].
     """
     windows = np.clip(np.floor(_marker_gaps(corners, ids, target)), 2, 31).astype(int)
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-4)
@@ -185,13 +185,14 @@ def refine_corners(
 
 
 def _marker_gaps(corners: Array, ids: NDArray[np.int32], target: CharucoTarget) -> Array:
-    """(N,) how far off the nearest corner of a marker is, along both edges [pixels]."""
+    """(N,) distance to the nearest corner of a marker, along both edges [pixels]."""
     return 0.5 * (1.0 - target.marker / target.square) * _square_sides(corners, ids, target)
 
 
 def _square_sides(corners: Array, ids: NDArray[np.int32], target: CharucoTarget) -> Array:
-    """(N,) length of the shortest side of a square that ends at each corner [pixels]; the least of
-    all where no neighbour was seen."""
+    """(N,) shortest side of a square at each corner [pixels]; the least of all if no neighbour was
+    detected.
+    """
     pairs = _neighbour_pairs(ids, target)
     lengths = np.linalg.norm(corners[pairs[:, 0]] - corners[pairs[:, 1]], axis=1)
     sides = np.full(len(ids), np.inf)
@@ -202,7 +203,7 @@ def _square_sides(corners: Array, ids: NDArray[np.int32], target: CharucoTarget)
 
 
 def _neighbour_pairs(ids: NDArray[np.int32], target: CharucoTarget) -> NDArray[np.int_]:
-    """(M, 2) rows of `ids` whose corners a side of a square joins."""
+    """(M, 2) indices into `ids` of corners that are joined by a side of a square."""
     columns = target.squares[0] - 1
     row_of = {int(number): k for k, number in enumerate(ids)}
     pairs = []
@@ -219,8 +220,8 @@ def _measure_edges(
 ) -> tuple[float, float]:
     """Blur and length of the squares' sides [pixels].
 
-    A step that a Gaussian of standard deviation s has blurred rises by its height / (s sqrt(2 pi))
-    a pixel at most. Motion blurs edges of one direction: the worse direction counts.
+    A step blurred by a Gaussian of standard deviation s rises by at most its height / (s sqrt(2
+    pi)) per pixel. Motion blurs edges of one direction: the worse direction counts.
     """
     pairs = _neighbour_pairs(ids, target)
     if not len(pairs):
@@ -231,7 +232,7 @@ def _measure_edges(
     reach = np.minimum(0.5 * side, 12.0)
     t = np.linspace(-1.0, 1.0, 49) * reach[:, None]
     places = np.linspace(0.4, 0.6, 5)
-    # (M, 5, 49, 2): five lines across each side, whose mean is less noisy than each is.
+    # (M, 5, 49, 2): five lines across each side, averaged against noise.
     p = start[:, None] + along[:, None] * places[:, None]
     p = (p[:, :, None] + across[:, None, None] * t[:, None, :, None]).astype(np.float32)
     u, v = np.moveaxis(p.reshape(len(p), -1, 2), 2, 0)

@@ -45,12 +45,12 @@ LENS_MODELS = tuple(COEFFICIENT_COUNTS)  # Names of all lens models.
 
 @dataclass(frozen=True, eq=False)
 class LensChoice:
-    """A fit, and what else the lens may be.
+    """The chosen fit and the plausible alternatives.
 
     Attributes:
-        fit: of the model that was asked for, or that is supported best.
-        supported: the fit that is supported best, to tell which corners do not belong.
-        hypotheses: what the lens may be.
+        fit: of the requested model, or of the best supported one.
+        supported: the best supported fit, for the rejection of outliers.
+        hypotheses: plausible lenses.
         dispersion: of the corners' errors, see `LensEvidence`.
     """
 
@@ -61,7 +61,7 @@ class LensChoice:
 
 
 def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str) -> LensChoice:
-    """Fits all models and chooses.
+    """Fit all lens models and choose one.
 
     Args:
         views: of one camera.
@@ -78,12 +78,12 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
     is_wide = np.arccos(corner_rays[:, 2]).max() > np.radians(55.0)
     fits = [*perspective, fisheye] if is_wide else perspective
     # All lenses distort a little, so that a pinhole is not chosen.
-    # Views disagree by a model that is wrong, and by one that they do not determine, so that the
-    # one by which they agree most tells how alike errors are.
+    # Both a wrong model and one that the views do not determine make views disagree. So the
+    # model by which they agree most shows the correlation of errors.
     limit = HUBER_RATIO * min(fit.typical for fit in fits[1:])
     evidence = LensEvidence(limit, min(view_disagreement(fit) for fit in fits[1:]) ** 2)
     best = min(fits[1:], key=lambda fit: fit.information(evidence, True))
-    # Beside the camera a perspective model means nothing, so it tells nothing about a fisheye.
+    # Perspective models are invalid beside the camera, so they say nothing about a fisheye.
     hypotheses = lens_hypotheses([best] if best is fisheye else fits, evidence)
     supported = best
     if model != AUTO_LENS_MODEL:
@@ -101,8 +101,9 @@ def _rational_if_better(
     hypotheses: tuple[LensHypothesis, ...],
     corners: Array,
 ) -> LensFit:
-    """The rational fit, if Akaike's criterion, which is more generous, prefers it, and it is nearer
-    to all that the lens may be: it can fit better and yet be wild where no corners were seen."""
+    """The rational fit if the more generous Akaike criterion prefers it and it is nearer to all
+    hypotheses, else the best fit. A rational lens may fit better and still be wild without corners.
+    """
     if not rational.information(evidence, False) < best.information(evidence, False):
         return best
     pixels = image_grid(best.intrinsics)
@@ -113,7 +114,7 @@ def _rational_if_better(
 
 
 def _fit_perspective_models(views: Sequence[CharucoView], target: CharucoTarget) -> list[LensFit]:
-    """Fits of the perspective models, each from the one before."""
+    """Fit the perspective models, each from the one before."""
     start = guess_camera(views, target, "perspective")
     fits = []
     # From the simplest on; each model contains the one before.
@@ -134,7 +135,7 @@ class CalibratedView:
     Attributes:
         view: the corners that were used.
         X_CT: (4, 4) target in the camera's frame.
-        residuals: (N, 2) where corners were seen less where the model puts them [pixels].
+        residuals: (N, 2) measured minus projected corners [pixels].
     """
 
     view: CharucoView
@@ -143,7 +144,7 @@ class CalibratedView:
 
     @property
     def rms(self) -> float:
-        """Root mean square distance of the corners from where the model puts them [pixels]."""
+        """Root mean square reprojection error of the corners [pixels]."""
         return rms_length(self.residuals)
 
     @property
@@ -154,7 +155,7 @@ class CalibratedView:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What images of a target tell of a camera.
+    """The calibration of a camera from images of a target.
 
     Attributes:
         intrinsics: with the residual of the calibration.
@@ -162,10 +163,10 @@ class Calibration:
         model: of the lens: `pinhole`, `radial4` (k1, k2, p1, p2), `radial` (k3 also), `rational`
             (k4, k5, k6 also) or `fisheye`.
         views: that were used.
-        rejected: names of the other images, and why each does not count.
+        rejected: names of rejected images, and the reasons.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients, if the lens is of this model.
-        hypotheses: what the lens may be by these corners, see `camera_error`.
-        bulge: how far the target is from flat, by its highest and lowest corner [m].
+        hypotheses: lenses that are plausible by these corners, see `camera_error`.
+        bulge: height difference of the target's highest and lowest corner [m].
     """
 
     intrinsics: Intrinsics
@@ -179,12 +180,12 @@ class Calibration:
 
     @cached_property
     def corners(self) -> Array:
-        """(N, 2) of all views [pixels]."""
+        """(N, 2) corners of all views [pixels]."""
         return np.concatenate([used.view.corners for used in self.views])
 
     @cached_property
     def accuracy(self) -> CalibrationAccuracy:
-        """To how many pixels the camera is known, and where it is not."""
+        """Error bounds of the calibrated camera over the image."""
         return calibration_accuracy(self.intrinsics, self.hypotheses, self.corners)
 
     @property
@@ -195,7 +196,7 @@ class Calibration:
 
     @property
     def rms(self) -> float:
-        """As of a view, over all views [pixels]."""
+        """Root mean square reprojection error over all views [pixels]."""
         return rms_length(np.concatenate([view.residuals for view in self.views]))
 
     @property
@@ -257,10 +258,10 @@ def calibrate_views(
         model: of the lens: `pinhole`, `radial4`, `radial`, `rational`, `fisheye`, or `auto`: the
             one of the last four that the residuals support best; a fisheye only if the lens is
             wide.
-        rejected: images that are no views, and why.
+        rejected: images without a view, and the reasons.
 
     Raises:
-        InvalidInputError: fewer than 3 can be used, or they do not determine a camera.
+        InvalidInputError: fewer than 3 views can be used, or they do not determine a camera.
         UnknownNameError: no such model.
     """
     known = (AUTO_LENS_MODEL, *LENS_MODELS)
@@ -305,20 +306,24 @@ def calibrate_views(
 def _select_usable_views(
     views: Sequence[CharucoView],
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Views of the size that most have, sharp and different; and the others."""
+    """Select sharp and different views of the most frequent size; return them and the rejected
+    ones.
+    """
     sizes = Counter(view.size for view in views)
     kept: list[CharucoView] = []
     refused = []
     for view in views:
         (size, _), *_ = sizes.most_common(1)
         # Fraction of the diagonal; nearer views are duplicates.
-        twin = next((other for other in kept if corner_displacement(view, other) < 0.005), None)
+        duplicate = next(
+            (other for other in kept if corner_displacement(view, other) < 0.005), None
+        )
         if view.size != size:
             reason = "has {} x {} pixels, the others have {} x {}".format(*view.size, *size)
         elif view.blur > MAX_VIEW_BLUR * view.side:
             reason = f"is blurred: its edges are {view.blur:.1f} pixels wide"
-        elif twin is not None:
-            reason = f"shows the target in the same place as {twin.name}"
+        elif duplicate is not None:
+            reason = f"shows the target in the same place as {duplicate.name}"
         else:
             kept.append(view)
             continue
@@ -329,7 +334,7 @@ def _select_usable_views(
 def corner_displacement(view: CharucoView, other: CharucoView) -> float:
     """Mean distance of corners between two views, as a share of the image's diagonal.
 
-    Infinite where they have less than half of their corners in common.
+    Infinite if they have less than half of their corners in common.
     """
     _, mine, its = np.intersect1d(view.ids, other.ids, return_indices=True)
     if view.size != other.size or 2 * len(mine) < max(len(view.ids), len(other.ids)):
@@ -352,7 +357,7 @@ def _require_views(views: Sequence[CharucoView], refused: Sequence[tuple[str, st
 def _reject_outliers(
     views: list[CharucoView], fit: LensFit
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Views without those, and without corners, that do not fit to the others."""
+    """Remove views and corners that do not fit the others."""
     lengths = [np.linalg.norm(r, axis=1) for r in fit.residuals]
     typical = float(np.median(np.concatenate(lengths)))
     rms = np.array([rms_length(r) for r in fit.residuals])
@@ -361,9 +366,9 @@ def _reject_outliers(
     corner_limit = max(5.0 * typical, 0.15)  # Pixels.
     kept, refused = [], []
     for view, length, of_view in zip(views, lengths, rms, strict=True):
-        # The worst first: they pull the view's pose, and with it other corners, off their place.
+        # The worst first: they shift the view's pose and with it other corners.
         good = length <= max(corner_limit, 0.5 * length.max())
-        # A few wrong corners are left out by themselves, without their view.
+        # A few wrong corners are removed without their view.
         if of_view > limit and (good.mean() < 0.8 or rms_length(length[good, None]) > limit):
             reason = f"is {of_view:.2f} pixels off, the median is {median:.2f}"
         elif good.sum() < MIN_CORNERS:

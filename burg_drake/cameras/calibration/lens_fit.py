@@ -20,8 +20,9 @@ FOCAL_LENGTH_GUESSES = np.geomspace(0.25, 3.0, 11)
 def guess_camera(
     views: Sequence[CharucoView], target: CharucoTarget, model: LensModel
 ) -> tuple[Intrinsics, Array]:
-    """A camera without coefficients, and (V, 4, 4) the target in its frame, of the focal length
-    that explains the median view best."""
+    """Guess a camera without distortion, and (V, 4, 4) the target in its frame, by the focal length
+    that explains the median view best.
+    """
     width, height = views[0].size
     found = []
     for share in FOCAL_LENGTH_GUESSES:
@@ -34,8 +35,8 @@ def guess_camera(
             model=model,
             distortion=(0.0,) * 4,
         )
-        posed = [_fit_view_pose(view, target, camera) for view in views]
-        errors, X_CT = zip(*posed, strict=True)
+        view_poses = [_fit_view_pose(view, target, camera) for view in views]
+        errors, X_CT = zip(*view_poses, strict=True)
         found.append((np.median(errors), camera, np.array(X_CT)))
     return min(found, key=lambda one: one[0])[1:]
 
@@ -43,7 +44,9 @@ def guess_camera(
 def _fit_view_pose(
     view: CharucoView, target: CharucoTarget, camera: Intrinsics
 ) -> tuple[float, Array]:
-    """Mean distance of a view's corners from where its best pose puts them [pixels], and (4, 4)."""
+    """Mean reprojection error of a view's corners at the best pose [pixels], and that pose (4,
+    4).
+    """
     p_TQ = target.p_TQ[view.ids]
     straight = np.ascontiguousarray((camera.undistort(view.corners) - camera.center) / camera.focal)
     _, rotations, translations, _ = cv2.solvePnPGeneric(
@@ -56,16 +59,17 @@ def _fit_view_pose(
         p_CQ = p_TQ @ X[:3, :3].T + X[:3, 3]
         if not (p_CQ[:, 2] > 0.0).all():
             continue
-        off = camera.project(p_CQ) - view.corners
-        error = float(np.linalg.norm(off, axis=1).mean())
+        residual = camera.project(p_CQ) - view.corners
+        error = float(np.linalg.norm(residual, axis=1).mean())
         if error < best[0]:
             best = error, X
     return best
 
 
 def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
-    """(4, 4) the target upright before the camera, as large as it is seen: for views that no pose
-    explains, which turn out not to fit to the others."""
+    """(4, 4) an upright target in front of the camera, of the size in the image: for views that no
+    pose explains, which are rejected later.
+    """
     size = float(np.std(p_TQ[:, :2]) / max(float(np.std(straight)), 1e-9))
     X = np.eye(4)
     X[:3, 3] = size * np.r_[straight.mean(axis=0), 1.0] - p_TQ.mean(axis=0)
@@ -73,11 +77,11 @@ def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
 
 
 def lens_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
-    """Image points and their derivatives.
+    """Project points and differentiate the projection.
 
     Args:
         intrinsics: of the camera.
-        p_CQ: (N, 3) points before it, in its frame [m].
+        p_CQ: (N, 3) points in front of the camera, in its frame [m].
 
     Returns:
         `(pixels, by_pose, by_camera)`: (N, 2); (N, 2, 6) by a small rotation [rad] of the points
@@ -106,11 +110,11 @@ FISHEYE_POWERS = np.array([2, 4, 6, 8])
 
 
 def lens_prior(camera: Intrinsics, bends: Array) -> tuple[Array, Array]:
-    """What is known of a camera and a target before any corner is seen.
+    """Prior of the parameters of a camera and a target.
 
     Returns:
-        `(errors, slopes)`: (P + 3,) how many standard deviations their parameters are from what is
-        expected, and the derivatives of that.
+        `(errors, slopes)`: (P + 3,) deviations of the parameters from their expected values, in
+        standard deviations, and their derivatives.
     """
     focal_log_sd = 0.5  # Standard deviation of the logarithm of the focal length over the diagonal.
     center_sd = 0.1  # Standard deviation of the principal point, as a fraction of the diagonal.
@@ -120,9 +124,11 @@ def lens_prior(camera: Intrinsics, bends: Array) -> tuple[Array, Array]:
     powers = FISHEYE_POWERS if camera.is_fisheye else PERSPECTIVE_POWERS[: len(camera.distortion)]
     # A term of the lens formula has a standard deviation of 1 in the image's corners.
     weights = reach**powers
-    aside = (np.array(camera.center) - 0.5 * (size - 1)) / (center_sd * diagonal)
+    center_deviation = (np.array(camera.center) - 0.5 * (size - 1)) / (center_sd * diagonal)
     focal = np.array(camera.focal)
-    errors = np.r_[np.log(focal / diagonal) / focal_log_sd, aside, weights * camera.distortion]
+    errors = np.r_[
+        np.log(focal / diagonal) / focal_log_sd, center_deviation, weights * camera.distortion
+    ]
     slopes = np.r_[1.0 / (focal_log_sd * focal), [1.0 / (center_sd * diagonal)] * 2, weights]
     return np.r_[errors, bends], np.r_[slopes, np.ones(BEND_TERMS)]
 
@@ -135,8 +141,9 @@ HUBER_RATIO = 3.0  # Residuals above this multiple of the median count linearly 
 
 
 class _LensFitState(NamedTuple):
-    """A camera, the target's bends (3,) and poses on the way: cost, and of N corners residuals
-    (N, 2), weights (N,) and derivatives (N, 2, 6) and (N, 2, P + 3)."""
+    """Intermediate camera, bends (3,) and poses of a fit, with cost, and residuals (N, 2), weights
+    (N,) and derivatives (N, 2, 6) and (N, 2, P + 3) of N corners.
+    """
 
     intrinsics: Intrinsics
     bends: Array
@@ -150,12 +157,11 @@ class _LensFitState(NamedTuple):
 
 @dataclass(frozen=True)
 class LensEvidence:
-    """How much corners tell about which model is right.
+    """Evidence of the corners for the comparison of lens models.
 
     Attributes:
-        limit: residuals beyond are of corners that do not belong, and tell no more than this
-            [pixels].
-        dispersion: how many corners, with errors that are alike, tell as much as one with its own
+        limit: larger residuals are of outliers and count as this [pixels].
+        dispersion: number of corners with correlated errors that are worth one independent corner
             (Burnham and Anderson, Model Selection and Multimodel Inference, 2002, section 2.5).
     """
 
@@ -169,15 +175,14 @@ class LensFit:
 
     Attributes:
         model: of the lens, a key of `COEFFICIENT_COUNTS`.
-        intrinsics: fitted.
+        intrinsics: fitted intrinsics.
         X_CT: (V, 4, 4) target in the camera's frame, of each view.
-        residuals: of each view (N, 2): where corners were seen less where the model puts them
-            [pixels].
+        residuals: of each view (N, 2): measured minus projected corners [pixels].
         bends: (3,) of the target along x^2, x y and y^2 [of what is usual].
-        bulge: difference of the target's highest and lowest corner by these [m].
+        bulge: height difference of the target's highest and lowest corner by `bends` [m].
         reduced: of each view (2 N, P + 3) derivatives of its pixels by fx, fy, cx, cy, the
-            coefficients and bends, without what a change of the view's pose explains, which is no
-            information about them.
+            coefficients and bends, with the part that a change of the view's pose explains
+            projected out.
     """
 
     model: str
@@ -190,7 +195,7 @@ class LensFit:
 
     @property
     def variance(self) -> float:
-        """Of a coordinate of a corner, as the residuals tell it [pixels^2]."""
+        """Variance of a corner's coordinate, from the residuals [pixels^2]."""
         count = sum(r.size for r in self.residuals)
         return self.squares / max(count - self.size - BEND_TERMS - 6 * len(self.residuals), 1)
 
@@ -210,8 +215,9 @@ class LensFit:
         return float(np.median(np.linalg.norm(np.concatenate(self.residuals), axis=1)))
 
     def information(self, evidence: LensEvidence, bayesian: bool) -> float:
-        """Bayesian information criterion, or Akaike's, which is more generous to large models: the
-        lowest of several models is best supported."""
+        """Bayesian information criterion, or Akaike's, which penalizes large models less. The model
+        with the lowest value is best supported.
+        """
         squares = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
         n = 2 * len(squares)
         total = max(float(np.minimum(squares, evidence.limit**2).sum()), 1e-18)
@@ -232,9 +238,9 @@ def fit_lens(
         views: images of one camera, all of one size.
         target: what they show.
         model: of the lens, a key of `COEFFICIENT_COUNTS`.
-        start: a camera near by, of a simpler model or the same, and (V, 4, 4) the target in its
+        start: initial camera, of a simpler model or the same, and (V, 4, 4) the target in its
             frame.
-        bend: how far the target bulges, about [m].
+        bend: approximate bulge of the target [m].
 
     Raises:
         InvalidInputError: the views do not determine a camera.
@@ -265,7 +271,7 @@ def fit_lens(
 
 
 def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
-    """Of a camera's parameters."""
+    """Names of a camera's parameters."""
     names: tuple[str, ...] = ("k1", "k2", "k3", "k4")  # OpenCV's order.
     if not camera.is_fisheye:
         names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")[: len(camera.distortion)]
@@ -273,7 +279,7 @@ def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
 
 
 def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
-    """A camera with as many coefficients as a model has."""
+    """Pad a camera's coefficients to the number of a model."""
     count = COEFFICIENT_COUNTS[model]
     distortion = (*camera.distortion, *(0.0,) * count)[:count]
     lens: LensModel = "fisheye" if model == "fisheye" else "perspective"
@@ -281,7 +287,7 @@ def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
 
 
 class _LensFitProblem:
-    """The sum of squares of a fit, and steps that lower it."""
+    """The least-squares problem of a fit, and its minimization."""
 
     def __init__(
         self,
@@ -321,7 +327,7 @@ class _LensFitProblem:
         return _LensFitState(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
     def minimize(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
-        """The state of lowest cost that steps from a camera lead to.
+        """Minimize the cost from an initial camera.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
@@ -342,7 +348,7 @@ class _LensFitProblem:
         return state
 
     def step(self, state: _LensFitState, damping: float) -> tuple[_LensFitState | None, float]:
-        """A state of lower cost and the next damping; None if there is no such."""
+        """Find a state of lower cost and the next damping; None if there is none."""
         root = np.sqrt(state.weights)[:, None]
         Jp, Jc = state.by_pose * root[..., None], state.by_others * root[..., None]
         r = state.residuals * root
@@ -357,11 +363,11 @@ class _LensFitProblem:
         while damping < 1e8:  # Levenberg-Marquardt damping at which no step lowers the cost.
             damped = pose + damping * diagonal[:, :, None] * np.eye(6)
             solved = np.linalg.solve(damped, np.concatenate([mixed, of_pose[..., None]], axis=2))
-            left = camera + damping * np.diag(np.diag(camera))
-            left = left - np.einsum("vij,vik->jk", mixed, solved[..., :-1])
+            reduced_camera = camera + damping * np.diag(np.diag(camera))
+            reduced_camera = reduced_camera - np.einsum("vij,vik->jk", mixed, solved[..., :-1])
             right = of_camera - np.einsum("vij,vi->j", mixed, solved[..., -1])
-            scale = 1.0 / np.sqrt(np.maximum(np.diag(left), 1e-300))
-            scaled = left * np.outer(scale, scale)
+            scale = 1.0 / np.sqrt(np.maximum(np.diag(reduced_camera), 1e-300))
+            scaled = reduced_camera * np.outer(scale, scale)
             change = scale * np.linalg.lstsq(scaled, scale * right, rcond=None)[0]
             poses = solved[..., -1] - solved[..., :-1] @ change
             found = self._take_step(state, change, poses)

@@ -30,14 +30,14 @@ COVERAGE_GRID = (6, 8)
 
 
 def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDArray[np.int_]:
-    """How many corners were seen in each part of the image.
+    """Count the corners in each cell of the image.
 
     Args:
         views: of the target.
         size: width and height of the image [pixels].
 
     Returns:
-        `COVERAGE_GRID` counts, rows from the top.
+        Counts in the shape of `COVERAGE_GRID`, rows from the top.
     """
     corners = np.concatenate([view.corners for view in views] or [np.empty((0, 2))])
     edges = [
@@ -49,8 +49,9 @@ def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDAr
 
 
 def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
-    """Which of `IMAGE_PARTS` show no corners, or along less than half of an edge, by the counts of
-    `corner_coverage`."""
+    """Find `IMAGE_PARTS` without corners, or with corners along less than half of an edge, by the
+    counts of `corner_coverage`.
+    """
     bands = (slice(0, 1), slice(1, -1), slice(-1, None))
     cells = (counts[rows, columns] for rows in bands for columns in bands)
     # Fraction of an edge's cells in which corners must be seen.
@@ -60,7 +61,7 @@ def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
 
 
 def image_part_indices(pixels: Array, size: tuple[int, int]) -> Indices:
-    """(N,) which of `IMAGE_PARTS` each place (N, 2) is in."""
+    """(N,) index into `IMAGE_PARTS` for each pixel (N, 2)."""
     bands = []
     for values, length, count in zip(pixels.T, size, COVERAGE_GRID[::-1], strict=True):
         cell = np.floor((values + 0.5) / length * count)
@@ -69,15 +70,15 @@ def image_part_indices(pixels: Array, size: tuple[int, int]) -> Indices:
 
 
 BOUND_SIGMAS = 2.0
-"""Standard deviations that errors exceed in one of 20 cases."""
+"""Number of standard deviations that errors exceed in one of 20 cases."""
 
 
 @dataclass(frozen=True, eq=False)
 class LensHypothesis:
-    """A model that the corners do not refute.
+    """A lens model that is consistent with the corners.
 
     Attributes:
-        weight: how well it is supported; those of all hypotheses add up to 1.
+        weight: its support; the weights of all hypotheses add up to 1.
         intrinsics: fitted.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients.
     """
@@ -88,7 +89,7 @@ class LensHypothesis:
 
 
 def image_grid(intrinsics: Intrinsics, columns: int = 13, rows: int = 9) -> Array:
-    """(rows * columns, 2) places spread over the image from edge to edge [pixels]."""
+    """(rows * columns, 2) points spread over the image from edge to edge [pixels]."""
     u = np.linspace(0.0, intrinsics.width - 1.0, columns)
     v = np.linspace(0.0, intrinsics.height - 1.0, rows)
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
@@ -100,7 +101,7 @@ def camera_covariance(fit: LensFit) -> Array:
 
 
 def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
-    """Fits of several models to the same corners, weighed by Akaike's criterion."""
+    """Weight the fits of several models to the same corners by Akaike's criterion."""
     information = np.array([fit.information(evidence, False) for fit in fits])
     weights = np.exp(-0.5 * (information - information.min()))
     # Models with less support are dropped.
@@ -114,11 +115,11 @@ def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[Le
 
 
 def view_disagreement(fit: LensFit) -> float:
-    """How many times as far views disagree as they would if all corners had errors of their own.
+    """Ratio of the views' disagreement to that expected from independent errors of the corners.
 
-    Errors of neighbouring corners are alike: blur, a bent target, a shutter that reads line by
-    line. What the camera changes by when one view is left out knows that (the jackknife), over
-    where corners were seen. At least 1.
+    Errors of neighbouring corners are correlated: blur, a bent target, a rolling shutter. The
+    jackknife measures this by the camera's change when one view is left out, at the corners. At
+    least 1.
     """
     H, squares = _fit_information(fit), np.zeros_like(_fit_information(fit))
     count = len(fit.residuals)
@@ -134,16 +135,16 @@ def view_disagreement(fit: LensFit) -> float:
 def camera_error(
     camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array, pixels: Array
 ) -> Array:
-    """How far a camera model may be off at places of the image.
+    """Expected error of a camera model at image points.
 
-    A turn of the camera that explains the difference where corners were seen does not count: the
-    camera's pose takes it up.
+    A rotation of the camera that explains the difference at the corners does not count, as the
+    camera's pose compensates it.
 
     Args:
-        camera: whose error is asked for.
-        hypotheses: what the true camera may be.
-        corners: (N, 2) that were seen [pixels].
-        pixels: (N, 2) places [pixels].
+        camera: camera to assess.
+        hypotheses: plausible true cameras.
+        corners: (N, 2) detected corners [pixels].
+        pixels: (N, 2) image points [pixels].
 
     Returns:
         (N,) root mean square distance [pixels]; infinite where a fisheye looks aside or back.
@@ -164,8 +165,9 @@ def camera_error(
 
 
 def _camera_differences(one: Intrinsics, other: Intrinsics, pixels: Array) -> tuple[Array, Array]:
-    """How far another camera shows what one shows at some pixels: (2 N, 1 + P), its distance from
-    there and how that changes with its parameters; and (2 N, 3), with a turn of it."""
+    """Image differences of two cameras at the pixels of one: (2 N, 1 + P), the differences and
+    their derivatives by the other's parameters; and (2 N, 3), by a rotation of it.
+    """
     found, by_pose, by_camera = lens_derivatives(other, one.rays(pixels))
     count = 4 + len(other.distortion)
     columns = [(found - pixels).ravel(), by_camera[..., :count].reshape(-1, count)]
@@ -185,7 +187,7 @@ def _fit_information(fit: LensFit) -> Array:
 
 
 def _scaled_inverse(information: Array, fit: LensFit) -> Array:
-    """Of a matrix whose parameters have the scales of a fit's."""
+    """Invert an information matrix, scaled by a fit's parameter scales."""
     scale = 1.0 / np.sqrt(np.diag(_fit_information(fit)))
     outer = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(information * outer, rcond=1e-14, hermitian=True) * outer)
@@ -194,7 +196,7 @@ def _scaled_inverse(information: Array, fit: LensFit) -> Array:
 NOTABLE_ERROR_PX = 0.5  # Error bound that is worth reporting, in pixels.
 MAX_KNOWN_ERROR_PX = 3.0  # Error bound above which the camera counts as unknown, in pixels.
 MAX_FISHEYE_ANGLE = np.radians(85.0)
-"""Radians from a fisheye's axis; beyond, no accuracy is given."""
+"""Radians from a fisheye's axis up to which an accuracy is given."""
 
 
 class Promise:
@@ -235,7 +237,7 @@ class CalibrationAccuracy(Promise):
     Attributes:
         parts: the bound in each part of the image [pixels]; without parts that look farther than
             85 degrees off the axis all over.
-        unknown: share of the image where the bound is more than 3 pixels.
+        unknown: share of the image with a bound above 3 pixels.
     """
 
     parts: dict[str, float]
@@ -254,10 +256,10 @@ class CalibrationAccuracy(Promise):
 
     @property
     def error_bound(self) -> float:
-        """The largest bound of all other parts [pixels]; infinite if there are none."""
+        """The largest bound outside the excepted parts [pixels]; infinite if there are none."""
         excepted = self.excepted_parts
-        held = [bound for name, bound in self.parts.items() if name not in excepted]
-        return max(held, default=np.inf)
+        known_bounds = [bound for name, bound in self.parts.items() if name not in excepted]
+        return max(known_bounds, default=np.inf)
 
     def bound(self, name: str) -> str:
         """The bound of a part, as text."""
@@ -277,10 +279,10 @@ def calibration_accuracy(
     camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array
 ) -> CalibrationAccuracy:
     """The accuracy of a calibrated camera; see `camera_error`."""
-    # Columns and rows of the places where the error is computed.
+    # Columns and rows of the points where the error is computed.
     pixels = image_grid(camera, 17, 13)
     pixels = pixels[camera.rays(pixels)[:, 2] > np.cos(MAX_FISHEYE_ANGLE)]
-    if not len(pixels):  # of views that tell nothing
+    if not len(pixels):  # views without information
         return CalibrationAccuracy(dict.fromkeys(IMAGE_PARTS, np.inf), 1.0)
     error = camera_error(camera, hypotheses, corners, pixels)
     bound = np.nan_to_num(BOUND_SIGMAS * error, nan=np.inf)

@@ -29,15 +29,15 @@ from burg_drake.scene import marker_dictionary
 def write_target(
     target: CharucoTarget, path: str | Path, settings: PrintSettings | None = None
 ) -> Paper:
-    """Writes a target as a PDF of one page.
+    """Write a target as a PDF of one page.
 
     Args:
         target: to print.
         path: file to write.
-        settings: page and printer; A4 by default. Of these the height map and names do not count.
+        settings: page and printer; A4 by default. Height map and names are ignored.
 
     Returns:
-        The page, upright or across, whichever the target fits on.
+        The page, in portrait or landscape, whichever the target fits on.
 
     Raises:
         UnknownNameError: there is no such page.
@@ -45,7 +45,7 @@ def write_target(
     """
     settings = settings or PrintSettings()
     papers = page_orientations(settings.page, settings.margin, settings.measured)
-    # White around the squares. Beyond the room there is the margin, which is white, too.
+    # White around the squares, in addition to the white margin.
     needed = np.array(target.size) + 2.0 * 0.3 * target.square
     paper = next((p for p in papers if (needed <= np.array(p.room) + 1e-9).all()), None)
     if paper is None:
@@ -78,13 +78,13 @@ def write_target(
 
 
 def target_origin(target: CharucoTarget, paper: Paper) -> Array:
-    """(2,) where the target's origin is on the page, from its lower left corner [m]."""
-    spare = (np.array(paper.room) - target.size) / 2.0
-    return np.array(paper.lower) + spare + [0.0, target.size[1]]
+    """(2,) position of the target's origin from the lower left corner of the page [m]."""
+    margins = (np.array(paper.room) - target.size) / 2.0
+    return np.array(paper.lower) + margins + [0.0, target.size[1]]
 
 
 def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
-    """Black squares and markers; T has y down the page."""
+    """Draw black squares and markers; T has y down the page."""
     flip = np.array([1.0, -1.0])
     markers = np.asarray(target.board.getObjPoints())[:, 0, :2]
     white = {tuple(at) for at in np.floor(markers / target.square).astype(int).tolist()}

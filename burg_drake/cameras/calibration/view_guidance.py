@@ -28,11 +28,11 @@ from burg_drake.core import InvalidInputError, transform_points
 
 TILT_DIRECTIONS = {"left": (0, 1.0), "right": (0, -1.0), "up": (1, 1.0), "down": (1, -1.0)}
 """Axis and sign of the target's z axis in the camera frame when it faces a side."""
-MIN_GOOD_VIEWS = 10  # Views of a good calibration, at least.
+MIN_GOOD_VIEWS = 10  # Least number of views of a good calibration.
 
 
 def wanted_views(calibration: Calibration) -> tuple[str, ...]:
-    """What to do with the target, in a few words each; none if there are views enough."""
+    """Instructions for moving the target, in a few words each; none if there are enough views."""
     camera, accuracy = calibration.intrinsics, calibration.accuracy
     bound = accuracy.parts
     views = [used.view for used in calibration.views]
@@ -54,14 +54,14 @@ def wanted_views(calibration: Calibration) -> tuple[str, ...]:
 
 
 def _list_parts(names: Sequence[str], accuracy: CalibrationAccuracy) -> str:
-    """Parts of the image and what is known of them; the first is the worst."""
+    """Text that lists image parts with their error bounds, the worst first."""
     first, *others = names
     text = f"{first} of the image, where the error may be {accuracy.bound(first)} pixels"
     return ", ".join([text, *(f"then the {name} ({accuracy.bound(name)})" for name in others)])
 
 
 def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
-    """The sides to which the target was hardly tilted."""
+    """Instructions for tilts of the target that are missing among the views."""
     # Views tilted by less than 15 degrees hardly separate focal length from distance.
     tilted = [used.X_CT[:2, 2] for used in views if used.tilt > np.radians(15.0)]
     toward = np.array(tilted).reshape(-1, 2)
@@ -77,7 +77,7 @@ def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
 
 
 def _missing_distances(calibration: Calibration) -> list[str]:
-    """Whether the target was always as far away."""
+    """Whether all views show the target at about the same distance."""
     views, middle = calibration.views, np.array([*calibration.target.size, 0.0]) / 2.0
     places = transform_points(np.array([used.X_CT for used in views]), middle[None])
     distance = np.linalg.norm(places, axis=-1)
@@ -89,7 +89,7 @@ def _missing_distances(calibration: Calibration) -> list[str]:
 
 
 def calibration_advice(calibration: Calibration) -> list[str]:
-    """What would make a calibration better, a sentence each; empty if it is good."""
+    """Advice to improve a calibration, a sentence each; empty if it is good."""
     views, accuracy = calibration.views, calibration.accuracy
     lines = list(wanted_views(calibration))
     if len(views) < MIN_GOOD_VIEWS:
@@ -105,7 +105,7 @@ def calibration_advice(calibration: Calibration) -> list[str]:
 
 
 def is_useless(calibration: Calibration) -> bool:
-    """Images that this camera model is used for would be misread by pixels."""
+    """Whether the calibration is too inaccurate to be used."""
     accuracy = calibration.accuracy
     bounds = accuracy.parts.values()
     parts = sum(not bound <= MAX_KNOWN_ERROR_PX for bound in bounds) / len(bounds)
@@ -116,30 +116,32 @@ def is_useless(calibration: Calibration) -> bool:
 
 @dataclass(eq=False)
 class ViewCollector:
-    """Chooses views from frames.
+    """Selects views for a calibration from frames.
 
     Attributes:
         target: that the camera sees.
-        views: that were taken.
-        wanted: what to tell the one who holds the target.
-        enough: the views that were taken make a good calibration.
+        views: selected views.
+        wanted: instruction for the person who holds the target.
+        enough: the
+            selected views suffice for a good calibration.
     """
 
     target: CharucoTarget
     views: list[CharucoView] = field(default_factory=list)
     wanted: str = "show the target"
     enough: bool = False
-    _before: CharucoView | None = None
+    _previous_view: CharucoView | None = None
 
     def add_frame(self, frame: Frame) -> tuple[bool, str]:
-        """Looks at a frame, and takes it if it is a good, new view.
+        """Add a frame if it is a good, new view.
 
         Returns:
-            `(taken, word)`: whether it was taken, and what to tell the one who holds the target.
+            `(taken, word)`: whether it was added, and an instruction for the person who holds the
+            target.
         """
         name = f"view {len(self.views) + 1}"
         view = find_target(frame.image, self.target, name)
-        before, self._before = self._before, None if isinstance(view, str) else view
+        before, self._previous_view = self._previous_view, None if isinstance(view, str) else view
         if isinstance(view, str):
             return False, f"the image {view}"
         # Fraction of the diagonal between two frames; avoids blur and rolling shutter.
@@ -155,8 +157,8 @@ class ViewCollector:
         return True, self.wanted
 
     def _missing(self) -> tuple[str, bool]:
-        """What view is wanted next, and whether there are enough."""
-        if len(self.views) < 5:  # Views needed before missing ones can be named.
+        """Instruction for the next view, and whether there are enough views."""
+        if len(self.views) < 5:  # Number of views from which missing ones can be named.
             return "show the target from other sides, tilted by 20 to 45 degrees", False
         try:
             calibration = calibrate_views(self.views, self.target)

@@ -14,14 +14,14 @@ from burg_drake.core import Array, Indices
 
 @dataclass(frozen=True, eq=False)
 class DisplacementFit:
-    """A displacement that measurements agree on.
+    """A displacement fitted to measurements.
 
     Attributes:
         step: (3,) x, y [m] and angle [rad]; the angle is 0 where it is not fitted.
         covariance: (3, 3) of it.
-        weights: (N,) of the measurements, in [0, 1]; 0 for outliers.
-        scale: standard deviation of the measurements over what they claim.
-        sensitivity: (3, N) by how much each measurement moves the result.
+        weights: (N,) robust weights of the measurements, in [0, 1]; 0 for outliers.
+        scale: ratio of the measurements' actual to their stated standard deviation.
+        sensitivity: (3, N) derivatives of the step by each measurement.
     """
 
     step: Array
@@ -50,11 +50,12 @@ def fit_displacement(
             the sandwich of clustered errors [White 1980; Liang and Zeger 1986]: errors may be alike
             within a neighbourhood.
         symmetric: leave the angle out.
-        unit: (3,) typical sizes of the step's parts, against bad scaling.
-        nuisance: (N, M) what other unknowns, of mean 0 and standard deviation 1, add to `offset`.
+        unit: (3,) typical sizes of the step's parts, for good conditioning.
+        nuisance: (N, M) derivatives of `offset` by other unknowns, of mean 0 and standard deviation
+            1.
 
     Returns:
-        None if the measurements do not determine the step.
+        The fit, or None if the measurements do not determine the step.
     """
     used = [0, 1] if symmetric else [0, 1, 2]
     extra = np.empty((len(offset), 0)) if nuisance is None else nuisance
@@ -81,7 +82,7 @@ def fit_displacement(
 
 
 def _solve_robustly(A: Array, b: Array, prior: Array, n: int) -> tuple[Array, Array, float] | None:
-    """Solution, weights and scale of `A x = b`; None where its first `n` are not determined."""
+    """Solution, weights and scale of `A x = b`; None if its first `n` are not determined."""
     mad_to_sd = 1.4826  # Standard deviation over median absolute deviation of normal errors.
     if len(b) < 4 * n:
         return None
@@ -109,17 +110,17 @@ def _tukey_weights(residual: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """An object that was aligned.
+    """The alignment of an object with an image.
 
     Attributes:
         q: (3,) displacement, see `TargetShape.displacement`.
-        covariance: (3, 3) of `q`, but for the camera's error.
-        camera: (3, 6) by how much `q` changes with the camera's error, as in `BoardEstimate`.
-        agreement: share of what should be seen that the result agrees with.
-        coverage: share of all that was looked at that agrees, also of what cannot tell.
-        residual: root mean square that is left of what agrees; pixels, or metres for depth.
+        covariance: (3, 3) of `q`, without the camera's error.
+        camera: (3, 6) derivatives of `q` by the camera's error, as in `BoardEstimate`.
+        agreement: share of the measurements that should be visible and agree with the result.
+        coverage: share of all measurements that agrees, uninformative ones included.
+        residual: root mean square residual of the inliers; pixels, or metres for depth.
         ambiguous: another place fits almost as well.
-        equivalent_turns: turns from here that fit as well [rad]; see `add_rotation_ambiguity`.
+        equivalent_turns: turns from `q` that fit as well [rad]; see `add_rotation_ambiguity`.
     """
 
     q: Array
@@ -167,31 +168,32 @@ class Aligner(Protocol):
     def align(
         self, shape: TargetShape, q: Array, others: Array, *, far: bool = True, turn: bool = True
     ) -> Alignment | None:
-        """Aligns an object; None if the image does not determine where it is."""
+        """Align an object; None if the image does not determine its place."""
 
-    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """How well the colors of a displaced object agree, from 0 to 1; 0 for an image without,
-        0.5 for an object without."""
+    def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """Color similarity of a displaced object and the image, 0 to 1; 0 for an image without
+        colors, 0.5 for an object without.
+        """
 
-    def misfit(
+    def mismatch(
         self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
-        """What disagrees with an object at a displacement, and its silhouette [raster pixels]."""
+        """Area that disagrees with a displaced object, and its silhouette [raster pixels]."""
 
 
 def wrap_to_pi(angle: float) -> float:
-    """The same angle from -pi to pi [rad]."""
+    """Wrap an angle to -pi to pi [rad]."""
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def are_different_places(a: Alignment, b: Alignment) -> bool:
-    """Whether two alignments mean different places."""
+    """Whether two alignments are at different places."""
     turn = wrap_to_pi(a.q[2] - b.q[2])
     return bool(np.hypot(*(a.q - b.q)[:2]) > 0.003 or abs(turn) > np.deg2rad(5.0))
 
 
 def outline_sectors(contour: ImageContour) -> Indices:
-    """(N,) number of the neighbourhood around the outline that each point belongs to."""
+    """(N,) index of the sector around the outline that each point belongs to."""
     x, y = (contour.pixels - contour.pixels.mean(axis=0)).T if len(contour) else np.empty((2, 0))
     # Neighbouring points of a sector may have correlated errors.
     return np.floor(np.arctan2(y, x) / (2.0 * np.pi) * 36).astype(np.int64)

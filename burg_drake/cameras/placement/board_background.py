@@ -22,14 +22,14 @@ class EmptyBoard:
     Attributes:
         color: (H, W, 3) predicted linear light; only meaningful on the `sheet`. With tints of
             a height map if the photo shows them.
-        sheet: (H, W) pixels that see nothing but the sheet, were it empty.
+        sheet: (H, W) pixels that see only the sheet if it is empty.
         evidence: (H, W) from +1, where something stands, to -1, where the board is seen; 0 where
-            that cannot be told.
-        paper: (3,) light of paper without shadow, mean over the sheet.
-        contrast: paper less ink, mean over channels and sheet [full scale, linear].
+            unknown.
+        paper: (3,) mean light of unshadowed paper over the sheet.
+        contrast: paper minus ink, mean over channels and sheet [full scale, linear].
         blur: of the photo [pixels].
         noise: standard deviation of the photo's noise over paper [full scale, linear].
-        smear: how far evidence reaches beyond what stands there [pixels].
+        smear: distance by which evidence reaches beyond objects [pixels].
     """
 
     color: Single
@@ -50,7 +50,7 @@ def empty_board(
     scale: tuple[float, float] = (1.0, 1.0),
     tints: Bytes | None = None,
 ) -> EmptyBoard | None:
-    """Predicts the empty board.
+    """Predict the image of the empty board.
 
     Args:
         board: its markers must fit on it.
@@ -62,7 +62,7 @@ def empty_board(
             None without.
 
     Returns:
-        None if there is no contrast of paper and ink in the photo.
+        The prediction, or None if the photo has no contrast of paper and ink.
     """
     size = image.shape[1], image.shape[0]
     light = srgb_to_linear(image)
@@ -74,9 +74,9 @@ def empty_board(
     layout = board.layout
     density = sheet.sum() / max(float(np.prod(board.size)), 1e-9)
     cell = max(layout.side / layout.cells * float(np.sqrt(density)), 1.0)
-    soft = cv2.GaussianBlur(ink, (0, 0), BLUR_SIGMAS_PX[2])
+    blurred_ink = cv2.GaussianBlur(ink, (0, 0), BLUR_SIGMAS_PX[2])
     # Relative to paper, before it is measured in the photo.
-    pattern = compare_texture(light, soft, 0.06, cell)
+    pattern = compare_texture(light, blurred_ink, 0.06, cell)
     seen = sheet & (pattern > 0.3)  # The board's texture is seen.
     levels = _light_levels(light, ink, seen, p_S)
     if levels is None:
@@ -85,16 +85,18 @@ def empty_board(
     contrast = float((white[sheet] - white[sheet] * black).mean())
     if contrast < 0.02:  # Difference of paper and ink, as a fraction of full scale.
         return None
-    blur, soft = _estimate_blur(light, ink, seen, black)
+    blur, blurred_ink = _estimate_blur(light, ink, seen, black)
     printed = 1.0 - (1.0 - tint) * (1.0 - frames[..., None])
-    paper = white * (printed if _is_tinted(light, white, printed, seen & (soft < 0.05)) else 1.0)
-    color = (paper * (1.0 - soft[..., None] * (1.0 - black))).astype(np.float32)
+    paper = white * (
+        printed if _is_tinted(light, white, printed, seen & (blurred_ink < 0.05)) else 1.0
+    )
+    color = (paper * (1.0 - blurred_ink[..., None] * (1.0 - black))).astype(np.float32)
     stands = np.maximum(
         _color_evidence(light, tint, white), _brightness_evidence(light, color, white)
     )
-    unseen = -compare_texture(light, soft, float(black.mean()), cell)
+    unseen = -compare_texture(light, blurred_ink, float(black.mean()), cell)
     evidence = np.where(stands > 0.0, np.maximum(stands, unseen), unseen)
-    far = cv2.dilate((soft > 0.01).astype(np.uint8), np.ones((5, 5))) == 0
+    far = cv2.dilate((blurred_ink > 0.01).astype(np.uint8), np.ones((5, 5))) == 0
     noise = _paper_noise(light, seen & far)
     return EmptyBoard(
         color,
@@ -109,32 +111,34 @@ def empty_board(
 
 
 def _is_tinted(light: Single, white: Array, printed: Array, paper: Booleans) -> bool:
-    """Whether what may be tinted is so in the photo: whose tones fit better, paper's or tints'."""
+    """Whether the height map's tints are in the photo: whether its tones fit them better than
+    paper.
+    """
     here = paper & (np.ptp(printed, axis=-1) > 0.1)
     if here.sum() < 30:
         return False
     seen, full, tint = light[here], white[here], printed[here]
     seen = seen / full
     tone = seen / np.maximum(seen.sum(axis=1, keepdims=True), 1e-4)
-    off = np.abs(tone - 1.0 / 3.0).sum(axis=1)
+    deviation = np.abs(tone - 1.0 / 3.0).sum(axis=1)
     off_tint = np.abs(tone - tint / tint.sum(axis=1, keepdims=True)).sum(axis=1)
-    return bool(np.median(off_tint - off) < 0.0)
+    return bool(np.median(off_tint - deviation) < 0.0)
 
 
 def _paper_noise(light: Single, paper: Booleans) -> float:
-    """Standard deviation of the photo over paper."""
+    """Standard deviation of the photo's noise over paper."""
     if not paper.any():
         return 0.01
     rough = light[..., 1] - cv2.GaussianBlur(light[..., 1], (0, 0), 1.0)
-    # what this blur takes of white noise
+    # factor by which this blur reduces white noise
     return 1.19 * 1.4826 * float(np.median(np.abs(rough[paper])))
 
 
 def _light_levels(
     light: Single, ink: Array, board: Booleans, p_S: Array
 ) -> tuple[Array, Array] | None:
-    """(H, W, 3) light of paper without shadow, and (3,) that of ink over that of paper; None if too
-    little is in view.
+    """(H, W, 3) light of unshadowed paper, and (3,) the ratio of ink to paper; None if too little
+    of the board is in view.
 
     Args:
         light: (H, W, 3) of the photo.
@@ -148,7 +152,7 @@ def _light_levels(
         return None
     x, y = p_S[..., 0], p_S[..., 1]
     basis = np.stack([np.ones_like(x), x, y, x * y, x * x, y * y], axis=-1)
-    step = max(1, int(paper.sum()) // 20_000)  # Pixels of paper that are used, about.
+    step = max(1, int(paper.sum()) // 20_000)  # Approximate number of paper pixels that are used.
     white = _upper_surface(basis, basis[paper][::step], light[paper][::step])
     # light of ink over that of the paper around it, shadow or not
     around = cv2.blur(np.where(paper[..., None], light, np.float32(0.0)), (15, 15))
@@ -162,22 +166,24 @@ def _light_levels(
 
 
 def _upper_surface(basis: Array, A: Array, levels: Array) -> Array:
-    """(H, W, 3) a quadratic function of the place that runs along the upper rim of levels.
+    """(H, W, 3) a quadratic surface fitted to the upper envelope of levels.
 
     Args:
-        basis: (H, W, 6) of the functions.
-        A: (N, 6) at samples.
-        levels: (N, 3) of these.
+        basis: (H, W, 6) basis functions.
+        A: (N, 6) basis functions at the samples.
+        levels: (N, 3) light at the samples.
     """
     quantile = 0.75  # Fraction of samples that may be darker than unshadowed paper.
     mean = levels.mean(axis=1)
     fit = np.full(len(mean), np.quantile(mean, quantile))
     w = np.zeros(6)
     for columns in (1, 3, 3, 6, 6, 6, 6):
-        off = (mean - fit) / np.maximum(fit, 1e-3)
+        deviation = (mean - fit) / np.maximum(fit, 1e-3)
         # darker by a shadow, brighter only by noise: asymmetric weights, then far ones let go
-        weight = np.where(off > 0.0, quantile, 1.0 - quantile) / np.maximum(np.abs(off), 0.01)
-        weight *= (off > -0.3) & (off < 0.5)
+        weight = np.where(deviation > 0.0, quantile, 1.0 - quantile) / np.maximum(
+            np.abs(deviation), 0.01
+        )
+        weight *= (deviation > -0.3) & (deviation < 0.5)
         B = A[:, :columns]
         normal = (B * weight[:, None]).T @ B + 1e-3 * weight.sum() * np.eye(columns)
         normal[0, 0] -= 1e-3 * weight.sum()
@@ -196,9 +202,9 @@ def _ink_edges(ink: Array) -> Bytes:
 
 
 def _estimate_blur(light: Single, ink: Array, board: Booleans, black: Array) -> tuple[float, Array]:
-    """The blur under which the board fits the photo best, and (H, W) the ink under it.
+    """The blur under which the board fits the photo best, and (H, W) the blurred ink.
 
-    The light at an edge is that of the brightest pixel near it, as shadows may be anywhere.
+    The light at an edge is taken from the brightest nearby pixel, as shadows may be anywhere.
     """
     near = board & (cv2.dilate(_ink_edges(ink), np.ones((3, 3))) > 0)
     grey = light.mean(axis=-1)
@@ -206,31 +212,30 @@ def _estimate_blur(light: Single, ink: Array, board: Booleans, black: Array) -> 
     seen = (1.0 - grey[near] / np.maximum(around, 1e-4)) / (1.0 - float(black.mean()))
     best, chosen = (np.inf, 0.0), ink
     for blur in BLUR_SIGMAS_PX:
-        soft = cv2.GaussianBlur(ink, (0, 0), blur)
-        off = np.minimum(np.abs(seen - soft[near]), 0.2)
-        score = (float((off**2).mean()), blur)
+        blurred_ink = cv2.GaussianBlur(ink, (0, 0), blur)
+        error = np.minimum(np.abs(seen - blurred_ink[near]), 0.2)
+        score = (float((error**2).mean()), blur)
         if score < best:
-            best, chosen = score, soft
+            best, chosen = score, blurred_ink
     return best[1], chosen
 
 
 def project_print(
     board: Board, H_pixel_S: Array, size: tuple[int, int]
 ) -> tuple[Array, Array, Booleans]:
-    """(H, W) shares of ink and of markers' white frames in each pixel, and which pixels the sheet
-    fills."""
+    """(H, W) shares of ink and of white marker frames in each pixel, and pixels on the sheet."""
     texels_per_metre = 4000.0  # 22 for a cell of the default markers.
     oversampling = 3  # Samples per pixel of the photo, each way.
     rows, columns = (round(s * texels_per_metre) for s in board.size[::-1])
     texture = np.zeros((rows, columns), np.float32)
     frames = np.zeros((rows, columns), np.uint8)
     layout = board.layout
-    wide = frame_width(layout) * texels_per_metre
+    frame_texels = frame_width(layout) * texels_per_metre
     for corners, black in zip(layout.p_SQ, layout.black, strict=True):
         x, y = corners[0, 0] * texels_per_metre, rows - corners[0, 1] * texels_per_metre
         step = layout.side / layout.cells * texels_per_metre
         ends = (x, y), (x + layout.cells * step, y + layout.cells * step)
-        for edge, level in ((wide, 1), (0.0, 0)):
+        for edge, level in ((frame_texels, 1), (0.0, 0)):
             first, last = (
                 np.round(np.add(end, side * edge)).astype(int).tolist()
                 for end, side in zip(ends, (-1, 1), strict=True)
@@ -262,7 +267,7 @@ def project_print(
 def project_tints(
     board: Board, tints: Bytes | None, H_pixel_S: Array, size: tuple[int, int]
 ) -> Single:
-    """(H, W, 3) reflectance of what may be tinted, over that of paper."""
+    """(H, W, 3) reflectance of a height map's tints relative to paper."""
     if tints is None:
         return np.ones((*size[::-1], 3), np.float32)
     rows, columns = tints.shape[:2]
@@ -274,7 +279,7 @@ def project_tints(
 
 
 def _texel_coverage(start: float, step: float, cells: int, n: int) -> Array:
-    """(cells, n) share of each of `n` texels that lies in each cell of a row."""
+    """(cells, n) share of each of `n` texels covered by each cell of a row."""
     low = start + step * np.arange(cells)[:, None]
     texel = np.arange(n)
     cover: Array = np.minimum(low + step, texel + 1) - np.maximum(low, texel)
@@ -282,7 +287,7 @@ def _texel_coverage(start: float, step: float, cells: int, n: int) -> Array:
 
 
 def pixels_on_sheet(H_pixel_S: Array, size: tuple[int, int], sheet: tuple[float, float]) -> Array:
-    """(H, W, 2) where on the sheet each pixel looks, from -1 to 1 each way."""
+    """(H, W, 2) normalized sheet coordinates of each pixel, from -1 to 1."""
     u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     p = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(H_pixel_S).T
     places: Array = p[..., :2] / p[..., 2:] / np.array(sheet) * 2.0 - 1.0
@@ -294,16 +299,16 @@ MIN_WINDOW_SIGMA_PX = 2.0
 
 
 def window_sigma(cell: float) -> float:
-    """Standard deviation of the neighbourhood for cells of a size [pixels]."""
+    """Standard deviation of the neighbourhood for a cell size [pixels]."""
     # Standard deviation of the neighbourhood, in cells.
     return max(0.8 * cell, MIN_WINDOW_SIGMA_PX)
 
 
 def compare_texture(light: Single, ink: Array, black: float, cell: float) -> Array:
-    """Compares logarithms of a photo and of the board in neighbourhoods.
+    """Compare the texture of the photo with that of the board in neighbourhoods.
 
-    Of a photo of the board in any light their covariance is the variance of the board's, and of one
-    without the pattern it is 0.
+    The covariance of their logarithms is the variance of the board's in a photo of the board in any
+    light, and 0 in a photo without the pattern.
 
     Args:
         light: (H, W, 3) of the photo.
@@ -312,13 +317,13 @@ def compare_texture(light: Single, ink: Array, black: float, cell: float) -> Arr
         cell: side of a marker's cell [pixels].
 
     Returns:
-        (H, W) 1 where the board's pattern has its contrast, -1 where there is none, 0 in the
-        middle and where no pattern is expected.
+        (H, W) from 1, where the board's pattern has its full contrast, to -1, where it has none; 0
+        where no pattern is expected.
     """
     dark_offset = 0.02  # Fraction of paper's light added before the logarithm, against noise.
     sigma = window_sigma(cell)
     grey = light.mean(axis=-1)
-    # what paper gives around here, so that the offset is the same share in shade and sun
+    # local light of paper, so that the offset is the same share in shade and sun
     local = cv2.GaussianBlur(cv2.dilate(grey, np.ones((5, 5))), (0, 0), 2.0 * sigma)
     seen = np.log(grey / np.maximum(local, 1e-4) + dark_offset).astype(np.float32)
     known = np.log(1.0 - (1.0 - black) * ink + dark_offset).astype(np.float32)
@@ -340,12 +345,13 @@ def _ramp(values: Array, limits: tuple[float, float]) -> Array:
 
 
 def _color_evidence(light: Single, tone: Single, white: Array) -> Array:
-    """(H, W) 0 where grey light on paper, ink and tint, mixed as they like, explains the color.
+    """(H, W) 0 where grey light on any mixture of paper, ink and tint explains the color.
 
     Args:
         light: (H, W, 3) of the photo.
-        tone: (H, W, 3) reflectance of what may be tinted, over that of paper.
-        white: (H, W, 3) light of paper without shadow.
+        tone: (H, W, 3) reflectance of a height map's tints relative to paper.
+        white: (H, W, 3)
+            light of paper without shadow.
     """
     r = cv2.GaussianBlur(light, (0, 0), 0.8) / white.astype(np.float32)
     grey = np.float32(1.0 / np.sqrt(3.0))
@@ -355,18 +361,19 @@ def _color_evidence(light: Single, tone: Single, white: Array) -> Array:
     length = np.sqrt((across**2).sum(axis=-1))
     across /= np.maximum(length, 1e-6)[..., None]
     share = np.clip((r * across).sum(axis=-1), 0.0, None) * (length > 0.01)
-    # no more tinted than the tint is
+    # limited to the full tint
     most = length / np.maximum(tone.sum(axis=-1) * grey, 1e-6) * along
     share = np.minimum(share, most)
-    left = r - along[..., None] * grey - share[..., None] * across
-    off = np.sqrt((left**2).sum(axis=-1))
-    # Unexplained part of the light; in the dark, colors are noise and stray light.
-    return _ramp(off / (along + 0.06), (0.10, 0.22))
+    residual = r - along[..., None] * grey - share[..., None] * across
+    residual_length = np.sqrt((residual**2).sum(axis=-1))
+    # Unexplained part of the light. In the dark, colors are noise and stray light.
+    return _ramp(residual_length / (along + 0.06), (0.10, 0.22))
 
 
 def _brightness_evidence(light: Single, color: Single, white: Array) -> Array:
-    """(H, W) 0 where the board of a color (H, W, 3) could be as bright as the light; tolerates a
-    pixel of misalignment."""
+    """(H, W) 0 where the board's color (H, W, 3) explains the brightness, with a tolerance of one
+    pixel of misalignment.
+    """
     most = cv2.dilate(color.mean(axis=-1), np.ones((3, 3)))
-    # Light over that of the board; next to a bright pixel an edge's blur is not exact
+    # Ratio of the photo to the board; next to a bright pixel an edge's blur is not exact
     return _ramp(light.mean(axis=-1) / (most + 0.03 * white.mean(axis=-1)), (1.15, 1.45))

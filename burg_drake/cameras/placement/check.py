@@ -62,13 +62,13 @@ MIN_VISIBILITY = 0.4  # Visible fraction needed for a certain measurement.
 
 
 class Undistortion:
-    """Straightens the images of one camera; of a pinhole camera they stay as they are.
+    """Removes lens distortion from the images of one camera; pinhole images stay unchanged.
 
     Args:
-        intrinsics: of the camera; those of the straightened images have the same `K`. They show
-            less than the camera sees where its edges look far aside: the width over the focal
-            length decides, and of any fisheye it is less than 180 degrees. One of 1280 pixels, 430
-            a radian, sees 170 degrees across and keeps the middle 112.
+        intrinsics: of the camera; the undistorted images have the same `K`. A wide lens loses its
+            outer part, as the width over the focal length limits the field of view below 180
+            degrees. A fisheye of 1280 pixels, 430 per radian, sees 170 degrees across and keeps the
+            middle 112.
     """
 
     def __init__(self, intrinsics: Intrinsics) -> None:
@@ -82,13 +82,15 @@ class Undistortion:
             self._map = at[..., 0].copy(), at[..., 1].copy()
 
     def color(self, image: Bytes) -> Bytes:
-        """(H, W, 3); black beyond the given image."""
+        """Undistort a color image (H, W, 3); black outside the given image."""
         if self._map is None:
             return image
         return np.asarray(cv2.remap(image, *self._map, cv2.INTER_CUBIC))
 
     def depth(self, depth: Single) -> Single:
-        """(H, W); of the nearest pixel, as distances across an edge have no mean; 0 beyond."""
+        """Undistort a depth image (H, W) by nearest pixels, as depths across an edge cannot be
+        averaged; 0 outside.
+        """
         if self._map is None:
             return depth
         return np.asarray(cv2.remap(depth, *self._map, cv2.INTER_NEAREST))
@@ -103,15 +105,15 @@ def assess_placement(
     rough: float,
     typical: float,
 ) -> Placement:
-    """The entry of an object.
+    """Build the document's entry of an object.
 
     Args:
         scene: the targets.
         name: of the instance.
         shape: of the object.
-        found: what was found.
+        found: its location.
         camera: (6, 6) covariance of the camera's pose, NaN if unknown.
-        rough: residual of the alignment from which on it is another object's.
+        rough: residual of the alignment above which it is of another object.
         typical: likeness of the scene's objects in the photo, see `typical_likeness`.
     """
     missing = _missing_reason(found)
@@ -140,13 +142,15 @@ def assess_placement(
 
 
 def typical_likeness(located: Iterable[ObjectLocation]) -> float:
-    """Median likeness of the objects that were found; 0 of fewer than three."""
-    likeness = [f.likeness for f in located if f.alignment is not None and f.seen > MIN_VISIBILITY]
-    return float(np.median(likeness)) if len(likeness) > 2 else 0.0
+    """Median likeness of the objects that were found; 0 for fewer than three."""
+    color_similarity = [
+        f.color_similarity for f in located if f.alignment is not None and f.seen > MIN_VISIBILITY
+    ]
+    return float(np.median(color_similarity)) if len(color_similarity) > 2 else 0.0
 
 
 def unseen_placement(scene: Scene, name: str, reason: str, seen: float = 0.0) -> Placement:
-    """The entry of an object of which nothing can be said."""
+    """Build the document's entry of an object that was not measured."""
     instance = scene.instance(name)
     return Placement(
         object=instance.object,
@@ -158,7 +162,7 @@ def unseen_placement(scene: Scene, name: str, reason: str, seen: float = 0.0) ->
 
 
 def _missing_reason(found: ObjectLocation) -> str:
-    """Why an object is not seen; empty if it is."""
+    """Reason why an object is not seen; empty if it is."""
     if found.in_image < MIN_ABSENCE_VISIBILITY:
         return "it is out of view"
     if found.seen < MIN_ABSENCE_VISIBILITY:
@@ -171,7 +175,7 @@ def _missing_reason(found: ObjectLocation) -> str:
 def _doubt_reason(
     shape: TargetShape, found: ObjectLocation, deviation: Array, rough: float, typical: float
 ) -> str:
-    """What is doubtful about a measurement; empty if nothing is."""
+    """Reasons to doubt a measurement; empty if there are none."""
     alignment = found.alignment
     assert alignment is not None
     if alignment.agreement < 0.6:  # Fraction of the outline, or of the depth points, that must fit.
@@ -189,8 +193,8 @@ def _doubt_reason(
         return (
             "its outline does not quite match the image: is it another object, or in another pose?"
         )
-    # Colors of meshes can be relied on if most objects of the scene look like theirs.
-    if shape.colors is not None and found.likeness < 0.4 * typical and typical > 0.6:
+    # Mesh colors are reliable if most objects of the scene match theirs.
+    if shape.colors is not None and found.color_similarity < 0.4 * typical and typical > 0.6:
         return "it does not have the colors of its mesh: is it another object?"
     if found.spill > 0.35:  # Fraction around the silhouette with evidence of something else.
         return "something sticks out next to it: is it another object, or in another pose?"
@@ -277,7 +281,7 @@ def _measure_objects(
     estimate: BoardEstimate,
     scale: tuple[float, float],
 ) -> tuple[dict[str, Placement], tuple[ExtraObject, ...], str]:
-    """Placements by name; what else stands there; and why nothing was measured, if so."""
+    """Placements by name, extra objects, and the reason if nothing was measured."""
     aligner = _build_aligner(scene, color, depth, intrinsics, estimate, scale)
     if isinstance(aligner, str):
         names = (*scene.instances, *scene.background)
@@ -321,7 +325,7 @@ def _build_aligner(
     estimate: BoardEstimate,
     scale: tuple[float, float],
 ) -> Aligner | str:
-    """What objects are aligned by; or why nothing can be measured."""
+    """The aligner, or the reason why nothing can be measured."""
     if not estimate.valid:
         return f"the board was not found: {estimate.reason}" if estimate.reason else "no board"
     size = intrinsics.width, intrinsics.height
@@ -344,7 +348,7 @@ def _height_map_tints(scene: Scene) -> Bytes:
 
 
 def _blind_pixels(straight: Undistortion, size: tuple[int, int]) -> Booleans:
-    """(H, W) pixels of a straight image that are beyond the given one, or next to these."""
+    """(H, W) pixels of an undistorted image outside the given one, or next to such pixels."""
     beyond = straight.depth(np.ones(size[::-1], np.float32)) == 0.0
     return np.asarray(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)
 

@@ -65,7 +65,7 @@ class DepthAligner:
         depth: (H, W) without lens distortion [m]; 0 where there is nothing.
 
     Attributes:
-        noise_sd: standard deviation of the heights of what lies on the board [m].
+        noise_sd: standard deviation of the heights of the board's surface [m].
     """
 
     def __init__(self, view: PinholeView, depth: Single) -> None:
@@ -86,7 +86,7 @@ class DepthAligner:
         self.noise_sd = max(spread, min_noise)
         # Metres. Fits of the right object leave less.
         self.residual_floor, self.max_residual = self.noise_sd, 0.005
-        self._stands = self._valid & (height > MIN_HEIGHT_SIGMAS * self.noise_sd)
+        self._above_board = self._valid & (height > MIN_HEIGHT_SIGMAS * self.noise_sd)
         evidence = np.clip(height / (MIN_HEIGHT_SIGMAS * self.noise_sd), 0.0, 1.0) * 2.0 - 1.0
         self.sees_colors, self.smear = False, 0.0
         self.evidence = np.where(self._valid, evidence, 0.0)
@@ -112,50 +112,54 @@ class DepthAligner:
         assert best is not None
         return best[0].result(q, best[1])
 
-    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """Depth has no colors."""
+    def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """0, as depth has no colors."""
         return 0.0
 
-    def misfit(
+    def mismatch(
         self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
-        """See `SilhouetteAligner.misfit`: distances that the object or the empty board has not."""
+        """Area with depths of neither the object nor the empty board; see
+        `SilhouetteAligner.mismatch`.
+        """
         surface_tolerance = 4e-3  # Metres beyond noise within which a pixel belongs to the surface.
         at = window.pixels()
         own = self.view.hits(shape, q, at)[1]
         seen, hides = sample_nearest(self._depth, at, 0.0), sample_nearest(others, at, 0.0)
         covered = np.isfinite(own)
         tolerance = MIN_HEIGHT_SIGMAS * self.noise_sd + surface_tolerance
-        off = np.abs(seen - np.where(covered, own, 0.0)) > tolerance
-        wrong = np.where(covered, off, sample_nearest(self._stands, at, 0.0) > 0.0)
-        # nothing can be said where another object is, unless this one stands clearly before it
+        depth_differs = np.abs(seen - np.where(covered, own, 0.0)) > tolerance
+        wrong = np.where(covered, depth_differs, sample_nearest(self._above_board, at, 0.0) > 0.0)
+        # pixels of another object count only where this one is clearly in front
         free = np.isinf(hides) | (covered & (hides > own + surface_tolerance))
         wrong &= (seen > 0.0) & free
         return float(wrong.sum()), float(covered.sum())
 
     def points(self, shape: TargetShape, q: Array, others: Array) -> tuple[Array, Booleans]:
-        """Points (N, 3) in S that stand near to a displaced object and belong to no other, and
-        which (N,) of them its silhouette covers."""
+        """Points (N, 3) in S near a displaced object and of no other object, and (N,) whether its
+        silhouette covers them.
+        """
         window = self.view.window(shape, q, 12.0)
         part = window_slices(window)
-        free = self._stands[part] & ~(np.abs(others[part] - self._depth[part]) < 0.01)
+        free = self._above_board[part] & ~(np.abs(others[part] - self._depth[part]) < 0.01)
         free &= ~(others[part] < self._depth[part])
         covered = np.isfinite(self.view.buffer(shape, q, window))
         p_SQ, inside = self._p_SQ[part][free], covered[free]
-        step = max(1, len(p_SQ) // 4000)  # Points that are used, about.
+        step = max(1, len(p_SQ) // 4000)  # Approximate number of points that are used.
         return p_SQ[::step], inside[::step]
 
     def expected(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """Share of the pixels in a displaced object's silhouette, and seen, that stand up."""
+        """Share of visible pixels in a displaced object's silhouette that are above the board."""
         window = self.view.window(shape, q, 1.0)
         part = window_slices(window)
         mask = (self.view.buffer(shape, q, window) < others[part]) & self._valid[part]
-        return float(self._stands[part][mask].mean()) if mask.any() else 0.0
+        return float(self._above_board[part][mask].mean()) if mask.any() else 0.0
 
     def edges(self, contour: ImageContour, others: Array) -> tuple[Array, Booleans]:
-        """Where on the normals of an outline (N,) the depth falls off [pixels], and where it does.
+        """(N,) distance along the outline's normals to the depth edge [pixels], and whether there
+        is one.
 
-        Only a fall from the outline's own depth to something clearly farther counts.
+        Only steps from the outline's own depth to clearly larger depth count.
         """
         min_depth_step = 0.012  # Metres from an outline to the surface behind it.
         search_distance = 6.0  # Pixels on both sides of the outline.
@@ -166,7 +170,7 @@ class DepthAligner:
         near = p_CQ[:, 2:]
         own = (depth > 0.0) & (depth < near + min_depth_step / 2) & (depth > near - 0.03)
         behind = depth > near + min_depth_step
-        count = np.cumprod(own, axis=1).sum(axis=1)  # samples from the inside on that are its own
+        count = np.cumprod(own, axis=1).sum(axis=1)  # inner samples at its own depth
         at = np.minimum(count, len(t) - 1)
         falls = (count > 4) & (count < len(t) - 4) & behind[np.arange(len(count)), at]
         falls &= ~np.isfinite(sample_nearest(others, points, np.inf)).any(axis=1)
@@ -174,13 +178,12 @@ class DepthAligner:
 
 
 class _DepthMeasurements:
-    """What a depth image says about an object at a displacement."""
+    """Measurements of a displaced object in a depth image."""
 
     def __init__(
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array, limit: float
     ) -> None:
         self._shape, self._noise = shape, aligner.noise_sd
-        self._share = aligner.expected(shape, q, others)
         X_SS = shape.displacement(q)
         points, covered = aligner.points(shape, q, others)
         self._count = int(covered.sum())
@@ -216,7 +219,7 @@ class _DepthMeasurements:
     def _add_outline(
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array
     ) -> None:
-        """Measurements of the outline, in metres at the object, after those of the surface."""
+        """Append measurements of the outline, in metres at the object."""
         contour = visible_outline(aligner.view, shape, q, others)
         offset, falls = aligner.edges(contour, others)
         p_CQ, _ = aligner.view.project(contour.p_SQ[falls])
@@ -230,7 +233,7 @@ class _DepthMeasurements:
         self._groups = np.concatenate([self._groups, 100_000 + outline_sectors(contour)[falls]])
 
     def solve(self, turn: bool) -> DisplacementFit | None:
-        """The step that the measurements ask for."""
+        """Fit the step to the measurements."""
         if len(self._offset) < 30:
             return None
         reach = float(np.linalg.norm(np.ptp(self._shape.p_SV[:, :2], axis=0))) / 2
@@ -241,9 +244,9 @@ class _DepthMeasurements:
         )
 
     def result(self, q: Array, solved: DisplacementFit) -> Alignment:
-        """The outcome, with the last step taken."""
-        left = (self._offset - self._along @ solved.step)[: self._surface_points]
-        fits = np.abs(left) < 4.0 * self._noise + 2e-3
+        """Build the alignment, with the last step applied."""
+        residual = (self._offset - self._along @ solved.step)[: self._surface_points]
+        fits = np.abs(residual) < 4.0 * self._noise + 2e-3
         share = self._fits / max(self._count, 1) * (fits.mean() if len(fits) else 0.0)
         return Alignment(
             q,
@@ -251,5 +254,5 @@ class _DepthMeasurements:
             solved.sensitivity @ self._camera,
             float(share),
             float(share),
-            float(np.sqrt(np.mean(left[fits] ** 2))) if fits.any() else float("nan"),
+            float(np.sqrt(np.mean(residual[fits] ** 2))) if fits.any() else float("nan"),
         )

@@ -186,7 +186,7 @@ def save_placement(check: PlacementCheck, path: str | Path) -> None:
 
 
 def _scene_reference(path: Path, folder: Path) -> str:
-    """What a file in a folder calls a scene: a bare name for those that come along, else a path."""
+    """Reference to a scene from a file in a folder: the name of a built-in scene, else a path."""
     try:
         if resolve_reference(path.stem, "scenes").samefile(path):
             return path.stem
@@ -210,17 +210,17 @@ def describe_image_file(path: str | Path) -> CheckedImage:
 
 
 def camera_versions() -> dict[str, str]:
-    """Versions of what decides about a placement check."""
+    """Versions of the packages that affect a placement check."""
     return software_versions(PLACEMENT_PACKAGES, with_platform=False)
 
 
 def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
-    """One check of several, of photos that show the same objects on the same places.
+    """Combine checks of several photos of the same objects at the same places.
 
-    An object is where the photos that measured it say, weighted by their variances per coordinate;
-    if these contradict each other, or one shows that it is not there, it is `uncertain`. One that
-    no photo measured is as the photo says that knows most. Extra objects are those that half of the
-    photos show. The camera, and the first image, are those of the first check.
+    An object's displacement is the mean over the photos that measured it, weighted by variance per
+    coordinate. It is `uncertain` if photos contradict each other or one shows the object's absence.
+    For an object that no photo measured, the most informative photo counts. Extra objects are those
+    that half of the photos show. Camera and first image are those of the first check.
 
     Args:
         checks: at least one.
@@ -250,12 +250,12 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
 def _combine_placements(placements: list[Placement]) -> Placement:
     found = _mean_placement(placements)
     # Visible fraction for which an object's absence counts.
-    gone = [p for p in placements if p.status == "not_seen" and p.seen >= 0.5]
-    if found.status != "measured" or not gone:
+    absent = [p for p in placements if p.status == "not_seen" and p.seen >= 0.5]
+    if found.status != "measured" or not absent:
         return found
-    shown = f"{len(gone)} of {len(placements)} photos show"
+    shown = f"{len(absent)} of {len(placements)} photos show"
     return replace(
-        found, status="uncertain", reason=f"{shown} that it is not there: {gone[0].reason}"
+        found, status="uncertain", reason=f"{shown} that it is not there: {absent[0].reason}"
     )
 
 
@@ -269,16 +269,16 @@ def _mean_placement(placements: list[Placement]) -> Placement:
     weight = sd**-2.0
     mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
     mean_sd = weight.sum(axis=0) ** -0.5
-    off = np.abs(values - mean)
+    deviation = np.abs(values - mean)
     # A photo farther from the mean of all contradicts it.
-    contradicts = bool((off > 4.0 * np.sqrt(np.maximum(sd**2 - mean_sd**2, 1e-18))).any())
+    contradicts = bool((deviation > 4.0 * np.sqrt(np.maximum(sd**2 - mean_sd**2, 1e-18))).any())
     if contradicts:
-        mean_sd = np.maximum(mean_sd, off.max(axis=0))
+        mean_sd = np.maximum(mean_sd, deviation.max(axis=0))
     best = max(measured, key=_information_rank)
     turned = best.angle is not None
-    reason = f"the photos disagree by {1e3 * off[:, :2].max():.1f} mm" if contradicts else ""
+    reason = f"the photos disagree by {1e3 * deviation[:, :2].max():.1f} mm" if contradicts else ""
     if contradicts and turned:
-        reason += f" and {np.rad2deg(off[:, 2].max()):.1f} deg"
+        reason += f" and {np.rad2deg(deviation[:, 2].max()):.1f} deg"
     angle = float((mean[2] + np.pi) % (2.0 * np.pi) - np.pi)
     return replace(
         best,
@@ -294,7 +294,7 @@ def _mean_placement(placements: list[Placement]) -> Placement:
 
 
 def _information_rank(placement: Placement) -> tuple[int, float]:
-    """How much a placement tells: its status, then how exact it is, or how much was seen."""
+    """Rank of a placement's information: its status, then its accuracy, or visible share."""
     rank = {"measured": 2, "uncertain": 1, "not_seen": 0}[placement.status]
     if placement.displacement_sd is None:
         return rank, placement.seen
@@ -302,7 +302,7 @@ def _information_rank(placement: Placement) -> tuple[int, float]:
 
 
 def _displacement_and_sd(placement: Placement) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """x, y [m] and angle [rad], and their standard deviations; angle 0 ± 1 where there is none."""
+    """x, y [m] and angle [rad], and their standard deviations; angle 0 ± 1 if there is none."""
     assert placement.displacement is not None
     assert placement.displacement_sd is not None
     sd = 1.0 if placement.angle_sd is None else placement.angle_sd
@@ -322,7 +322,7 @@ def _merge_extra_objects(extra: list[ExtraObject], photos: int) -> tuple[ExtraOb
     """Extra objects that half of the photos show, each once."""
     groups: list[list[ExtraObject]] = []
     for one in extra:
-        # Metres within which extra objects are one.
+        # Metres within which extra objects are the same.
         near = (g for g in groups if np.hypot(*np.subtract(one.position, g[0].position)) < 0.05)
         group = next(near, None)
         if group is None:

@@ -30,17 +30,17 @@ MIN_OBJECT_SUPPORT = 0.35
 
 @dataclass(frozen=True, eq=False)
 class ObjectLocation:
-    """What became of one object.
+    """The location of one object.
 
     Attributes:
         alignment: where it is; None if nothing was found.
         in_image: share of its silhouette that is in the image.
-        seen: share that is in the image and not hidden by other objects; of an object that was not
-            found, at its target.
+        seen: share that is in the image and not hidden by other objects; at the target if the
+            object was not found.
         support: mean evidence in the silhouette, where there is any, in [-1, 1].
-        spill: how much stands around the silhouette that no object explains, as a share of what is
-            looked at there.
-        likeness: of its colors to those of its mesh, from 0 to 1; 0.5 where either has none.
+        spill: share of the evidence around the silhouette that shows something else than known
+            objects.
+        likeness: color similarity of photo and mesh, from 0 to 1; 0.5 if either has no colors.
     """
 
     alignment: Alignment | None
@@ -48,11 +48,11 @@ class ObjectLocation:
     seen: float
     support: float
     spill: float
-    likeness: float
+    color_similarity: float
 
 
 def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str, ObjectLocation]:
-    """Finds and aligns the objects of a scene.
+    """Find and align the objects of a scene.
 
     Args:
         aligner: of the image.
@@ -61,12 +61,14 @@ def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str
     q = assign_candidates(aligner, shapes, {})
     aligned: dict[str, Alignment] = {}
     _align_objects(aligner, shapes, q, aligned, list(q), far=True)
-    # one that took another's place left that one without, and itself fits badly
-    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < 0.7]
-    if weak:
-        before = {name: (aligned.pop(name), q.pop(name)) for name in weak if name in aligned}
+    # an object found in another's place fits badly, and the other was not found
+    poorly_aligned = [n for n in shapes if n not in aligned or aligned[n].agreement < 0.7]
+    if poorly_aligned:
+        before = {
+            name: (aligned.pop(name), q.pop(name)) for name in poorly_aligned if name in aligned
+        }
         placed = {name: (shapes[name], alignment.q) for name, alignment in aligned.items()}
-        found = assign_candidates(aligner, {name: shapes[name] for name in weak}, placed)
+        found = assign_candidates(aligner, {name: shapes[name] for name in poorly_aligned}, placed)
         q |= found
         _align_objects(aligner, shapes, q, aligned, list(found), far=True)
         for name, (alignment, start) in before.items():
@@ -85,7 +87,7 @@ def _align_objects(
     *,
     far: bool,
 ) -> None:
-    """Aligns objects, from their candidates or where they are; leaves out what fails."""
+    """Align objects from their candidates or current places; leave out failures."""
     for name in names:
         others = _depth_of_others(aligner.view, shapes, q, name)
         starts = q[name] if far else _nudged_starts(shapes[name], aligned[name])
@@ -100,8 +102,9 @@ def _align_objects(
 
 
 def _nudged_starts(shape: TargetShape, found: Alignment) -> list[Array]:
-    """Where to begin the last alignment: where an object was found, and turned a little from there
-    if not all fits, as outlines catch on wrong edges."""
+    """Starts of the last alignment: the current one, and small turns from it if not all of the
+    outline fits, as outlines may lock on wrong edges.
+    """
     # With less, the alignment may have caught on a wrong edge.
     if shape.symmetric or found.agreement > 0.93:
         return [found.q]
@@ -111,14 +114,14 @@ def _nudged_starts(shape: TargetShape, found: Alignment) -> list[Array]:
 def _depth_of_others(
     view: PinholeView, shapes: dict[str, TargetShape], q: dict[str, list[Array]], name: str
 ) -> Array:
-    """(H, W) depth of all objects that were found but one."""
+    """(H, W) depth of all objects that were found except one."""
     return view.depth((shapes[other], q[other][0]) for other in q if other != name)
 
 
 def best_alignment(
     aligner: Aligner, shape: TargetShape, starts: list[Array], others: Array, far: bool
 ) -> Alignment | None:
-    """The alignment that agrees best with the image; if several do, near the target's angle."""
+    """The alignment that agrees best with the image; among equals, near the target's angle."""
     rated: list[tuple[float, Alignment]] = []
     for start in starts:
         found = aligner.align(shape, start, others, far=far)
@@ -126,7 +129,7 @@ def best_alignment(
             continue
         support, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
         rating = found.agreement + found.coverage + support
-        rating += aligner.likeness(shape, found.q, others)
+        rating += aligner.color_similarity(shape, found.q, others)
         rating -= _depth_disagreement(aligner, shape, found.q, others)
         if abs(wrap_to_pi(found.q[2])) > LARGE_TURN:
             rating -= aligner.required_gain
@@ -146,8 +149,9 @@ def best_alignment(
 
 
 def _least_turned(shape: TargetShape, q: Array) -> Array:
-    """Of the displacements that look like this one, as a box's does after half a turn, the one
-    nearest to the target's angle."""
+    """Among displacements that look the same, as a box after half a turn, the one nearest to the
+    target's angle.
+    """
     alike = [q]
     for quarter in (1, 2, 3) if abs(wrap_to_pi(q[2])) > LARGE_TURN else ():
         other = q + np.array([0.0, 0.0, quarter * np.pi / 2])
@@ -158,13 +162,14 @@ def _least_turned(shape: TargetShape, q: Array) -> Array:
 
 
 def _depth_disagreement(aligner: Aligner, shape: TargetShape, q: Array, others: Array) -> float:
-    """How much of an image of distances disagrees, as a share of the silhouette; 0 for a photo,
-    where shadows and other things stand out as well."""
+    """Area of a depth image that disagrees, relative to the silhouette; 0 for a photo, where
+    shadows disagree as well.
+    """
     if not aligner.checks_depth:
         return 0.0
     # Width of the compared rim, as a fraction of the image's width.
     window = aligner.view.window(shape, q, 0.04 * aligner.view.size[0])
-    wrong, area = aligner.misfit(shape, q, others, window)
+    wrong, area = aligner.mismatch(shape, q, others, window)
     return min(wrong / max(area, 1.0), 1.0)
 
 
@@ -191,15 +196,15 @@ def _build_located(
     ring = (away > near) & (away < near + ring_width) & ~np.isfinite(others[part])
     around = aligner.evidence[part][ring]
     spill = float(np.maximum(around, 0.0).sum() / max(np.abs(around).sum(), 1.0))
-    alike = aligner.likeness(shape, at, others) if aligner.sees_colors else 0.5
-    return ObjectLocation(alignment, in_image, seen, support, spill, alike)
+    likeness = aligner.color_similarity(shape, at, others) if aligner.sees_colors else 0.5
+    return ObjectLocation(alignment, in_image, seen, support, spill, likeness)
 
 
 _POSITIVE_TURNS = np.deg2rad((8.0, 15.0, 25.0, 40.0, 60.0, 85.0, 110.0, 135.0, 160.0))  # Radians.
 AMBIGUITY_TEST_ANGLES = np.concatenate(
     [np.stack([_POSITIVE_TURNS, -_POSITIVE_TURNS], axis=1).ravel(), [np.pi]]
 )
-"""Radians by which an object is turned to see whether it fits as well."""
+"""Radians by which an object is turned to test for rotational ambiguity."""
 TURNING_SHIFT = 0.025
 """Metres by which an object may shift while it is turned."""
 
@@ -207,7 +212,7 @@ TURNING_SHIFT = 0.025
 def add_rotation_ambiguity(
     aligner: Aligner, shape: TargetShape, found: Alignment, others: Array
 ) -> Alignment:
-    """The alignment, told in how many other angles the object fits as well.
+    """The alignment with all other angles at which the object fits as well.
 
     Args:
         aligner: of the image.
@@ -218,22 +223,22 @@ def add_rotation_ambiguity(
     if shape.symmetric:
         return found
     window = _turning_window(aligner.view, shape, found.q)
-    least, area = aligner.misfit(shape, found.q, others, window)
+    least, area = aligner.mismatch(shape, found.q, others, window)
     # Disagreement that still fits as well; 12 pixels of an image 640 wide.
-    slack = 0.01 * area + 12.0 * (aligner.view.size[0] / 640) ** 2 * window.scale**2
+    tolerance = 0.01 * area + 12.0 * (aligner.view.size[0] / 640) ** 2 * window.scale**2
     evidence = np.where(np.isfinite(others), 0.0, aligner.evidence)
     search = SilhouetteSearch(aligner.view, shape, evidence)
     fitting = []
     for turn in AMBIGUITY_TEST_ANGLES:
-        q = search.shifted(found.q + np.array([0.0, 0.0, turn]), TURNING_SHIFT)
-        more = aligner.misfit(shape, q, others, window)[0] - least
-        if more > 2.0 * slack:  # Multiple of the slack before the exact place is known.
+        q = search.best_displacement(found.q + np.array([0.0, 0.0, turn]), TURNING_SHIFT)
+        more = aligner.mismatch(shape, q, others, window)[0] - least
+        if more > 2.0 * tolerance:  # Multiple of the tolerance before the exact place is known.
             continue
         exact = aligner.align(shape, q, others, far=False, turn=False)
         if exact is None:
             continue
-        more = aligner.misfit(shape, exact.q, others, window)[0] - least
-        worse = max(more, 0.0) / slack + _fit_loss(found, exact, aligner.residual_floor)
+        more = aligner.mismatch(shape, exact.q, others, window)[0] - least
+        worse = max(more, 0.0) / tolerance + _fit_loss(found, exact, aligner.residual_floor)
         if worse < 1.0 and not shape.looks_alike(found.q, exact.q):
             fitting.append(exact.q - found.q)
     if not fitting:
@@ -244,7 +249,7 @@ def add_rotation_ambiguity(
 
 
 def _fit_loss(found: Alignment, other: Alignment, fine: float) -> float:
-    """By how much another alignment fits the image worse; 1 where that is no chance any more."""
+    """How much worse another alignment fits the image; 1 is significant."""
     missing = max(found.coverage - other.coverage, found.agreement - other.agreement, 0.0)
     rougher = other.residual / max(found.residual, fine) - 1.0
     # A loss of agreement of 0.1, or residuals larger by half, tell two angles apart.
@@ -252,7 +257,7 @@ def _fit_loss(found: Alignment, other: Alignment, fine: float) -> float:
 
 
 def _turning_window(view: PinholeView, shape: TargetShape, q: Array) -> ImageWindow:
-    """A raster of all that the object may cover while it is turned."""
+    """An image window of all that the object may cover while it is turned."""
     distance = np.linalg.norm(shape.p_SV[:, :2] - shape.p_SR[:2], axis=1)
     reach = float(distance.max()) + TURNING_SHIFT / 2
     top = float(shape.p_SV[:, 2].max())

@@ -34,26 +34,26 @@ def find_exchanged_objects(
     located: dict[str, ObjectLocation],
     doubtful: list[str],
 ) -> tuple[dict[str, tuple[str, Placed]], set[str]]:
-    """Which object stands in the place of which, and where exactly.
+    """Find objects that stand in other objects' places.
 
     Args:
         aligner: of the image.
         shapes: the objects by name.
         located: what was found.
-        doubtful: names of those that were not found for sure, the only ones looked at.
+        doubtful: names of the objects that were not found reliably; only they are tested.
 
     Returns:
-        By the name of the place: the name of what stands there, its shape as if that were its
-        target, and its displacement from there. And the names of places in which their own objects
-        do not stand, but others of the scene may that were not found anywhere.
+        By the name of the place: name of the object that stands there, its shape with the place as
+        target, and its displacement from it. And the names of places that are without their own
+        objects, but may hold other objects of the scene that were not found.
     """
-    sure = {
+    reliable = {
         name: (shapes[name], found.alignment.q)
         for name, found in located.items()
         if name not in doubtful and found.alignment is not None
     }
-    others = aligner.view.depth(sure.values())
-    evidence = unexplained_evidence(aligner, sure)
+    others = aligner.view.depth(reliable.values())
+    evidence = unexplained_evidence(aligner, reliable)
     own = {
         name: _score_fit(aligner, shapes[name], located[name].alignment, others)
         for name in doubtful
@@ -77,13 +77,13 @@ def find_exchanged_objects(
         if place not in stands and name not in {other for other, _ in stands.values()}:
             stands[place] = name, placed
     elsewhere = {name for name, _ in stands.values()}
-    lost = {name for name in doubtful if not own[name].good} - elsewhere
-    empty = {place for place in lost | elsewhere if place not in stands and lost - {place}}
+    missing = {name for name in doubtful if not own[name].good} - elsewhere
+    empty = {place for place in missing | elsewhere if place not in stands and missing - {place}}
     return stands, empty
 
 
 def shape_at_place(shape: TargetShape, place: TargetShape) -> TargetShape:
-    """An object as if its target were where another one's reference point belongs."""
+    """Move an object's target to the reference point of another object's target."""
     X_SO = shape.X_SO.copy()
     X_SO[:2, 3] += (place.p_SR - shape.p_SR)[:2]
     return replace(shape, X_SO=X_SO)
@@ -95,8 +95,8 @@ class _FitScore:
 
     Attributes:
         total: agreement, evidence and likeness together.
-        good: none of them is too low.
-        shown: share of its outline that is seen and agrees.
+        good: each of them is high enough.
+        shown: share of its outline that is visible and agrees.
     """
 
     total: float = 0.0
@@ -110,12 +110,12 @@ def _score_fit(
     if found is None:
         return _FitScore()
     filled, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
-    alike = aligner.likeness(shape, found.q, others)
+    likeness = aligner.color_similarity(shape, found.q, others)
     # Likeness of colours, where they are known.
-    colored = alike > 0.4 or not aligner.sees_colors or shape.colors is None
+    colored = likeness > 0.4 or not aligner.sees_colors or shape.colors is None
     _, seen = aligner.view.seen(shape, found.q, others)
     return _FitScore(
-        float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike,
+        float(np.clip(found.agreement, 0.0, 1.0)) + filled + likeness,
         found.agreement >= 0.7 and filled >= 0.6 and colored,
         found.coverage * seen,
     )
@@ -124,13 +124,13 @@ def _score_fit(
 def find_extra_objects(
     aligner: Aligner, placed: Iterable[Placed], p_SR: Sequence[Array] = ()
 ) -> tuple[ExtraObject, ...]:
-    """What none of the objects explains, the largest first.
+    """Find objects outside the scene by unexplained evidence, the largest first.
 
     Args:
         aligner: of the image.
-        placed: all objects that were found, where they are.
-        p_SR: (3,) places where another object of the scene may stand that was not found anywhere.
-            Nothing there counts, as it may be that one.
+        placed: all objects that were found, with their displacements.
+        p_SR: (3,) places where an object of the scene that was not found may stand. Evidence there
+            is ignored.
     """
     view, placed = aligner.view, list(placed)
     # Pixels per metre of the board, in the middle of the image.
@@ -144,7 +144,7 @@ def find_extra_objects(
     size = max(2 * round(MIN_EXTRA_WIDTH * pitch / 2) + 1, 3)
     disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     stands = cv2.morphologyEx(stands.astype(np.uint8), cv2.MORPH_OPEN, disk)
-    size = 2 * round(0.02 * pitch / 2) + 1  # Metres within which regions are one object.
+    size = 2 * round(0.02 * pitch / 2) + 1  # Metres within which regions belong to one object.
     count, labels = cv2.connectedComponents(cv2.dilate(stands, np.ones((size, size), np.uint8)))
     hidden = _HiddenBoard(aligner, placed)
     found = [_describe_region(view, (labels == k) & (stands > 0), hidden) for k in range(1, count)]
@@ -159,52 +159,53 @@ def find_extra_objects(
 
 
 class _HiddenBoard:
-    """Where things may stand behind objects that were found."""
+    """The board's area hidden behind objects that were found."""
 
     def __init__(self, aligner: Aligner, placed: list[Placed]) -> None:
         self._view = aligner.view
         stands = aligner.evidence > MIN_EXTRA_EVIDENCE
         self._covered = np.isfinite(self._view.depth(placed)) | stands
         corners = (transform_points(s.displacement(q), s.p_SV)[:, :2] for s, q in placed)
-        self._feet = [cv2.convexHull(p.astype(np.float32)) for p in corners]
+        self._contact_areas = [cv2.convexHull(p.astype(np.float32)) for p in corners]
 
     def extent(self, start: Array, toward: Array) -> float:
-        """How far from a point of the board (2,) the camera does not see the board, nor does an
-        object stand there, in a direction (2,) [m]."""
+        """Length of the hidden and unoccupied board from a point (2,) in a direction (2,) [m]."""
         # Metres of the board behind an object that are searched.
         step = KNOWN_MARGIN / 2
         distances = np.arange(KNOWN_MARGIN, 0.15, step)  # Metres
         p_S = start + distances[:, None] * toward
         _, pixels = self._view.project(np.column_stack([p_S, np.zeros(len(p_S))]))
         hidden = sample_nearest(self._covered, pixels, False).astype(bool)
-        on_foot = [any(cv2.pointPolygonTest(f, p, False) >= 0 for f in self._feet) for p in p_S]
+        on_foot = [
+            any(cv2.pointPolygonTest(f, p, False) >= 0 for f in self._contact_areas) for p in p_S
+        ]
         return step * int(np.argmin(np.append(hidden & ~np.array(on_foot), False)))
 
 
 def _describe_region(
     view: PinholeView, mask: Booleans, hidden: _HiddenBoard
 ) -> tuple[float, ExtraObject]:
-    """The area on the board behind a region of the image [m²], and what stands there.
+    """Area of the board behind an image region [m²], and the extra object there.
 
-    A thing hides the board behind it: it stands at the near end of that, and is as deep as wide. If
-    an object hides the near end, it is in the middle of where that may be.
+    An extra object stands at the near end of the board's area that it hides, and is as deep as
+    wide. If a known object hides the near end, it is in the middle of its possible places.
     """
     row, column = np.nonzero(mask)
     p_S = _points_on_board(view, np.stack([column, row], axis=-1).astype(float))
     area = float(_pixel_area(view, p_S).sum())
     arm = p_S - view.X_SC[:2, 3]
-    away = arm.mean(axis=0) / max(float(np.linalg.norm(arm.mean(axis=0))), 1e-9)
-    across = np.array([-away[1], away[0]])
-    deep, side = arm @ away, arm @ across
-    near = float(np.quantile(deep, 0.02))
-    if near < MIN_EXTRA_WIDTH:  # the camera looks straight down on it
+    forward = arm.mean(axis=0) / max(float(np.linalg.norm(arm.mean(axis=0))), 1e-9)
+    across = np.array([-forward[1], forward[0]])
+    depths, side = arm @ forward, arm @ across
+    nearest_depth = float(np.quantile(depths, 0.02))
+    if nearest_depth < MIN_EXTRA_WIDTH:  # the camera looks straight down on it
         return area, _build_extra_object(p_S.mean(axis=0), 2.0 * float(np.sqrt(area / np.pi)))
     # seen from above the camera's foot, the hidden board widens like a shadow
-    left, right = np.quantile(side / np.maximum(deep, 1e-3), [0.02, 0.98]).tolist()
-    aside = away + (left + right) / 2 * across
-    near -= hidden.extent(view.X_SC[:2, 3] + near * aside, -away) / 2.0
-    width = max((right - left) * near, MIN_EXTRA_WIDTH)
-    middle = view.X_SC[:2, 3] + (near + width / 2) * aside
+    left, right = np.quantile(side / np.maximum(depths, 1e-3), [0.02, 0.98]).tolist()
+    widening = forward + (left + right) / 2 * across
+    nearest_depth -= hidden.extent(view.X_SC[:2, 3] + nearest_depth * widening, -forward) / 2.0
+    width = max((right - left) * nearest_depth, MIN_EXTRA_WIDTH)
+    middle = view.X_SC[:2, 3] + (nearest_depth + width / 2) * widening
     return area, _build_extra_object(middle, width)
 
 

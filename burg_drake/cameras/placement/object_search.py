@@ -38,7 +38,8 @@ class SearchResult:
 
 
 def find_places(view: PinholeView, shape: TargetShape, evidence: Array) -> list[SearchResult]:
-    """Places where an object may be: those near its target's angle first, each kind best first.
+    """Find candidate places of an object: those near the target's angle first, then the others,
+    each best first.
 
     Args:
         view: the camera.
@@ -47,12 +48,12 @@ def find_places(view: PinholeView, shape: TargetShape, evidence: Array) -> list[
     """
     search = SilhouetteSearch(view, shape, evidence)
     if shape.symmetric:
-        return [search.slide(0.0, search.slide(0.0).q)]
+        return [search.best_translation(0.0, search.best_translation(0.0).q)]
     return search.best(NEAR_SEARCH_ANGLES) + search.best(FAR_SEARCH_ANGLES)
 
 
 class SilhouetteSearch:
-    """Slides one shape over the evidence, at a coarse scale."""
+    """Search of one shape in the evidence, at a coarse scale."""
 
     def __init__(self, view: PinholeView, shape: TargetShape, evidence: Array) -> None:
         self._view, self._shape = view, shape
@@ -60,42 +61,46 @@ class SilhouetteSearch:
         size = (round(view.size[0] * self._scale), round(view.size[1] * self._scale))
         self._evidence = cv2.resize(evidence.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         top = float(shape.p_SV[:, 2].max())
-        self._middle = shape.p_SR + np.array([0.0, 0.0, top / 2])
+        self._center = shape.p_SR + np.array([0.0, 0.0, top / 2])
 
     def best(self, turns: Array) -> list[SearchResult]:
-        """The best places among some angles and those beside the best two."""
-        rough = sorted((self.slide(float(turn)) for turn in turns), key=lambda f: -f.score)
-        found = [self.slide(f.q[2], f.q) for f in rough[:5]]  # Best angles that are refined.
+        """The best places at given angles, refined around the best ones."""
+        rough = sorted(
+            (self.best_translation(float(turn)) for turn in turns), key=lambda f: -f.score
+        )
+        # Best angles that are refined.
+        found = [self.best_translation(f.q[2], f.q) for f in rough[:5]]
         found.sort(key=lambda f: -f.score)
         found += [
-            self.slide(f.q[2] + side * FINE_SEARCH_ANGLE, f.q)
+            self.best_translation(f.q[2] + side * FINE_SEARCH_ANGLE, f.q)
             for f in found[:2]
             for side in (-1, 1)
         ]
         # For near and for far angles each.
         return _drop_duplicates(sorted(found, key=lambda f: -f.score))[:3]
 
-    def slide(self, turn: float, start: Array | None = None) -> SearchResult:
-        """The best translation at an angle: anywhere, or near to where it seems to be, as the
-        silhouette changes with its place."""
+    def best_translation(self, turn: float, start: Array | None = None) -> SearchResult:
+        """The best translation at an angle: anywhere, or near a start, as the silhouette changes
+        with its place.
+        """
         near = start if start is not None else np.zeros(2)
         reach = SEARCH_RANGE if start is None else SEARCH_RANGE / 4
         q, score = self._step(np.array([near[0], near[1], turn]), reach)
         off = np.hypot(q[0], q[1]) / SEARCH_RANGE
         return SearchResult(q, score - DISTANCE_PENALTY * min(off, 2.0) ** 2)
 
-    def shifted(self, q: Array, reach: float) -> Array:
-        """The best displacement at the angle of another, up to `reach` [m] from it."""
+    def best_displacement(self, q: Array, reach: float) -> Array:
+        """The best displacement at the angle of `q`, up to `reach` [m] from it."""
         return self._step(q, reach)[0]
 
     def _step(self, q: Array, reach: float) -> tuple[Array, float]:
-        """One correlation; returns where its peak is, and the mean evidence there."""
+        """Correlate once; return the displacement at the peak and its mean evidence."""
         view, scale = self._view, self._scale
         window = _snap_to_scale(view.window(self._shape, q, 1.0), scale)
         mask = np.isfinite(view.buffer(self._shape, q, window)).astype(np.float32)
         if mask.sum() < 4:
             return q, -1.0
-        J = view.jacobian((self._middle + q * (1.0, 1.0, 0.0))[None])[0, :, :2] * scale
+        J = view.jacobian((self._center + q * (1.0, 1.0, 0.0))[None])[0, :, :2] * scale
         pad = int(np.ceil(reach * np.linalg.norm(J, axis=1).max())) + 1
         left, top = round(window.left * scale), round(window.top * scale)
         around = cv2.copyMakeBorder(
@@ -106,7 +111,7 @@ class SilhouetteSearch:
         v, u = np.mgrid[: score.shape[0], : score.shape[1]] - pad
         shift = np.stack([u, v], axis=-1) @ np.linalg.inv(J).T
         off = np.linalg.norm(shift, axis=-1)
-        # what is not within the range is not looked for; from outside, the way back is open
+        # places outside the range are excluded; a start outside may come back
         far = np.hypot(q[0] + shift[..., 0], q[1] + shift[..., 1]) / SEARCH_RANGE
         rated = np.where(off <= reach * 1.01, score - DISTANCE_PENALTY * far**2, -np.inf)
         best = np.unravel_index(int(rated.argmax()), rated.shape)
@@ -123,7 +128,7 @@ def _snap_to_scale(window: ImageWindow, scale: float) -> ImageWindow:
 
 
 def _drop_duplicates(found: list[SearchResult]) -> list[SearchResult]:
-    """Leaves out places that are near to better ones."""
+    """Drop places that are near better ones."""
     kept: list[SearchResult] = []
     for f in found:
         near = (
@@ -146,8 +151,9 @@ Placed = tuple[TargetShape, Array]
 def assign_candidates(
     aligner: Aligner, shapes: dict[str, TargetShape], placed: dict[str, Placed]
 ) -> dict[str, list[Array]]:
-    """Candidate displacements of the objects that seem to be there, best first; not where others
-    are already."""
+    """Candidate displacements of the objects that seem present, best first, outside the places of
+    other objects.
+    """
     view, evidence = aligner.view, unexplained_evidence(aligner, placed)
     waiting = {name: find_candidates(view, shape, evidence) for name, shape in shapes.items()}
     assigned: dict[str, list[Array]] = {}
@@ -167,7 +173,7 @@ def assign_candidates(
 
 
 def unexplained_evidence(aligner: Aligner, placed: dict[str, Placed]) -> Array:
-    """(H, W) the evidence that no object explains that has its place."""
+    """(H, W) evidence that no placed object explains."""
     evidence = aligner.evidence.copy()
     for shape, q in placed.values():
         _remove_explained(aligner.view, shape, q, evidence)
@@ -175,14 +181,16 @@ def unexplained_evidence(aligner: Aligner, placed: dict[str, Placed]) -> Array:
 
 
 def promising_places(found: list[SearchResult]) -> list[Array]:
-    """The displacements of places that may turn out to be the best, the likeliest first."""
+    """Displacements of the places that may prove best, the likeliest first."""
     best = max(f.score for f in found)
     # Evidence below that of the best place at which a place is still tried.
     return [f.q for i, f in enumerate(found) if i == 0 or f.score > best - 0.12]
 
 
 def find_candidates(view: PinholeView, shape: TargetShape, evidence: Array) -> list[SearchResult]:
-    """Where an object may be; if it is not near its target's angle, the best of all first."""
+    """Candidate places of an object; if none near its target's angle is good, the best of all
+    first.
+    """
     found = find_places(view, shape, evidence)
     if _rate_candidate(view, shape, found, evidence) >= MIN_CANDIDATE_EVIDENCE:
         return found
@@ -192,7 +200,7 @@ def find_candidates(view: PinholeView, shape: TargetShape, evidence: Array) -> l
 def _rate_candidate(
     view: PinholeView, shape: TargetShape, found: list[SearchResult], evidence: Array
 ) -> float:
-    """How sure it is that an object is where it was found: its support, more for a large one."""
+    """Confidence in an object's candidate place: its support, more for a large one."""
     support, area = silhouette_support(view, shape, found[0].q, evidence, None)
     return support if area > 30.0 else -1.0  # Pixels with evidence that a silhouette needs.
 
@@ -200,7 +208,7 @@ def _rate_candidate(
 def silhouette_support(
     view: PinholeView, shape: TargetShape, q: Array, evidence: Array, others: Array | None
 ) -> tuple[float, float]:
-    """Mean evidence in the silhouette where there is any, and how many pixels that are."""
+    """Ratio of signed to absolute evidence in the silhouette, and the absolute sum [pixels]."""
     window = view.window(shape, q, 2.0)
     depth = view.buffer(shape, q, window)
     part = window_slices(window)
@@ -212,7 +220,7 @@ def silhouette_support(
 def _remove_explained(
     view: PinholeView, shape: TargetShape, q: Array, evidence: Array
 ) -> ImageWindow:
-    """Takes away the evidence that an object explains; returns where that was."""
+    """Remove the evidence that an object explains; return its pixels."""
     window = view.window(shape, q, 8.0)
     mask = np.isfinite(view.buffer(shape, q, window)).astype(np.uint8)
     grown = cv2.dilate(mask, np.ones((7, 7), np.uint8)) > 0

@@ -35,7 +35,7 @@ SYMMETRY_TEST_ANGLES = np.deg2rad((11.0, 37.0, 73.0, 117.0, 161.0))
 
 @dataclass(frozen=True, eq=False)
 class TargetShape:
-    """An object where it should stand.
+    """An object at its target.
 
     Attributes:
         vertices: (V, 3) in O [m].
@@ -43,7 +43,7 @@ class TargetShape:
         X_SO: (4, 4) the target.
         p_OR: (3,) reference point, in the plane of the board at the target [m].
         symmetric: a turn about the vertical through the reference point changes nothing.
-        colors: (F, 3) linear reflectance that the library's mesh has; None without.
+        colors: (F, 3) linear reflectance of the library's mesh; None if it has no colors.
     """
 
     vertices: Array
@@ -65,12 +65,12 @@ class TargetShape:
 
     @cached_property
     def outline(self) -> MeshOutline:
-        """The mesh at the target, in S, prepared for contours."""
+        """Contours of the mesh at the target, in S."""
         return MeshOutline(self.p_SV, self.faces)
 
     @cached_property
     def rays(self) -> RayCaster:
-        """The mesh at the target, in S, prepared for rays."""
+        """Ray caster for the mesh at the target, in S."""
         return RayCaster(self.p_SV, self.faces)
 
     @cached_property
@@ -82,12 +82,12 @@ class TargetShape:
 
     @cached_property
     def surface(self) -> tuple[Array, Array]:
-        """Points (N, 3) spread over the surface at the target, and its normals there, in S."""
+        """Points (N, 3) spread over the surface at the target, and their normals, in S."""
         mesh = trimesh.Trimesh(self.p_SV, self.faces, process=False)
         return sample_surface(mesh, SURFACE_SAMPLES)
 
     def looks_alike(self, a: Array, b: Array) -> bool:
-        """Whether two displacements (3,) look the same: a box turned by half a turn."""
+        """Whether two displacements (3,) look the same, as a box after half a turn."""
         X_SS = inverse(self.displacement(a)) @ self.displacement(b)
         points, _ = self.surface
         return self._matcher.contains_points(transform_points(X_SS, points[::12]))
@@ -97,7 +97,7 @@ class TargetShape:
         return _SurfaceMatcher(*self.surface)
 
     def displacement(self, q: Array) -> Array:
-        """(4, 4) what `q` does to points in S: a turn about the vertical through the target's
+        """(4, 4) transform of points in S by `q`: a turn about the vertical through the target's
         reference point, then a translation.
 
         Args:
@@ -130,8 +130,9 @@ def target_shapes(scene: Scene) -> dict[str, TargetShape]:
 
 
 def _face_colors(surface: trimesh.Trimesh, path: Path) -> Array | None:
-    """(F, 3) linear reflectance of a surface's faces, from the mesh file that has its look; None if
-    that has no colors."""
+    """(F, 3) linear reflectance of a surface's faces, from the visual mesh file; None if it has no
+    colors.
+    """
     seen = trimesh.load(path, force="mesh", process=False)
     if not seen.visual.defined:
         return None
@@ -162,7 +163,7 @@ def target_shape(
 
 
 def _outline_centroid(points: Array) -> Array:
-    """Centroid of the area inside the convex outline of points (N, 2); it turns with them."""
+    """Centroid of the convex hull of points (N, 2); it rotates with the points."""
     hull = points[ConvexHull(points).vertices]
     scale = float(np.ptp(hull, axis=0).max())
     origin = hull.mean(axis=0)
@@ -182,7 +183,7 @@ def _is_rotationally_symmetric(surface: trimesh.Trimesh) -> bool:
 
 
 class _SurfaceMatcher:
-    """Tells whether moved points of a surface are points of it.
+    """Tests whether moved surface points are still on the surface.
 
     Args:
         points, normals: (N, 3) spread over the surface.
@@ -194,13 +195,15 @@ class _SurfaceMatcher:
         # Fraction of the diagonal; 1.3 mm for a can.
         self._tolerance = 0.01 * float(np.linalg.norm(np.ptp(points, axis=0)))
         apart = self._tree.query(points[::12], k=2)[0][:, 1]
-        self._beside = 6.0 * float(np.median(apart)) + self._tolerance
+        self._max_distance = 6.0 * float(np.median(apart)) + self._tolerance
 
     def contains_points(self, moved: Array) -> bool:
-        """Whether most of some moved points (M, 3) are on the surface."""
+        """Whether most of the moved points (M, 3) are on the surface."""
         distance, near = self._tree.query(moved, k=3)
-        away = moved[:, None] - self._points[near]
-        off = np.abs(np.einsum("nki,nki->nk", self._normals[near], away)).min(axis=1)
-        same = (off < self._tolerance) & (distance[:, 0] < self._beside)
+        difference = moved[:, None] - self._points[near]
+        plane_distance = np.abs(np.einsum("nki,nki->nk", self._normals[near], difference)).min(
+            axis=1
+        )
+        same = (plane_distance < self._tolerance) & (distance[:, 0] < self._max_distance)
         # Fraction of the surface that must be within the tolerance.
         return bool(same.mean() >= 0.98)

@@ -20,17 +20,17 @@ TONE_WEIGHTS = (np.diag([1.0, 0.5, 0.5]) @ np.linalg.qr(np.ones((3, 1)), "comple
 
 @dataclass(frozen=True, eq=False)
 class StepLines:
-    """Lines across steps.
+    """Profiles across steps of light.
 
     Attributes:
         t: (T,) distances from the expected step, outwards [pixels].
         light: (N, T, 3) of the photo.
-        behind: (N, T, 3) what is behind the object in the light from farther outside.
+        behind: (N, T, 3) the background behind the object, in the light farther outside.
         color: (N, 3) of the object, farther in.
-        tone: (N, 3) of the object at its edge, expected, over that.
-        strip: (N,) where, from the step, another material begins [pixels]; -infinity where none
-            does.
-        used: (N, T) samples that count.
+        tone: (N, 3) expected ratio of the object's color at its edge to `color`.
+        strip: (N,) distance from the step to the next material [pixels]; -infinity if there is
+            none.
+        used: (N, T) samples that are used.
     """
 
     t: Array
@@ -44,13 +44,13 @@ class StepLines:
 
 @dataclass(frozen=True, eq=False)
 class EdgeSteps:
-    """Steps that were fitted.
+    """Fitted steps.
 
     Attributes:
-        offset: (N,) where they are [pixels].
+        offset: (N,) distance from the expected step [pixels].
         variance: (N,) of that.
-        rms: (N,) root mean square of what is left of the light.
-        contrast: (N,) of both sides.
+        rms: (N,) root mean square residual of the light.
+        contrast: (N,) between both sides.
         color: (N, 3) of the object at its edge.
     """
 
@@ -62,10 +62,10 @@ class EdgeSteps:
 
 
 def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> EdgeSteps:
-    """Fits all lines by Gauss and Newton.
+    """Fit steps to all profiles by Gauss-Newton.
 
     Args:
-        lines: the lines.
+        lines: the profiles.
         blur: of the photo and of sampling [pixels].
         noise: of the photo over paper.
         paper: light of paper.
@@ -86,7 +86,7 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
     prior = np.zeros((len(lines.color), n, n))
     prior[:, at, at] = 0.1
     prior[:, outer, outer] = rise.T @ rise
-    # the edge's color keeps to the inner one's, or may be quite another
+    # the edge's color is near the inner one, or that of a strip of another material
     tie = _tone_prior(lines.color * lines.tone, strip, paper)
     prior[:, edge, edge] = tie
     prior[:, inner, inner] = _tone_prior(lines.color, np.zeros_like(strip), paper) + tie
@@ -100,21 +100,26 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
         covered = ndtr(away)[..., None]
         slope = (np.exp(-0.5 * away**2) / np.sqrt(2.0 * np.pi) / blur)[..., None]
         beyond = away + np.where(strip, lines.strip, -1e3)[:, None] / blur
-        deep = np.where(strip[:, None], ndtr(beyond), 0.0)[..., None]
+        strip_share = np.where(strip[:, None], ndtr(beyond), 0.0)[..., None]
         fall = np.exp(-0.5 * beyond**2)[..., None] / np.sqrt(2.0 * np.pi) / blur
-        lit = lines.behind * np.maximum(1.0 + x[:, outer] @ knots.T, 0.0)[..., None]
+        lit_background = lines.behind * np.maximum(1.0 + x[:, outer] @ knots.T, 0.0)[..., None]
         first = (lines.color * lines.tone + x[:, edge])[:, None]
         second = (lines.color + x[:, inner])[:, None]
-        left = lines.light - lit - covered * (first - lit) - deep * (second - first)
-        J = np.zeros((*left.shape, n), np.float32)
-        J[..., at] = slope * (first - lit) + fall * (second - first)
+        residual = (
+            lines.light
+            - lit_background
+            - covered * (first - lit_background)
+            - strip_share * (second - first)
+        )
+        J = np.zeros((*residual.shape, n), np.float32)
+        J[..., at] = slope * (first - lit_background) + fall * (second - first)
         J[..., outer] = ((1.0 - covered) * lines.behind)[..., None] * knots[:, None]
         for channel in range(3):
-            J[..., channel, edge.start + channel] = (covered - deep)[..., 0]
-            J[..., channel, inner.start + channel] = deep[..., 0]
+            J[..., channel, edge.start + channel] = (covered - strip_share)[..., 0]
+            J[..., channel, inner.start + channel] = strip_share[..., 0]
         J = (TONE_WEIGHTS @ J * weight[..., None]).reshape(len(x), -1, n)
-        e = (left @ TONE_WEIGHTS.T * weight).reshape(len(x), -1).astype(np.float32)
-        # what is rough on a line says less
+        e = (residual @ TONE_WEIGHTS.T * weight).reshape(len(x), -1).astype(np.float32)
+        # rough profiles get less weight
         rough = np.maximum((e**2).sum(axis=1) / count, 1.0)[:, None, None]
         normal = J.transpose(0, 2, 1) @ J / rough + prior
         pull = (J.transpose(0, 2, 1) @ e[..., None] / rough - prior @ x[..., None])[..., 0]
@@ -123,15 +128,14 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
         x[:, outer] = np.clip(x[:, outer], -0.95, 1.0)
     # neighbouring samples share pixels, hence 2
     variance = 2.0 * np.linalg.inv(normal)[:, at, at]
-    rms = np.sqrt((lines.used[..., None] * left**2).sum(axis=(1, 2)) / count)
+    rms = np.sqrt((lines.used[..., None] * residual**2).sum(axis=(1, 2)) / count)
     here = int(np.argmin(np.abs(t)))
-    contrast = np.linalg.norm(first[:, 0] - lit[:, here], axis=1) / np.sqrt(3.0)
+    contrast = np.linalg.norm(first[:, 0] - lit_background[:, here], axis=1) / np.sqrt(3.0)
     return EdgeSteps(x[:, at], variance, rms, contrast, first[:, 0])
 
 
 def _tone_prior(color: Array, strip: Booleans, paper: float) -> Array:
-    """(N, 3, 3) inverse covariance of colors (N, 3), which vary by their brightness more than by
-    their tone."""
+    """(N, 3, 3) inverse covariance of colors (N, 3), which vary more in brightness than in tone."""
     surface_sds = (0.15, 0.03)  # Relative brightness and tone of the object at its edge ...
     strip_sds = (0.8, 0.15)  # ... and of a strip of another material.
     bright, tone = np.where(strip[:, None], strip_sds, surface_sds).T
@@ -145,7 +149,7 @@ def _tone_prior(color: Array, strip: Booleans, paper: float) -> Array:
 
 
 PROFILE_STEP_PX = 0.5
-"""Distance of samples on a normal, in pixels."""
+"""Spacing of samples on a normal, in pixels."""
 MIN_EDGE_CONTRAST = 0.05
 """Contrast of an edge, at least, as a fraction of that of paper and ink."""
 FINE_SEARCH_PX = 5.0
@@ -157,13 +161,13 @@ class PhotoEdges:
     """Edges of a photo on the normals of an outline.
 
     Attributes:
-        offset: (N,) where they are, outwards from the outline [pixels].
+        offset: (N,) their distances outwards from the outline [pixels].
         deviation: (N,) their standard deviations [pixels].
-        shading: (N,) how far inwards it is measured, per share by which the object is darker at its
-            very edge than beside it, as round objects are [pixels].
-        found: (N,) there is one.
-        expected: (N,) there should be one: nothing else is in the way, and what is inside the
-            outline looks different from what is outside.
+        shading: (N,) inward shift of the measured edge per relative darkening of the object at its
+            edge, as of round objects [pixels].
+        found: (N,) an edge was found.
+        expected: (N,) an edge should be visible: nothing occludes it, and both sides of the outline
+            look different.
     """
 
     offset: Array
@@ -175,18 +179,18 @@ class PhotoEdges:
 
 @dataclass(frozen=True, eq=False)
 class NormalProfiles:
-    """What is on the normals of an outline.
+    """Samples of photo and empty board on the normals of an outline.
 
     Attributes:
         t: (T,) distances from the outline [pixels].
         light: (N, T, 3) the photo, linear.
         board: (N, T, 3) the board without objects and shadows.
-        evidence: (N, T) of something that stands there.
+        evidence: (N, T) evidence that something stands there.
         known: (N, T) `board` can be relied on.
         covered: (N, T) the object covers it.
-        strip: (N,) where the surface that begins at the outline ends inwards: at a bend, another
-            material, or a part that it hides [pixels]; -infinity if it does not.
-        tone: (N, 3) its reflectance over that of what begins there.
+        strip: (N,) inner end of the surface that begins at the outline: a bend, another material,
+            or a part behind it [pixels]; -infinity if there is none.
+        tone: (N, 3) ratio of its reflectance to that of the surface inside.
         occluded: (N, T) another object covers it.
     """
 
@@ -208,14 +212,14 @@ def sample_normal_profiles(
     others: Array,
     reach: float,
 ) -> NormalProfiles:
-    """Samples a photo on the normals of an outline.
+    """Sample a photo on the normals of an outline.
 
     Args:
         contour: the outline.
         light: (H, W, 3) of the photo, linear.
         picture: of the empty board.
         others: (H, W) depth of other objects, infinity where there is none.
-        reach: to both sides [pixels].
+        reach: length of the normals to both sides [pixels].
     """
     t = np.arange(-reach, reach + PROFILE_STEP_PX / 2, PROFILE_STEP_PX)
     points = contour.points(t)
@@ -241,8 +245,9 @@ def sample_normal_profiles(
 
 
 def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
-    """The best place on each line for a step from the object to the background: by the evidence on
-    the sheet, by colors beyond it."""
+    """Find the best step from object to background on each normal: by evidence on the sheet, by
+    colors outside it.
+    """
     t, reach = on.t, float(on.t[-1])
     far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
     usable: Booleans = np.asarray((on.covered & far_in).any(axis=1))
@@ -264,13 +269,13 @@ def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
 
 
 def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
-    """Edges near to the outline, by least squares: a blurred step between two explained sides.
+    """Find edges near the outline by least squares: a blurred step between two modelled sides.
 
-    Outside is the board B(t) in a light g(t) that may change, most next to the object, whose shadow
-    begins there; inside is the object's color F. With the blurred step s the photo is
-    g B + s(offset - t) (F - g B). Where F is grey as well, a shadow's edge looks like the object's,
-    and the offset's standard deviation says so, as g is solved for with it. An outline that has the
-    board on both sides is a shadow's, and no edge.
+    The outside is the board B(t) in a light g(t), which varies most at the object, where its shadow
+    begins. The inside is the object's color F. With the blurred step s the photo is g B + s(offset
+    - t) (F - g B). Where F is grey as well, a shadow's edge looks like the object's; the offset's
+    standard deviation includes this, as g is fitted as well. An outline with the board on both
+    sides is a shadow's and not an edge.
     """
     inner_width = 0.6  # Pixels over which the object's colour is sampled; many objects have a rim.
     outer_width = 3.0  # Pixels over which the light outside is sampled.
@@ -283,7 +288,7 @@ def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     core = on.covered & np.roll(on.covered, round(clear / PROFILE_STEP_PX), axis=1)
     # Pixels. Thickest strip of another material along an outline.
     strip = np.where(on.strip > -clear - inner_width - 2.5, on.strip, -np.inf)
-    # the object's color, from beyond a strip of another material if there is one
+    # the object's color, sampled inside a strip of another material if there is one
     start = -clear + np.where(np.isfinite(strip), strip, 0.0)[:, None]
     inner = core & (t <= start) & (t >= start - inner_width)
     outer = (t >= clear) & (t <= clear + outer_width) & ~on.covered
@@ -316,17 +321,17 @@ def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
 
 
 def _background_light(on: NormalProfiles, outer: Booleans) -> tuple[Array, Array]:
-    """(N, T, 3) what is behind the object, and (N,) root mean square of what
-    that leaves outside. Where the board is not known, it is the mean of what is outside.
+    """(N, T, 3) background behind the object, and (N,) its root mean square residual outside. The
+    mean of the outside where the board is unknown.
     """
     known: Booleans = np.asarray(np.all(on.known[:, on.t >= 0.0], axis=1))
     B = np.where(outer[..., None], on.board, 0.0)
     level = (B * on.light).sum(axis=(1, 2)) / ((B * B).sum(axis=(1, 2)) + 1e-9)
     model = on.board * level[:, None, None]
-    left = (((on.light - model) ** 2).mean(axis=-1) * outer).sum(axis=1)
+    square_error = (((on.light - model) ** 2).mean(axis=-1) * outer).sum(axis=1)
     mean = np.broadcast_to(_mean_of_samples(on.light, outer)[:, None], model.shape)
     model = np.where(known[:, None, None], model, mean)
-    return model, np.sqrt(left / np.maximum(outer.sum(axis=1), 1))
+    return model, np.sqrt(square_error / np.maximum(outer.sum(axis=1), 1))
 
 
 def _mean_of_samples(values: Array, where: Booleans) -> Array:

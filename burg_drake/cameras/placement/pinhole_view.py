@@ -16,7 +16,7 @@ from burg_drake.core import Array, Booleans, Indices, inverse, transform_points
 
 @dataclass(frozen=True)
 class ImageWindow:
-    """A part of an image, seen by a finer or coarser raster; pixel centres at integers.
+    """A part of an image, sampled by a finer or coarser raster; pixel centres at integers.
 
     Attributes:
         left, top: first column and row of the image.
@@ -36,11 +36,11 @@ class ImageWindow:
         return round(self.height * self.scale), round(self.width * self.scale)
 
     def scaled(self, scale: float) -> ImageWindow:
-        """The same part, seen by a raster of another scale."""
+        """The same part, with a raster of another scale."""
         return replace(self, scale=scale)
 
     def overlaps(self, other: ImageWindow) -> bool:
-        """Whether both show a part of the same image points."""
+        """Whether two windows overlap in the image."""
         across = self.left < other.left + other.width and other.left < self.left + self.width
         return across and self.top < other.top + other.height and other.top < self.top + self.height
 
@@ -65,8 +65,8 @@ class PinholeView:
     Attributes:
         K: (3, 3) camera matrix, pixel centres at integers.
         size: width and height of its image [pixels].
-        X_SC: (4, 4) where it is.
-        blind: (H, W) pixels that show nothing; None if all do.
+        X_SC: (4, 4) its pose.
+        blind: (H, W) pixels without image content; None if there are none.
     """
 
     K: Array
@@ -80,13 +80,13 @@ class PinholeView:
         return inverse(self.X_SC)
 
     def project(self, p_SQ: Array) -> tuple[Array, Array]:
-        """Points (N, 3) of S in the camera frame, and their pixels (N, 2)."""
+        """Transform points (N, 3) from S to the camera frame and project them to pixels (N, 2)."""
         p_CQ = transform_points(self.X_CS, p_SQ)
         depth = np.maximum(p_CQ[:, 2:], MIN_POINT_DEPTH)
         return p_CQ, p_CQ[:, :2] / depth * self.K[[0, 1], [0, 1]] + self.K[:2, 2]
 
     def jacobian(self, p_SQ: Array) -> Array:
-        """(N, 2, 3) by how many pixels points (N, 3) of S move per metre along x, y, z of S."""
+        """(N, 2, 3) derivatives of the pixels by points (N, 3) in S [pixels per metre]."""
         p_CQ, _ = self.project(p_SQ)
         z = np.maximum(p_CQ[:, 2], MIN_POINT_DEPTH)
         fx, fy = self.K[0, 0], self.K[1, 1]
@@ -96,7 +96,7 @@ class PinholeView:
         return np.stack([x, y], axis=1) @ self.X_CS[:3, :3]
 
     def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[Indices, Array]:
-        """What of a displaced shape is seen at image points.
+        """Cast rays through image points at a displaced shape.
 
         Args:
             shape: the object.
@@ -104,8 +104,8 @@ class PinholeView:
             pixels: (..., 2).
 
         Returns:
-            (...,) its faces, -1 where the shape is not; and distances along the optical axis [m],
-            infinity there.
+            (...,) faces that are hit, -1 for none; and depth along the optical axis [m], infinity
+            for none.
         """
         at = pixels.reshape(-1, 2)
         rays = np.ones((len(at), 3))
@@ -119,8 +119,9 @@ class PinholeView:
         return face.reshape(at_pixels), (distance / length).reshape(at_pixels)
 
     def points(self, shape: TargetShape, q: Array, pixels: Array, depth: Array) -> Array:
-        """(..., 3) points that a displaced shape has at image points (..., 2), with depths (...,),
-        as they are before it is displaced [m]."""
+        """(..., 3) points of a displaced shape at image points (..., 2) with depths (...,), moved
+        back to the undisplaced shape [m].
+        """
         xy = (pixels - self.K[:2, 2]) / self.K[[0, 1], [0, 1]]
         p_CQ = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1) * depth[..., None]
         X_SC = inverse(shape.displacement(q)) @ self.X_SC
@@ -136,7 +137,7 @@ class PinholeView:
         return self.window_of(pixels, margin)
 
     def window_of(self, pixels: Array, margin: float) -> ImageWindow:
-        """The part of the image around some of its points (N, 2); empty if all are outside."""
+        """The part of the image around image points (N, 2); empty if all are outside."""
         low = np.floor(pixels.min(axis=0) - margin).astype(int)
         high = np.ceil(pixels.max(axis=0) + margin).astype(int) + 1
         low, high = np.clip(low, 0, self.size), np.clip(high, 0, self.size)
@@ -156,15 +157,15 @@ class PinholeView:
         return nearest
 
     def seen(self, shape: TargetShape, q: Array, others: Array) -> tuple[float, float]:
-        """Shares of a displaced shape's silhouette.
+        """Visible shares of a displaced shape's silhouette.
 
         Args:
             shape: the object.
             q: (3,) its displacement.
-            others: (H, W) depth of what may stand before it.
+            others: (H, W) depth of possible occluders.
 
         Returns:
-            Of the whole silhouette, what is in the image; and what is in the image and not hidden.
+            Share of the silhouette in the image; and share in the image and not hidden.
         """
         p_CV, pixels = self.project(transform_points(shape.displacement(q), shape.p_SV))
         if (p_CV[:, 2] <= MIN_POINT_DEPTH).any():
@@ -184,13 +185,15 @@ class PinholeView:
 
 
 def window_slices(window: ImageWindow) -> tuple[slice, slice]:
-    """The window's part of an image."""
+    """Slices of the window's part of an image."""
     rows = slice(window.top, window.top + window.height)
     return rows, slice(window.left, window.left + window.width)
 
 
 def sample_nearest(values: NDArray[Any], pixels: Array, outside: float) -> Array:
-    """Values (H, W) at the pixels nearest to image points (..., 2); `outside` beyond the image."""
+    """Sample values (H, W) at the pixels nearest to image points (..., 2); `outside` beyond the
+    image.
+    """
     at = np.round(pixels).astype(int)
     height, width = values.shape[:2]
     inside = (at[..., 0] >= 0) & (at[..., 0] < width) & (at[..., 1] >= 0) & (at[..., 1] < height)
@@ -199,9 +202,9 @@ def sample_nearest(values: NDArray[Any], pixels: Array, outside: float) -> Array
 
 
 OUTLINE_TEST_OFFSETS_PX = np.array([0.6, 1.2, -0.6])
-"""Pixels outward from an outline point that must be free, free and covered."""
+"""Pixels outward from an outline point, which must be free, free and covered."""
 OCCLUSION_DEPTH_STEP = 2e-3
-"""Metres by which something must be nearer to occlude an outline point."""
+"""Metres by which an occluder must be nearer than an outline point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,11 +214,11 @@ class ImageContour:
     Attributes:
         pixels: (N, 2) in the image.
         normals: (N, 2) unit vectors in the image, out of the object.
-        p_SQ: (N, 3) where they are [m].
+        p_SQ: (N, 3) the points in S [m].
         along: (N, 3) pixels along the normal per x, y [m] and angle [rad] of the displacement.
         camera: (N, 6) pixels along the normal per error of the camera, as `BoardEstimate` has it:
             rotation [rad], then translation [m].
-        view, shape, q: whose outline.
+        view, shape, q: camera, object and its displacement.
     """
 
     pixels: Array
@@ -235,16 +238,16 @@ class ImageContour:
         return self.pixels[:, None] + offsets[:, None] * self.normals[:, None]
 
     def inside(self, pixels: Array, t: Array) -> tuple[Booleans, Array, Array]:
-        """What the object covers of points (N, T, 2) on the normals.
+        """Find which points (N, T, 2) on the normals the object covers, and where its surface ends.
 
         Args:
             pixels: the points.
             t: (T,) their distances from the outline, rising.
 
         Returns:
-            (N, T) whether it covers them; (N,) at which distance the surface that begins at the
-            outline ends inwards, -infinity if it does not: at a bend, another material, or where
-            it hides another part; and (N, 3) its reflectance over that of what begins there.
+            (N, T) covered points; (N,) distance at which the surface that begins at the outline
+            ends inwards (bend, other material, part behind it), -infinity if it does not; and (N,
+            3) ratio of its reflectance to that of the surface inside.
         """
         face, depth = self.view.hits(self.shape, self.q, pixels)
         covered = np.isfinite(depth)
@@ -275,7 +278,7 @@ class ImageContour:
 
 
 def visible_outline(view: PinholeView, shape: TargetShape, q: Array, others: Array) -> ImageContour:
-    """The outline of a displaced object, where it is in the image and nothing hides it.
+    """The visible outline of a displaced object in the image.
 
     Args:
         view: the camera.
@@ -315,7 +318,9 @@ def visible_outline(view: PinholeView, shape: TargetShape, q: Array, others: Arr
 
 
 def _sample_segments(view: PinholeView, ends: Array) -> tuple[Array, Indices]:
-    """Points (N, 3) spaced evenly over segments (E, 2, 3) as the image has them; whose they are."""
+    """Points (N, 3) spaced evenly in the image over segments (E, 2, 3), and their segments'
+    indices.
+    """
     spacing = 2.0  # Pixels between points along the outline.
     _, pixels = view.project(ends.reshape(-1, 3))
     pixels = pixels.reshape(-1, 2, 2)

@@ -40,7 +40,7 @@ class SilhouetteAligner:
     Args:
         view: its camera.
         image: (H, W, 3) without lens distortion, sRGB.
-        picture: the board without objects.
+        picture: the predicted empty board.
     """
 
     def __init__(self, view: PinholeView, image: Bytes, picture: EmptyBoard) -> None:
@@ -53,7 +53,7 @@ class SilhouetteAligner:
         self.max_residual = 0.8 * max(1.0, picture.blur)
         self.residual_floor = MIN_RESIDUAL_PX
         self._light = srgb_to_linear(image)
-        self._balanced = self._light / picture.paper
+        self._relative_light = self._light / picture.paper
         self._picture = picture
 
     def align(
@@ -63,31 +63,34 @@ class SilhouetteAligner:
 
         Args:
             shape: the object.
-            q: (3,) displacement to start from.
+            q: (3,) initial displacement.
             others: (H, W) depth of other objects, infinity where there is none.
-            far: it may be many pixels off.
-            turn: its angle may change.
+            far: the initial displacement may be many pixels off.
+            turn: the angle is fitted, too.
 
         Returns:
-            None if the photo does not determine where it is.
+            The alignment; None if the photo does not determine the object's place.
         """
         near = self._coarse_fit(shape, q, others) if far else q
         if near is None:
             return None
-        rounds = 3 if far or not turn else 6  # A place that is only compared needs fewer.
+        rounds = 3 if far or not turn else 6  # Fewer suffice for a place that is only compared.
         return self._fine_fit(shape, near, others, turn, rounds)
 
-    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """How alike the tones of a displaced object and of its mesh are; see `color_likeness`."""
-        return color_likeness(self.view, shape, q, others, self._balanced)
+    def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """Similarity of the photo's tones to those of a displaced object's mesh; see
+        `color_likeness`.
+        """
+        return color_likeness(self.view, shape, q, others, self._relative_light)
 
-    def misfit(
+    def mismatch(
         self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
-        """What of a raster disagrees with a displaced object, but for where others are.
+        """Area of a window that disagrees with a displaced object, without the area of other
+        objects.
 
         Returns:
-            That, and the object's silhouette [raster pixels].
+            Disagreement, and the silhouette's area [raster pixels].
         """
         at = window.pixels()
         own = np.isfinite(self.view.hits(shape, q, at)[1])
@@ -96,7 +99,7 @@ class SilhouetteAligner:
         return float(np.maximum(np.where(own, -evidence, evidence), 0.0).sum()), float(own.sum())
 
     def _coarse_fit(self, shape: TargetShape, q: Array, others: Array) -> Array | None:
-        """The displacement to a pixel or so, from many away; None without an outline."""
+        """The displacement to about a pixel, from many pixels off; None without an outline."""
         # Search distance of each round, as a fraction of the image's width.
         for share in (1 / 45, 1 / 45, 1 / 80, 1 / 110):
             contour = visible_outline(self.view, shape, q, others)
@@ -115,7 +118,7 @@ class SilhouetteAligner:
     def _fine_fit(
         self, shape: TargetShape, q: Array, others: Array, turn: bool, rounds: int
     ) -> Alignment | None:
-        """The alignment, from a displacement that is a few pixels off."""
+        """The alignment, from an initial displacement that is a few pixels off."""
         start, result = q, None
         for _ in range(rounds):
             contour = visible_outline(self.view, shape, q, others)
@@ -143,7 +146,7 @@ def _solve_displacement(
         return None
     reach = float(np.linalg.norm(np.ptp(shape.p_SV[:, :2], axis=0))) / 2
     unit = np.array([1e-3, 1e-3, 1e-3 / reach])
-    # What else moves edges, by standard deviations: objects are darker at their edges by 15 %,
+    # Nuisances that move edges, by standard deviations: objects are darker at their edges by 15 %,
     # outlines look larger by 0.2 pixels, and by 0.6 where they meet the board and its shadow, which
     # ends 4 mm above it.
     height = np.maximum(contour.p_SQ[used, 2], 0.0)
@@ -161,7 +164,7 @@ def _solve_displacement(
 
 
 def _limit_step(step: Array) -> Array:
-    """No round moves an object farther than edges were looked for, or turns it out of sight."""
+    """Limit a step to the range in which edges are searched."""
     return np.clip(step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
 
 
@@ -176,7 +179,7 @@ def _build_alignment(
     normals = contour.normals[used]
     rough = max(residual, MIN_RESIDUAL_PX) if np.isfinite(residual) else agreement_limit
     ends, sides = _ends_and_sides(contour.pixels[used], normals)
-    # Unexplained shift of the outline, in residuals, standard deviation.
+    # Standard deviation of an unexplained shift of the outline, in residuals.
     shifted = 0.4 * rough * solved.sensitivity @ normals
     # The same of its two ends against each other.
     twisted = 0.35 * rough * solved.sensitivity @ (normals * ends[:, None])
@@ -193,8 +196,9 @@ def _build_alignment(
 
 
 def _ends_and_sides(pixels: Array, normals: Array) -> tuple[Array, Array]:
-    """(N,) 1 or -1, to which end of its longest extent each point of an outline belongs; and (N,)
-    from 1 to -1, whether it is at its side or its end."""
+    """(N,) 1 or -1, the end of the longest extent that each outline point belongs to; and (N,) from
+    1 at a side to -1 at an end.
+    """
     away = pixels - pixels.mean(axis=0)
     _, axes = np.linalg.eigh(away.T @ away)
     ends = np.where(away @ axes[:, 1] > 0.0, 1.0, -1.0)
@@ -202,7 +206,7 @@ def _ends_and_sides(pixels: Array, normals: Array) -> tuple[Array, Array]:
 
 
 def _weighted_rms(left: Array, deviation: Array) -> float:
-    """Root mean square, in which clear edges count more; NaN of nothing."""
+    """Root mean square, weighted by inverse variance; NaN without values."""
     weight = deviation**-2.0
     return float(np.sqrt((weight * left**2).sum() / weight.sum())) if len(left) else float("nan")
 
@@ -210,22 +214,22 @@ def _weighted_rms(left: Array, deviation: Array) -> float:
 def color_likeness(
     view: PinholeView, shape: TargetShape, q: Array, others: Array, light: Single
 ) -> float:
-    """How alike the tones of a displaced object and of its mesh are, from 0 to 1.
+    """Similarity of the photo's tones to those of a displaced object's mesh, from 0 to 1.
 
     Args:
         view: the camera.
         shape: the object.
         q: (3,) its displacement.
         others: (H, W) depth of other objects.
-        light: (H, W, 3) of the photo over that of paper.
+        light: (H, W, 3) light of the photo relative to paper.
 
     Returns:
-        A mean over what is seen of it; 0.5 if its mesh has no colors, or nothing is seen.
+        Mean over its visible surface; 0.5 if its mesh has no colors, or nothing is visible.
     """
     if shape.colors is None:
         return 0.5
     window = view.window(shape, q, 0.0)
-    # Pixels of an object that are compared, about.
+    # Approximate number of an object's pixels that are compared.
     pitch = max(1.0, float(np.sqrt(window.width * window.height / 1200)))
     at = window.scaled(1.0 / pitch).pixels()
     face, depth = view.hits(shape, q, at)
@@ -237,8 +241,10 @@ def color_likeness(
     r = light[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(float)
     known = shape.colors[face[seen]]
     total, expected = r.sum(axis=1, keepdims=True), known.sum(axis=1, keepdims=True)
-    off = np.linalg.norm(r / np.maximum(total, 1e-3) - known / np.maximum(expected, 1e-3), axis=1)
-    # Fraction of paper's light below which a tone says little.
+    difference = np.linalg.norm(
+        r / np.maximum(total, 1e-3) - known / np.maximum(expected, 1e-3), axis=1
+    )
+    # Fraction of paper's light below which a tone is unreliable.
     weight = np.clip(np.minimum(total, expected)[:, 0] / (3 * 0.03), 0.05, 1.0)
-    # Difference of chromaticity at which two colours are half alike.
-    return float((weight / (1.0 + (off / 0.08) ** 2)).sum() / weight.sum())
+    # Difference of chromaticity at which the similarity is one half.
+    return float((weight / (1.0 + (difference / 0.08) ** 2)).sum() / weight.sum())

@@ -20,16 +20,14 @@ class BoardEstimate:
     Attributes:
         X_SC: (4, 4) camera's optical frame in the scene frame; NaN unless `valid`.
         valid: the pose can be used.
-        reason: one line that says why not, or what is doubtful; empty if all is well.
-        reprojection_error: root mean square distance between where the markers' corners were seen
-            and where the pose puts them [pixels].
-        covariance: (6, 6) of a small rotation [rad], then translation [m], both in S, that lead
-            from the true to the estimated pose: `R_SC = exp(rotation) R_true`,
-            `p_SC = p_true + translation`.
+        reason: one line that says why the pose is missing or doubtful, else empty.
+        reprojection_error: root mean square reprojection error of the markers' corners [pixels].
+        covariance: (6, 6) of a small rotation [rad], then translation [m], both in S, from the true
+            to the estimated pose: `R_SC = exp(rotation) R_true`, `p_SC = p_true + translation`.
         ids: markers that were used.
         corners: (N, 4, 2) where their corners were seen [pixels].
-        scale: size of the printed board against the document's, where it could be measured (from
-            depth, or a camera whose place is known); NaN otherwise.
+        scale: size of the printed board relative to the document, if measured (from depth, or a
+            known camera pose); NaN otherwise.
     """
 
     X_SC: Array = field(default_factory=lambda: np.full((4, 4), np.nan))
@@ -44,13 +42,13 @@ class BoardEstimate:
 
 @dataclass(frozen=True, eq=False)
 class LocatedCamera:
-    """A camera of a station, located.
+    """The measured pose of a station's camera.
 
     Attributes:
         camera: to be written into the station document; a pinhole camera, even if the real one
             has lens distortion.
         X_WC: (4, 4) its pose, unrounded.
-        apart: largest distance [m] and angle [rad] between it and the pose of a single image.
+        apart: largest distance [m] and angle [rad] to the pose of a single image.
     """
 
     camera: Camera
@@ -61,15 +59,15 @@ class LocatedCamera:
 def locate_camera(
     station: StationLike, estimates: Sequence[BoardEstimate], intrinsics: Intrinsics
 ) -> LocatedCamera:
-    """Places a camera that did not move between its images.
+    """Locate a fixed camera from several images.
 
     Args:
-        station: says where the board lies.
-        estimates: of each image; those that are not valid are left out.
+        station: has the pose of the board.
+        estimates: one per image; invalid ones are ignored.
         intrinsics: of the camera.
 
     Raises:
-        InvalidInputError: no estimate is valid, or they are of different places.
+        InvalidInputError: no estimate is valid, or the poses differ.
     """
     # Metres and radians; larger means that the camera or the board was moved.
     max_difference = 0.005, np.deg2rad(0.5)
@@ -100,7 +98,7 @@ def locate_camera(
 
 
 def _round_pose(X_WC: Array) -> Pose:
-    """To a hundredth of a millimetre and a thousandth of a degree."""
+    """Round to a hundredth of a millimetre and a thousandth of a degree."""
     pose = Pose.from_matrix(X_WC)
     assert pose.rpy_deg is not None
     (x, y, z), (roll, pitch, yaw) = pose.translation, pose.rpy_deg

@@ -46,12 +46,12 @@ from burg_drake.scene import Board
 class BoardPose:
     """Estimates poses of one camera over one board.
 
-    Holds tables that take some milliseconds to make; keep it for images that follow each other.
+    Making its tables takes some milliseconds; reuse it for successive images.
 
     Args:
         board: the board.
         intrinsics: of the camera.
-        scale: size of the print against the document along x and y, if it was measured. The origin
+        scale: size of the print relative to the document along x and y, if measured. The origin
             of S stays in the corner of the sheet.
     """
 
@@ -82,7 +82,7 @@ class BoardPose:
         Args:
             image: (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
             depth: (H, W) depth image of the same camera [m], to measure the print's size.
-            X_SC_known: (4, 4) where the camera is known to be, for the same purpose.
+            X_SC_known: (4, 4) known pose of the camera, for the same purpose.
 
         Raises:
             InvalidInputError: not an image, or one of another size than the intrinsics.
@@ -106,10 +106,10 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """Finds markers, and from them the pose."""
+        """Detect markers and estimate the pose from corners, then edges."""
         seen = self._detector.detect(grey)
         if len(seen.duplicated) >= MIN_FOREIGN_MARKERS:
-            # Nothing tells on which of the sheets the objects belong.
+            # It is unknown on which of the sheets the objects belong.
             return BoardEstimate(
                 reason=f"two copies of this board in sight: {len(seen.duplicated)} markers appear"
                 " twice; remove or cover one of them"
@@ -139,7 +139,7 @@ class BoardPose:
         found: Indices,
         corners: Array,
     ) -> tuple[RefinedPose | None, str]:
-        """The pose that fits the edges best, or why there is none."""
+        """The pose that fits the edges best, or the reason why there is none."""
         max_same_turn = 0.01  # Radians. Poses that differ by less are the same.
         attempts = [self._refinement.refine(light, X_SC, found, corners) for X_SC in poses]
         rounds = sorted((r for r in attempts if r), key=lambda r: self._median_residual(r, found))
@@ -175,14 +175,15 @@ class BoardPose:
         return best, ""
 
     def _is_clearly_better(self, best: EdgeRound, second: EdgeRound, found: Indices) -> bool:
-        """Whether the edges of the markers that were read are clearly nearer to where the first
-        pose puts them than to where the second one does."""
+        """Whether the edges of the detected markers clearly fit the first pose better than the
+        second.
+        """
         # For one marker. Wrong poses fitted up to 0.6 worse in 92 test images.
         ratio = 1.0 + 0.7 / len(found)
         return self._median_residual(second, found) > ratio * self._median_residual(best, found)
 
     def _median_residual(self, last: EdgeRound, found: Indices) -> float:
-        """How far the edges of the markers that were read are off, the median [pixels]."""
+        """Median residual of the detected markers' edges [pixels]."""
         own = np.isin(self._edges.marker[last.views.which], found)
         return float(np.median(np.abs(last.residual[own])))
 
@@ -194,7 +195,7 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """What to tell about a pose."""
+        """Build the estimate of a refined pose."""
         wrong = self._wrong_board.describe_foreign_markers(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
@@ -206,7 +207,7 @@ class BoardPose:
         if X_SC_known is not None:
             scale = scale_by_height(refined.X_SC, X_SC_known)
         if abs(scale - 1.0) > MIN_SCALE_DEVIATION:
-            # Distances by such a print are false by as much.
+            # A wrong print size makes distances wrong by the same ratio.
             reason = (
                 f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give the"
                 " measured lengths of its rulers"
@@ -227,8 +228,9 @@ class BoardPose:
         )
 
     def _seen_corners(self, refined: RefinedPose) -> tuple[Indices, Array, float]:
-        """Markers that were used, their corners (N, 4, 2) as their edges put them, and how far that
-        is from where the pose puts them, root mean square [pixels]."""
+        """Used markers, their corners (N, 4, 2) by their measured edges, and the root mean square
+        reprojection error [pixels].
+        """
         marker = self._edges.marker[refined.views.which]
         weight = refined.weight / refined.sd**2
         normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
@@ -246,7 +248,7 @@ class BoardPose:
         return used, self.intrinsics.project(p_C) + shift[:, None], error
 
     def _mirrored_reason(self, grey: Bytes, seen: Detection) -> str:
-        """That more markers can be read in the mirrored image, if so."""
+        """Reason if more markers can be read in the mirrored image, else empty."""
         if seen.candidates < MIN_FOREIGN_MARKERS:
             return ""
         mirrored = self._detector.detect(np.ascontiguousarray(grey[:, ::-1]))
@@ -259,8 +261,9 @@ class BoardPose:
         )
 
     def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """That markers beside the board stand as on another print of it, or on a board whose rows
-        go on there; empty if none do."""
+        """Reason if markers beside the board belong to a second print of it or to a larger board,
+        else empty.
+        """
         min_copy_markers = 3  # Markers of a second print of the board.
         rest = ~coarse.inliers
         if not coarse.X_SC or rest.sum() < min_copy_markers:
@@ -269,7 +272,7 @@ class BoardPose:
         copy = estimate_coarse_pose(places, corners, self.intrinsics)
         if not copy.X_SC or copy.inliers.sum() < min_copy_markers:
             return ""
-        # Another board's markers would be within this one's grid: two sheets lie side by side.
+        # A larger board's markers would be on this board's grid; so two sheets lie side by side.
         rays = self.intrinsics.rays(corners[copy.inliers].mean(axis=1)) @ coarse.X_SC[0][:3, :3].T
         at = coarse.X_SC[0][:2, 3] - coarse.X_SC[0][2, 3] * rays[:, :2] / rays[:, 2:]
         low, high = self._p_SQ.min(axis=(0, 1))[:2], self._p_SQ.max(axis=(0, 1))[:2]
@@ -282,10 +285,10 @@ class BoardPose:
         )
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """Why the markers that were found are not this board; empty if they are."""
-        off = abs(coarse.marker_scale - 1.0)
+        """Reason if the detected markers are of another board, else empty."""
+        deviation = abs(coarse.marker_scale - 1.0)
         # Overexposure shifts sides by a pixel.
-        if off > 0.05 and off * _median_side(seen.corners) / 2.0 > 1.5:
+        if deviation > 0.05 and deviation * _median_side(seen.corners) / 2.0 > 1.5:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
@@ -293,7 +296,7 @@ class BoardPose:
         return ""
 
     def _wrong_print_reason(self, refined: RefinedPose) -> str:
-        """Why a print is none of this board; empty if it is."""
+        """Reason if the print is of another board, else empty."""
         at = self.intrinsics.project((self._p_SQ - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3])
         used = np.unique(self._edges.marker[refined.views.which[refined.weight > 0.0]])
         marker_scale = wrong_marker_size(refined.disturbance, _median_side(at[used]))
@@ -323,8 +326,9 @@ def estimate_board(
 
 
 def _untinted_light(image: Bytes) -> Single:
-    """(H, W) linear light of the lightest channel: the tints of a height map, which is printed
-    below the markers, look as white in it as paper does."""
+    """(H, W) linear light of the lightest channel, in which the tints of a height map printed below
+    the markers look white.
+    """
     image = np.asarray(image)
     if image.ndim == 2:
         return srgb_to_linear(np.ascontiguousarray(image))
@@ -358,7 +362,7 @@ def _median_side(corners: Array) -> float:
 
 
 def _residual_doubt(error: float) -> str:
-    """What is doubtful about residuals; empty if nothing is."""
+    """Describe too large residuals; empty if they are small."""
     if error > 0.3:  # Pixels. With more, intrinsics are wrong or the board is not flat.
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"

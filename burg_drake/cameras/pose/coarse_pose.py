@@ -13,17 +13,17 @@ from burg_drake.cameras.pose.marker_detection import side_lengths
 from burg_drake.core import Array, Booleans, inverse
 
 CORNER_TOLERANCE = 3.0, 0.1
-"""Pixels, or fraction of a marker's side if larger, of a corner from its place."""
+"""Largest offset of a corner from its place: pixels, or fraction of a marker's side if larger."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoarsePose:
-    """Poses by corners.
+    """Poses from the markers' corners.
 
     Attributes:
-        X_SC: one or two (4, 4) poses above the sheet, the better first; none if there is no such.
-        inliers: (N,) markers that stand where the board has them.
-        marker_scale: size of the markers against their distances, by the document 1.
+        X_SC: up to two (4, 4) poses above the sheet, the better first.
+        inliers: (N,) True for markers in their places on the board.
+        marker_scale: size of the markers relative to their distances; 1 as in the document.
     """
 
     X_SC: list[Array]
@@ -32,7 +32,7 @@ class CoarsePose:
 
 
 def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePose:
-    """Finds the pose.
+    """Estimate the pose from corners.
 
     Args:
         p_SQ: (N, 4, 3) corners on the board [m].
@@ -67,7 +67,7 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
     found: list[tuple[float, Array]] = []
     for rotation, translation, rough in zip(rotations, translations, errors.ravel(), strict=True):
         if found and rough > 10.0 * found[0][0] + 5.0:
-            continue  # no refinement makes it a rival
+            continue  # too bad to become the better pose by refinement
         rotation, translation = cv2.solvePnPRefineLM(p, q, K, None, rotation, translation)
         X_CS = np.eye(4)
         X_CS[:3, :3], X_CS[:3, 3] = cv2.Rodrigues(rotation)[0], translation.ravel()
@@ -78,15 +78,14 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
             error = float(np.sqrt(((seen - q) ** 2).sum(axis=1).mean()))
             found.append((error, inverse(X_CS)))
     found.sort(key=lambda one: one[0])
-    # Poses with smaller differences are one.
+    # Poses with smaller differences are the same.
     if len(found) == 2 and np.allclose(found[0][1], found[1][1], atol=1e-3):
         found.pop()
     return [X for _, X in found], [error for error, _ in found]
 
 
 def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Booleans:
-    """Markers whose corners fit the homography that most corners agree on, up to a distance
-    [pixels]."""
+    """Find markers whose corners fit a homography, by RANSAC, within a distance [pixels]."""
 
     cv2.setRNGSeed(0)
     _, fits = cv2.findHomography(
@@ -98,8 +97,7 @@ def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Boolea
 
 
 def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
-    """Size of the markers on a plane on which their centres stand as they should; 1 if there is no
-    such."""
+    """Size of the markers by a homography that fits their centres; 1 if there is none."""
 
     if len(p_SQ) <= 4:
         return 1.0
@@ -109,8 +107,8 @@ def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
         return 1.0
     on_board = cv2.perspectiveTransform(straight.reshape(-1, 1, 2), H).reshape(-1, 4, 2)
     sides, side = side_lengths(on_board), float(side_lengths(p_SQ).mean())
-    off = np.linalg.norm(on_board.mean(axis=1) - centers, axis=1)
-    return float(np.median(sides)) / side if off.max() < 0.1 * side else 1.0
+    distance = np.linalg.norm(on_board.mean(axis=1) - centers, axis=1)
+    return float(np.median(sides)) / side if distance.max() < 0.1 * side else 1.0
 
 
 def _marker_scale(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -> float:

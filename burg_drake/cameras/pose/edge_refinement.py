@@ -63,17 +63,17 @@ class LightSpread:
 
 @dataclass(frozen=True, eq=False)
 class EdgeRound:
-    """What a round of looking for edges found.
+    """Edges and pose of one refinement round.
 
     Attributes:
         X_SC: (4, 4).
         covariance: (6, 6), see `BoardEstimate`.
         views, fits: edges as seen by the pose before the round, and where they were found.
-        weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
+        weight: (N,) of each edge, 0 to 1; 0 for outliers.
         residual: (N,) of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
-        spread: of the light.
-        rms_motion: of the edges by the round, root mean square [pixels].
+        spread: how light spreads.
+        rms_motion: root mean square motion of the edges in this round [pixels].
     """
 
     X_SC: Array
@@ -89,11 +89,10 @@ class EdgeRound:
 
 @dataclass(frozen=True, eq=False)
 class RefinedPose(EdgeRound):
-    """A pose by edges, and what each is off from there: the last round's, less what else moves the
-    markers.
+    """The result of the last round, corrected for shifts of the markers.
 
     Attributes:
-        disturbance: what else that is.
+        disturbance: shifts of the markers and their effect.
     """
 
     disturbance: Disturbance
@@ -120,8 +119,8 @@ class EdgeRefinement:
 
         Args:
             light: (H, W) image in linear light.
-            X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
-            markers: those that were found, as indices of the layout's.
+            X_SC: (4, 4) pose, accurate to about a pixel at the edges of `markers`.
+            markers: indices of the detected markers in the layout.
             corners: (N, 4, 2) of them in the image [pixels].
 
         Returns:
@@ -160,8 +159,9 @@ class EdgeRefinement:
         return result
 
     def _count_misplaced_markers(self, result: EdgeRound, shift: Array) -> int:
-        """Markers of which most edges are not where the pose puts them, nor the corners that were
-        read: edges of small or half hidden markers are unclear without being elsewhere."""
+        """Count markers whose corners and most edges are not where the pose puts them. Unclear
+        edges alone do not count: small or half hidden markers have them, too.
+        """
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         unused = used < 0.5 * np.bincount(marker, minlength=n)
@@ -176,27 +176,26 @@ class EdgeRefinement:
         shift: Array,
         step: bool = True,
     ) -> tuple[EdgeRound, Array]:
-        """A round that looks for the edges of each marker beside its place, and weighs them by how
-        they fit to each other in the marker, not to the pose: pages that are glued beside their
-        places would drop out otherwise.
+        """Run a round that allows each marker a shift and weights its edges by how well they fit
+        each other, not the pose. Otherwise misplaced pages would be rejected as outliers.
 
         Args:
             light: (H, W) image in linear light.
-            last: round.
-            which: edges, as indices.
+            last: previous round.
+            which: indices of edges.
             shift: (M, 2) of each marker from where the pose puts it [pixels].
-            step: the pose moves to where it fits all markers best.
+            step: move the pose to the best fit of all markers.
 
         Returns:
-            The round, or the last one if too few edges are left, and the shifts from its pose.
+            The new round, or `last` if too few edges are left, and the shifts relative to its pose.
         """
         max_shift = EDGE_MARGIN_PX / 2.0  # Pixels. The fit across an edge stays within the image.
         views = project_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
         marker = self._edges.marker[views.which]
         normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
         shift = np.clip(shift, -max_shift, max_shift)
-        looked_at = replace(views, at=views.at + shift[marker])
-        fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
+        shifted_views = replace(views, at=views.at + shift[marker])
+        fits = fit_edges(light, self._edges, shifted_views, last.spread.blur)
         good = has_expected_profile(fits)
         if good.sum() < MIN_EDGES:
             return last, shift
@@ -237,7 +236,7 @@ class EdgeRefinement:
         return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
     def with_disturbance(self, light: Single, last: EdgeRound) -> RefinedPose:
-        """The pose of the last round if markers may be shifted."""
+        """The pose of the last round, corrected for marker shifts."""
         found = self._disturbance(last)
         if replace(found.shifts, size=0.0) != MarkerShifts():
             # Weights by how edges fit the pose leave out those that shifts move most, so that
@@ -256,7 +255,7 @@ class EdgeRefinement:
         return RefinedPose(**vars(last), disturbance=found)
 
     def _fit_shifted(self, light: Single, last: EdgeRound, found: Disturbance) -> EdgeRound:
-        """A round that looks for the edges where shifts put their markers."""
+        """Run a round that measures the edges at their shifted markers."""
         rest = last.residual - last.views.motion @ found.step
         there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
         shift = self._shifts_by_marker(there, rest)
@@ -273,15 +272,15 @@ class EdgeRefinement:
         ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
 
     def _unknown_size(self, p_SC: Array) -> Array:
-        """(3, 3) covariance of the camera's position over a print that is longer along one axis by
-        as much as its length: which of both axes is right, the image does not say, nor to which
-        part of the sheet S belongs."""
+        """(3, 3) covariance of the camera's position per relative stretch of the print along one
+        axis. The image shows neither which axis is right nor which part of the sheet is S's origin.
+        """
         middle = np.r_[self._modes.middle, 0.0]
         arm = p_SC - middle
         return np.asarray(0.25 * (np.outer(arm, arm) + np.diag(middle**2)))
 
     def _shift_by_blur(self, last: EdgeRound) -> Array:
-        """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
+        """(3, 3) covariance of the rotation that an asymmetric blur causes."""
         sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
         # Square pixels of lens and pixel in a sharp image.
         beyond = max(last.spread.variance - 0.5, 0.0)
@@ -289,17 +288,19 @@ class EdgeRefinement:
         return np.asarray(0.04**2 * beyond * sideways @ sideways.T)
 
     def _first_spread(self, light: Single, X_SC: Array, which: Indices) -> LightSpread:
-        """The blur with which edges are most like what they should be."""
-        tried = np.tile(which[: FIRST_EDGES // len(INITIAL_BLURS)], len(INITIAL_BLURS))
-        views = project_edges(self._edges, tried, self._intrinsics, X_SC)
+        """The initial blur under which the edges fit best."""
+        candidates = np.tile(which[: FIRST_EDGES // len(INITIAL_BLURS)], len(INITIAL_BLURS))
+        views = project_edges(self._edges, candidates, self._intrinsics, X_SC)
         if len(views.which) == 0:
             return LightSpread(INITIAL_BLURS[0])
         blurs = np.repeat(INITIAL_BLURS, len(views.which) // len(INITIAL_BLURS), axis=0)
-        unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(INITIAL_BLURS), -1)
-        return LightSpread(INITIAL_BLURS[int(np.argmin(np.median(unlike, axis=1)))])
+        noise_by_blur = fit_edges(light, self._edges, views, blurs).noise.reshape(
+            len(INITIAL_BLURS), -1
+        )
+        return LightSpread(INITIAL_BLURS[int(np.argmin(np.median(noise_by_blur, axis=1)))])
 
     def _missed_markers(self, result: EdgeRound, read: Booleans) -> Booleans:
-        """(N,) other markers that the image may show, whose place the pose tells well enough."""
+        """(N,) unread markers in the image whose position the pose predicts well enough."""
         at, variance = predict_pixels(
             self._corners, self._intrinsics, result.X_SC, result.covariance
         )
@@ -308,7 +309,7 @@ class EdgeRefinement:
         return np.asarray(~read & in_image & (variance < 0.5**2).all(axis=1))  # Pixels.
 
     def _edges_in_sight(self, result: EdgeRound, found: Indices) -> Indices:
-        """Edges of the markers of which a part is in sight, and of those that were found."""
+        """Indices of the edges of detected and of partly visible markers."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         read = np.unique(self._edges.marker[found])
@@ -350,29 +351,28 @@ class EdgeRefinement:
     def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
         """Covariance (6, 6) of a step, by the residuals' own scale.
 
-        What the model errs by is alike within a marker, so that it counts once a marker, not once
-        an edge.
+        Model errors are correlated within a marker and count once per marker, not per edge.
         """
         total = weight.sum()
         markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
         scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
         # Pixels. Part of the error that edges of one marker share.
-        alike = max(total / max(markers, 1) - 1.0, 0.0) * 0.006**2
+        shared_variance = max(total / max(markers, 1) - 1.0, 0.0) * 0.006**2
         J = np.column_stack([views.motion, views.bloom])
-        J = J * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        J = J * np.sqrt(weight / (scale * sd**2 + shared_variance))[:, None]
         covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
         return covariance
 
 
 def _bloom_prior() -> Array:
-    """(7, 7) information about a step that is known before."""
+    """(7, 7) prior information about a step."""
     prior = np.zeros((7, 7))
     prior[6, 6] = 1.0  # White may look larger on all sides, by about a pixel.
     return prior
 
 
 def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: Booleans) -> Array:
-    """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
+    """(2, 2) updated blur, under which the edges fit better; unchanged along axes without edges."""
     n = views.across[good]
     n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
     across, information = widening[good].T

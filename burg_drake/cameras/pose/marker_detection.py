@@ -17,13 +17,12 @@ MIN_CELL_CONTRAST = 10.0
 
 
 def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimeter: float) -> Array:
-    """(N, 4, 2) corners of what is darker than its surroundings and has four sides, clockwise in
-    the image [pixels].
+    """(N, 4, 2) corners of dark quadrilaterals, clockwise in the image [pixels].
 
     Args:
         grey: (H, W) image.
-        window: of the surroundings, odd [pixels].
-        constant: by which it is darker than their mean [8-bit levels].
+        window: odd side of the neighbourhood whose mean is the threshold [pixels].
+        constant: least difference to that mean [8-bit levels].
         perimeter: least length of a contour [pixels].
     """
     border = 3  # Pixels between corners and the image's border: OpenCV's value.
@@ -59,15 +58,15 @@ def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimete
 
 
 def read_cells(grey: Bytes, corners: Array, cells: int) -> tuple[Booleans, Array]:
-    """Which cells of quadrilaterals are black, in rows from the first corner toward the second.
+    """Read the black cells of quadrilaterals, in rows from the first corner toward the second.
 
     Args:
         grey: (H, W) image.
         corners: (N, 4, 2), see `find_dark_quadrilaterals`.
-        cells: along a side.
+        cells: number of cells along a side.
 
     Returns:
-        (N, cells, cells), and contrasts (N,) of black and white [8-bit levels].
+        (N, cells, cells) True for black, and (N,) contrasts of black and white [8-bit levels].
     """
     sample_offsets = (-0.2, 0.2)  # Cells from the middle of a cell, along both axes.
 
@@ -82,9 +81,9 @@ def read_cells(grey: Bytes, corners: Array, cells: int) -> tuple[Booleans, Array
 
 
 def _from_unit_square(corners: Array, x: Array, y: Array) -> tuple[Single, Single]:
-    """(N, M) columns and rows of points of the unit square under the homographies that take its
-    corners to those of quadrilaterals (Heckbert, Fundamentals of Texture Mapping, 1989, section
-    2.2)."""
+    """(N, M) columns and rows of points of the unit square, mapped by the homographies to
+    quadrilaterals (Heckbert, Fundamentals of Texture Mapping, 1989, section 2.2).
+    """
     a, b, c, d = corners.transpose(1, 0, 2)
     (bx, by), (dx, dy), (sx, sy) = (b - c).T, (d - c).T, (a - b + c - d).T
     det = bx * dy - dx * by
@@ -97,8 +96,9 @@ def _from_unit_square(corners: Array, x: Array, y: Array) -> tuple[Single, Singl
 
 
 def _otsu_split(means: Array, shape: tuple[int, ...]) -> tuple[Booleans, Array]:
-    """Splits each row of brightnesses where the variance between both parts is largest (Otsu, A
-    Threshold Selection Method from Gray-Level Histograms, 1979)."""
+    """Split each row of brightnesses where the between-class variance is largest (Otsu, A Threshold
+    Selection Method from Gray-Level Histograms, 1979).
+    """
     ordered = np.sort(means, axis=1)
     count = np.arange(1, means.shape[1])
     total = np.cumsum(ordered, axis=1)
@@ -129,10 +129,10 @@ class Detection:
     """Markers of a board that were found in an image.
 
     Attributes:
-        index: (N,) which of the layout's markers each is.
+        index: (N,) indices into the layout's markers.
         corners: (N, 4, 2) their corners, in the order of the layout's [pixels].
-        candidates: number of other squares that may be markers, but not of this board.
-        duplicated: (M,) markers of the layout that are seen at two places or more; not in `index`.
+        candidates: number of other squares that may be markers of another board.
+        duplicated: (M,) markers that were found at several places; not in `index`.
     """
 
     index: Indices = field(default_factory=lambda: np.empty(0, dtype=np.intp))
@@ -157,17 +157,17 @@ class MarkerDetector:
         self._patterns = _pack_bits(np.concatenate(turned)[:, ~self._border])
         correctable = marker_dictionary(layout.dictionary).maxCorrectionBits
         self._tolerance = int(MAX_BIT_CORRECTION * correctable)
-        self._enough = min(3, len(layout.ids))  # The first search suffices with as many.
+        self._sufficient_count = min(3, len(layout.ids))  # The first search suffices with as many.
 
     def detect(self, grey: Bytes) -> Detection:
-        """Finds markers in an image (H, W). One that is seen twice counts as not seen."""
+        """Find markers in an image (H, W). Markers that are found twice are left out."""
         found = Detection()
         for encoded, (windows, constant) in MARKER_SEARCHES:
             image = grey if encoded else linear_levels(srgb_to_linear(grey))
             again = self._search(image, windows, constant)
             if again.count >= found.count:
                 found = again
-            if found.count >= (self._enough if encoded else 1):
+            if found.count >= (self._sufficient_count if encoded else 1):
                 break
         return found
 
@@ -180,10 +180,10 @@ class MarkerDetector:
             return Detection()
         black, contrast = read_cells(grey, squares, self._cells)
         inside = _pack_bits(black[:, ~self._border])
-        wrong = np.bitwise_count(inside[:, None] ^ self._patterns)
-        best = wrong.argmin(axis=1)
+        bit_errors = np.bitwise_count(inside[:, None] ^ self._patterns)
+        best = bit_errors.argmin(axis=1)
         fits = (
-            (wrong.min(axis=1) <= self._tolerance)
+            (bit_errors.min(axis=1) <= self._tolerance)
             & ((~black[:, self._border]).mean(axis=1) <= MAX_BORDER_ERRORS)
             & (contrast >= MIN_CELL_CONTRAST)
         )
@@ -194,7 +194,7 @@ class MarkerDetector:
         return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()), twice)
 
     def _refined_corners(self, grey: Bytes, corners: Array) -> Array:
-        """Corners where the lines of both of their sides meet."""
+        """Refine corners to the intersections of the sides' lines."""
 
         if not len(corners):
             return corners
@@ -211,7 +211,7 @@ class MarkerDetector:
 
 
 def _pack_bits(cells: Booleans) -> NDArray[np.uint64]:
-    """(N,) cells (N, K) as the bits of a number; dictionaries have 49 at most."""
+    """(N,) integers whose bits are the cells (N, K); dictionaries have at most 49 bits."""
     bits = np.uint64(1) << np.arange(cells.shape[1], dtype=np.uint64)
     return np.asarray(np.where(cells, bits, np.uint64(0)).sum(axis=1, dtype=np.uint64))
 
@@ -223,8 +223,9 @@ def side_lengths(corners: Array) -> Array:
 
 
 def _remove_duplicates(index: Indices, corners: Array) -> tuple[Indices, Array, Indices]:
-    """Markers that are seen at one place, by the largest quadrilateral there, and those that are
-    seen at several."""
+    """Merge duplicates: markers found at one place, by its largest quadrilateral, and markers found
+    at several.
+    """
     side, middle = side_lengths(corners), corners.mean(axis=1)
     order = np.lexsort((-side, index))
     index, corners, side, middle = index[order], corners[order], side[order], middle[order]
@@ -238,10 +239,10 @@ def _remove_duplicates(index: Indices, corners: Array) -> tuple[Indices, Array, 
 
 @dataclass(frozen=True)
 class ForeignMarkers:
-    """Markers that are not of a board.
+    """Markers that do not belong to a board.
 
     Attributes:
-        dictionary: OpenCV's name of theirs, without `DICT_`.
+        dictionary: OpenCV's name of their dictionary, without `DICT_`.
         ids: their numbers.
     """
 
@@ -255,7 +256,7 @@ def format_ids(ids: tuple[int, ...] | list[int]) -> str:
 
 
 def no_markers_reason(grey: Bytes, layout: MarkerLayout, candidates: int) -> str:
-    """Why no marker of a board was found in an image (H, W) with some candidates."""
+    """Explain why no marker of a board was found in an image (H, W)."""
     other = find_foreign_markers(grey, layout) if candidates else None
     if other is None:
         return "no marker of the board in sight"
@@ -269,7 +270,7 @@ def no_markers_reason(grey: Bytes, layout: MarkerLayout, candidates: int) -> str
 
 
 def misplaced_reason(count: int, fit: int) -> str:
-    """Why markers are not this board's, of which only some stand where they should."""
+    """Explain that the markers are of another board, as only some are in their places."""
     return (
         f"another board: only {fit} of {format_marker_count(count)} in sight are where this one"
         " has them; are columns, rows and first_id right?"
@@ -282,13 +283,12 @@ def format_marker_count(count: int) -> str:
 
 
 def find_foreign_markers(grey: Bytes, layout: MarkerLayout) -> ForeignMarkers | None:
-    """Looks for markers that a board does not have: of its dictionary, and of common others.
+    """Find markers that a board does not have, of its dictionary and other common ones.
 
     Takes as long as eight detections.
 
     Returns:
-        Those of the dictionary of which there are most; None if there are fewer than
-        `MIN_FOREIGN_MARKERS` of each.
+        The markers of the most frequent dictionary; None with fewer than `MIN_FOREIGN_MARKERS`.
     """
     # Dictionaries of other boards.
     others = ["ARUCO_MIP_36h12", "4X4_250", "5X5_250", "6X6_250", "7X7_250", "APRILTAG_36h11"]

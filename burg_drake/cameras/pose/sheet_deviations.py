@@ -18,8 +18,9 @@ from burg_drake.cameras.pose.edge_measurement import MIN_VISIBLE_DEPTH, EdgeView
 from burg_drake.core import Array, Indices
 
 MARKER_SIGMAS_PX = 0.006, 0.02, 0.06, 0.2
-"""Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
-[pixels]. In images without noise the first one is right."""
+"""Standard deviations that are tried for shifts of single markers by unmodelled errors [pixels].
+The first one suits images without noise.
+"""
 MIN_MODE_VARIANCE = 1e-3
 """Variance of a pattern, as a fraction of the strongest one's."""
 SHIFT_SIGMAS: dict[str, tuple[float, ...]] = {
@@ -34,7 +35,7 @@ SHIFT_SIGMAS: dict[str, tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class MarkerShifts:
-    """Standard deviations of shifts; 0 for those that are not.
+    """Standard deviations of marker shifts by their cause; 0 for a cause that is absent.
 
     Attributes:
         marker: of single markers [pixels].
@@ -55,22 +56,22 @@ class MarkerShifts:
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """A step of a pose that allows for shifts of markers.
+    """A correction of a pose that accounts for marker shifts.
 
     Attributes:
         step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
         covariance: (6, 6) of it.
         shifts: how large they are.
-        in_plane: largest shift along the sheet of a marker that was seen [m]. This, and what
-            follows, is 0 where the residuals tell no such shift beyond chance.
-        out_of_plane: largest height of one [m].
-        rows: by what markers move in the time from the first row of the image to the last one,
-            root mean square [pixels].
-        aspect: how much longer the print is along y than along x [-].
-        size: by how much the markers are larger for their distances [-].
-        mean_square_aspect: of how much longer the print may be along y than along x, by
-            probability, whether told or not [-].
-        residual: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
+        in_plane: largest shift along the sheet of a visible marker [m]. This and the following
+            fields are 0 where the residuals do not show such a shift beyond chance.
+        out_of_plane: largest height of a visible marker [m].
+        rows: root mean square motion of markers from the first to the last row of the image
+            [pixels].
+        aspect: excess length of the print along y over x [-].
+        size: excess size of the markers relative to their distances [-].
+        mean_square_aspect: expected square of the excess length along y over x, whether it is
+            reported or not [-].
+        residual: (N,) offsets of all edges minus the most probable shifts [pixels].
     """
 
     step: Array
@@ -86,8 +87,7 @@ class Disturbance:
 
 
 class SheetModes:
-    """Patterns of shifts of a board's edges, which are independent of each other, and of which the
-    first few make up nearly all.
+    """Independent shift patterns of a board's edges. The first few explain nearly all variance.
 
     The frame S of a sheet with errors is the one that fits all its markers best, so that a pattern
     neither shifts nor turns the sheet as a whole.
@@ -111,7 +111,7 @@ class SheetModes:
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _covariance_modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
-        # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
+        # Not only the markers' middles: a curling sheet rises most beyond the last middle.
         corners = p_SQ.reshape(-1, 3)
         # Metres within which heights are correlated.
         alike, between = _correlated_covariance(corners, p_SE, 0.14)
@@ -120,8 +120,9 @@ class SheetModes:
 
 
 def _correlated_covariance(points: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
-    """(M, M) covariance of shifts of points (M, 3) that are alike within a distance [m], and
-    (N, M) shifts of edges by those of the points."""
+    """(M, M) covariance of shifts of points (M, 3), correlated within a distance [m], and (N, M)
+    interpolation of edge shifts from them.
+    """
     covariance, to_edges = (
         np.exp(-((p[:, None] - points) ** 2).sum(axis=-1) / (2.0 * within**2))
         for p in (points, p_SE)
@@ -131,7 +132,7 @@ def _correlated_covariance(points: Array, p_SE: Array, within: float) -> tuple[A
 
 
 def _covariance_modes(covariance: Array, whole: Array) -> Array:
-    """(N, K) independent patterns of a covariance (N, N) without what moves all (N, 3)."""
+    """(N, K) independent modes of a covariance (N, N) without common motions `whole` (N, 3)."""
     Q, _ = np.linalg.qr(whole)
     rest = np.eye(len(covariance)) - Q @ Q.T
     variance, patterns = np.linalg.eigh(rest @ covariance @ rest)
@@ -142,13 +143,14 @@ def _covariance_modes(covariance: Array, whole: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _ShiftSolution:
-    """What shifts of some size leave of the step.
+    """The pose step for one assumed size of the shifts.
 
     Attributes:
-        logarithm: of the probability of what was seen, but for a constant.
-        shifts: the size.
-        x, covariance: (K,) and (K, K) step of pose and bloom, and strengths of patterns.
-        columns: (K,) of all that there are.
+        logarithm: log likelihood of the measurements, up to a constant.
+        shifts: assumed size of the shifts.
+        x, covariance: (K,) and (K, K) step of pose and bloom, then amplitudes of the shift
+            patterns.
+        columns: (K,) which columns of the full problem are used.
     """
 
     logarithm: float
@@ -164,9 +166,8 @@ class DisturbanceFit:
     Args:
         views: edges as seen by a pose.
         offset: (N,) of each from there [pixels].
-        information: (N,) inverse variance of each by the image's noise, 0 for those that do not
-            count.
-        marker: (N,) that each belongs to.
+        information: (N,) inverse variance of each by the image's noise, 0 for excluded edges.
+        marker: (N,) marker that each edge belongs to.
         modes: patterns of shifts of the sheet.
         height: of the image [pixels].
     """
@@ -195,10 +196,10 @@ class DisturbanceFit:
         x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
         strength = np.sqrt((J[kept] ** 2).mean(axis=0)) + 1e-9
         # What the camera does from the first row to the last one moves each edge by [pixels].
-        self._turning = J / strength / np.sqrt(6.0)
+        self._rolling_motion = J / strength / np.sqrt(6.0)
         parts = {
             "pose": np.column_stack([J, views.bloom]),
-            "rows": row * self._turning,
+            "rows": row * self._rolling_motion,
             "aspect": 0.5 * (views.print[:, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
             "size": views.print[:, 1:],
             "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
@@ -208,11 +209,11 @@ class DisturbanceFit:
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
         self._J = np.column_stack(list(parts.values()))
-        self._add_up()
+        self._sum_equations()
         self._equations = {sd: self._normal_equations(sd) for sd in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
-        """The most probable shifts, and the step of the pose with them.
+        """Find the most probable shifts and the pose step they imply.
 
         Args:
             prior: (7, 7) information about the step of pose and bloom that is known before.
@@ -230,25 +231,25 @@ class DisturbanceFit:
         return self._disturbance(best, list(solved.values()), center)
 
     def _by_marker(self) -> tuple[Array, Array]:
-        """(n, 2, 2) information about the shift of each marker, and (n, 2) times what is seen."""
+        """(n, 2, 2) information about the shift of each marker, and (n, 2) right-hand sides."""
         G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
         return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
 
     def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
-        """Variance of offsets within markers over that by the image's noise."""
-        alike = np.column_stack([views.motion, views.bloom, views.print])
+        """Ratio of the offsets' variance within markers to that of the image's noise."""
+        common_motions = np.column_stack([views.motion, views.bloom, views.print])
         rest = residuals_within_markers(
-            self._normal, alike, self._offset, information, self._marker
+            self._normal, common_motions, self._offset, information, self._marker
         )
         markers = len(np.unique(self._marker[self._kept]))
-        freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
+        freedom = np.count_nonzero(self._kept) - 2 * markers - common_motions.shape[1]
         if freedom < 5:  # Degrees of freedom from which on the spread is known.
             return 1.0
         # Relative to noise; keeps probabilities finite.
         return float(max((information * rest**2).sum() / freedom, 1e-3))
 
-    def _add_up(self) -> None:
-        """Sums over all edges, and those by marker, of the columns and of what is seen."""
+    def _sum_equations(self) -> None:
+        """Sum the normal equations over all edges and by marker."""
         G, g = self._by_marker()
         both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
         both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)
@@ -258,16 +259,17 @@ class DisturbanceFit:
         self._squares = (seen * weight[:, None]).T @ seen
 
     def _normal_equations(self, marker_sd: float) -> tuple[Array, Array, float]:
-        """(K, K) and (K,) normal equations of all columns if single markers are shifted as well,
-        and what that leaves of the logarithm of the probability."""
+        """(K, K) and (K,) normal equations of all columns with shifts of single markers, and their
+        contribution to the log likelihood.
+        """
         inner = self._G + np.eye(2) / marker_sd**2
         a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
         det = a * c - b * b
         inverse = np.stack([c, -b, -b, a], axis=-1).reshape(-1, 2, 2) / det[:, None, None]
         shares = self._shares.reshape(-1, self._shares.shape[2])
-        left = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
+        reduced = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
         volume = float(np.log(det * marker_sd**4).sum())
-        return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
+        return reduced[:-1, :-1], reduced[:-1, -1], -0.5 * (float(reduced[-1, -1]) + volume)
 
     def _solve(self, shifts: MarkerShifts, prior: Array) -> _ShiftSolution:
         pose = self._columns["pose"]
@@ -281,19 +283,20 @@ class DisturbanceFit:
         covariance = np.linalg.inv(A)
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
-        rare = sum(
+        penalty_count = sum(
             1 + (sds[k] == SHIFT_SIGMAS[k][-1] and len(SHIFT_SIGMAS[k]) > 1)
             for k in _present_kinds(shifts)
         )
         # For each kind of shift; twice for its largest size.
-        logarithm -= float(np.log(known).sum()) + 6.0 * rare
+        logarithm -= float(np.log(known).sum()) + 6.0 * penalty_count
         return _ShiftSolution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(
         self, best: _ShiftSolution, solved: list[_ShiftSolution], center: float
     ) -> Disturbance:
-        """What the best solution says, its step and covariance those of all, by probability. The
-        step takes the principal point as it is known, so that the pose fits the image with it."""
+        """The best solution, with step and covariance averaged over all solutions by probability.
+        The step assumes the given principal point, so that the pose fits the image with it.
+        """
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
         chosen = _present_kinds(best.shifts)
@@ -323,7 +326,7 @@ class DisturbanceFit:
             best.shifts,
             float(np.linalg.norm(self._modes[0][self._kept] @ in_plane, axis=1).max()),
             float(np.abs(self._modes[1][self._kept] @ out_of_plane).max()),
-            float(np.sqrt(2.0 * ((self._turning[self._kept] @ rows) ** 2).mean())),
+            float(np.sqrt(2.0 * ((self._rolling_motion[self._kept] @ rows) ** 2).mean())),
             float(aspect[0]),
             float(size[0]),
             float(weight @ np.square(aspects)),
@@ -334,12 +337,12 @@ class DisturbanceFit:
 def residuals_within_markers(
     normal: Array, alike: Array, offset: Array, information: Array, marker: Indices
 ) -> Array:
-    """(N,) offsets of edges without what a shift of each marker explains, and changes that are
-    alike for all markers [pixels].
+    """(N,) edge offsets that neither a shift of each marker nor changes common to all markers
+    explain [pixels].
 
     Args:
         normal: (N, 2) directions of the offsets.
-        alike: (N, K) motion of edges by such changes.
+        alike: (N, K) motion of edges by the common changes.
         offset: (N,) of edges [pixels].
         information: (N,) inverse variance of each offset.
         marker: (N,) that each belongs to.
@@ -362,7 +365,7 @@ def _present_kinds(shifts: MarkerShifts) -> set[str]:
 
 
 def _neighbouring_shifts(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
-    """Shifts that differ from some in one kind, and in those of single markers."""
+    """Variants of shifts in which one kind, or the shift of single markers, differs."""
     for marker_sd in {shifts.marker, MARKER_SIGMAS_PX[0]}:
         for kind, values in SHIFT_SIGMAS.items():
             for value in values:
@@ -374,8 +377,8 @@ MIN_SCALE_DEVIATION = 0.01
 
 
 def wrong_marker_size(found: Disturbance, side: float) -> float:
-    """Size of the markers against their distances if no light makes that, so that it is another
-    board; 1 otherwise.
+    """Size of the markers relative to their distances if lighting cannot explain it and this is
+    another board; 1 otherwise.
 
     Args:
         found: in the image.
@@ -387,7 +390,7 @@ def wrong_marker_size(found: Disturbance, side: float) -> float:
 
 
 def implausible_reason(found: Disturbance) -> str:
-    """Why no print of a board looks like that; empty if one may."""
+    """Explain why no print of the board can look like that; empty if it can."""
     if abs(found.aspect) > 0.05:
         return (
             f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
@@ -402,7 +405,7 @@ def implausible_reason(found: Disturbance) -> str:
 
 
 def print_doubt(found: Disturbance) -> str:
-    """What is doubtful about a print, how it lies, or the camera's motion; empty if all is well."""
+    """Describe doubts about the print, its flatness, or camera motion; empty if there are none."""
     if abs(found.aspect) > 0.003:
         return (
             f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"
@@ -435,7 +438,8 @@ def print_doubt(found: Disturbance) -> str:
 def scale_by_depth(
     p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, depth: NDArray[np.floating[Any]]
 ) -> float:
-    """Size of the printed board against the document, by a depth image; NaN if it shows too little.
+    """Size of the printed board relative to the document, from a depth image; NaN with too few
+    depths.
 
     Args:
         p_SQ: (..., 3) points of the board that are in sight [m].
@@ -454,5 +458,5 @@ def scale_by_depth(
 
 
 def scale_by_height(X_SC: Array, X_SC_known: Array) -> float:
-    """Size of the printed board against the document, by the known height of the camera over it."""
+    """Size of the printed board relative to the document, from the camera's known height."""
     return float(X_SC_known[2, 3] / X_SC[2, 3])

@@ -25,7 +25,7 @@ CORNER_DIRECTIONS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]
 
 
 class WrongBoardCheck:
-    """Looks for signs of another sheet in images of one board by one camera.
+    """Detects signs of another board in images of one board by one camera.
 
     Args:
         board: of the document.
@@ -38,29 +38,29 @@ class WrongBoardCheck:
         self._layout, self._intrinsics = layout, intrinsics
         self._columns = len(np.unique(np.round(layout.p_SQ[:, 0, 0], 9)))
         self._rows = len(layout.ids) // self._columns
-        self._half = 0.5 * layout.side * np.array(scale)
+        self._half_side = 0.5 * layout.side * np.array(scale)
         pitch = layout.side + board.markers.spacing
         row, column = np.mgrid[-1 : self._rows + 1, -1 : self._columns + 1]
         ring = (row < 0) | (row == self._rows) | (column < 0) | (column == self._columns)
         first = layout.p_SQ[0].mean(axis=0)[:2]
-        self._around = (first + pitch * np.stack([column, -row], axis=-1)[ring]) * scale
-        self._inside = layout.p_SQ.mean(axis=1)[:, :2] * scale
+        self._outer_places = (first + pitch * np.stack([column, -row], axis=-1)[ring]) * scale
+        self._marker_places = layout.p_SQ.mean(axis=1)[:, :2] * scale
         last_pixel = intrinsics.width - 1, intrinsics.height - 1
         corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * last_pixel
         slopes = (intrinsics.undistort(corners) - intrinsics.center) / intrinsics.focal
-        # Slopes of used rays over those of the image's corners.
-        self._steepest = 1.02 * float(np.linalg.norm(slopes, axis=1).max())
+        # Largest slope of a ray that is used, relative to the image's corners.
+        self._max_slope = 1.02 * float(np.linalg.norm(slopes, axis=1).max())
         cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
         # Middles of the border's cells, and the white beside them, in half sides.
-        self._frame = np.concatenate(
+        self._border_offsets = np.concatenate(
             [(1.0 - cell) * SIDE_DIRECTIONS, (1.0 + min(cell, gap)) * SIDE_DIRECTIONS]
         )
         # Points of a place that must be blank; the outer ones are on its border.
         middles = np.linspace(cell - 1.0, 1.0 - cell, 4)
-        self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+        self._blank_offsets = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
     def describe_foreign_markers(self, grey: Bytes, light: Single, X_SC: Array) -> str:
-        """Which markers stand around the grid, where the document has none.
+        """Describe markers around the grid, where the document has none.
 
         Args:
             grey: (H, W) image.
@@ -68,18 +68,18 @@ class WrongBoardCheck:
             X_SC: (4, 4) pose that fits the markers.
 
         Returns:
-            What is wrong; empty if nothing is.
+            A message, empty if there are none.
         """
         min_foreign = 2  # Markers beyond the document's that show another board.
-        at, seen = self._places(X_SC, self._around, self._frame)
+        at, seen = self._project_places(X_SC, self._outer_places, self._border_offsets)
         if not seen.any():
             return ""
         values = _sample_light(light, at[seen])
         # Fraction of the light of the white frame.
         darker = (values[:, :4] < 0.6 * values[:, 4:]).sum(axis=1)
         # Sides of four that must look like a marker's border.
-        suspects = self._around[seen][darker >= 3]
-        ids = self._read(grey, X_SC, suspects) if len(suspects) >= min_foreign else []
+        suspects = self._outer_places[seen][darker >= 3]
+        ids = self._read_ids(grey, X_SC, suspects) if len(suspects) >= min_foreign else []
         if len(ids) < min_foreign:
             return ""
         return (
@@ -89,20 +89,22 @@ class WrongBoardCheck:
         )
 
     def describe_blank_line(self, light: Single, X_SC: Array, used: Indices) -> str:
-        """Which row or column next to those in sight is blank paper.
+        """Describe a row or column that should have markers but is blank paper.
 
         Args:
             light, X_SC: see `describe_foreign_markers`.
             used: markers that were seen, as indices of the layout's.
 
         Returns:
-            What is doubtful; empty if nothing is.
+            A message, empty if there is none.
         """
         rows, columns = np.divmod(used, self._columns)
         for across, lines, count in ((True, rows, self._rows), (False, columns, self._columns)):
             for line in (lines.min() - 1, lines.max() + 1):
                 if 0 <= line < count and self._is_blank(light, X_SC, used, across, line):
-                    return self._doubt(across, int(line), int(lines.min()), int(lines.max()))
+                    return self._blank_line_reason(
+                        across, int(line), int(lines.min()), int(lines.max())
+                    )
         return ""
 
     def _is_blank(
@@ -113,26 +115,28 @@ class WrongBoardCheck:
         across: bool,
         line: int,
     ) -> bool:
-        """All places of a row or column that are in the image are as light as paper all over."""
+        """Whether all visible marker places of a row or column are as light as blank paper."""
         max_difference = 0.35  # Fraction of the light of paper nearby.
-        every = np.arange(len(self._inside)).reshape(self._rows, self._columns)
+        every = np.arange(len(self._marker_places)).reshape(self._rows, self._columns)
         which = every[line] if across else every[:, line]
-        at, seen = self._places(X_SC, self._inside[which], self._looks)
+        at, seen = self._project_places(X_SC, self._marker_places[which], self._blank_offsets)
         if seen.sum() < min(3, len(which)):  # Visible places of a row or column, or all of them.
             return False
         values = _sample_light(light, at[seen])
         if (np.ptp(values, axis=1) > 2.0 * max_difference * values.max(axis=1)).any():
             return False
-        white, in_image = self._places(X_SC, self._inside[used], self._frame[4:])
+        white, in_image = self._project_places(
+            X_SC, self._marker_places[used], self._border_offsets[4:]
+        )
         if not in_image.any():
             return False
         paper = np.median(_sample_light(light, white[in_image]), axis=1)
         # Light falls unevenly: the paper beside the nearest markers that are in sight counts.
-        away = self._inside[which][seen][:, None] - self._inside[used][in_image]
+        away = self._marker_places[which][seen][:, None] - self._marker_places[used][in_image]
         nearest = paper[(away**2).sum(axis=2).argmin(axis=1)]
         return bool((np.abs(values - nearest[:, None]) < max_difference * nearest[:, None]).all())
 
-    def _doubt(self, across: bool, line: int, first: int, last: int) -> str:
+    def _blank_line_reason(self, across: bool, line: int, first: int, last: int) -> str:
         names = ("row", "from the top") if across else ("column", "from the left")
         looks = ""
         if across:
@@ -145,9 +149,9 @@ class WrongBoardCheck:
             f" another board{looks}?"
         )
 
-    def _places(self, X_SC: Array, middles: Array, offsets: Array) -> tuple[Array, Any]:
-        """Pixels (N, M, 2) of points around places on the sheet, and places (N,) of which all are
-        in the image.
+    def _project_places(self, X_SC: Array, middles: Array, offsets: Array) -> tuple[Array, Any]:
+        """Pixels (N, M, 2) of points around places on the sheet, and (N,) whether all points of a
+        place are in the image.
 
         Args:
             X_SC: (4, 4).
@@ -155,20 +159,20 @@ class WrongBoardCheck:
             offsets: (M, 2) of the points [half sides of a marker].
         """
         p_S = np.zeros((len(middles), len(offsets), 3))
-        p_S[..., :2] = middles[:, None] + offsets * self._half
+        p_S[..., :2] = middles[:, None] + offsets * self._half_side
         p_C = (p_S - X_SC[:3, 3]) @ X_SC[:3, :3]
         z = np.maximum(p_C[..., 2], MIN_VISIBLE_DEPTH)
         seen = (p_C[..., 2] > MIN_VISIBLE_DEPTH) & (
-            np.hypot(p_C[..., 0], p_C[..., 1]) < self._steepest * z
+            np.hypot(p_C[..., 0], p_C[..., 1]) < self._max_slope * z
         )
         at = self._intrinsics.project(np.where(seen[..., None], p_C, [0.0, 0.0, 1.0]))
         limit = [self._intrinsics.width - 1, self._intrinsics.height - 1]
         seen &= ((at >= 0.0) & (at <= limit)).all(axis=2)
         return at, seen.all(axis=1)
 
-    def _read(self, grey: Bytes, X_SC: Array, middles: Array) -> list[int]:
-        """Numbers of markers that stand upright at places (N, 2), each once."""
-        at, _ = self._places(X_SC, middles, CORNER_DIRECTIONS)
+    def _read_ids(self, grey: Bytes, X_SC: Array, middles: Array) -> list[int]:
+        """Unique ids of upright markers at places (N, 2)."""
+        at, _ = self._project_places(X_SC, middles, CORNER_DIRECTIONS)
         black, _ = read_cells(grey, at, self._layout.cells)
         border = np.pad(np.zeros((self._layout.cells - 2,) * 2, bool), 1, constant_values=True)
         dictionary = marker_dictionary(self._layout.dictionary)

@@ -1,4 +1,4 @@
-"""Scene, station and all files that Drake reads of them as one zip, and a judge built from it."""
+"""Packs scene, station and all files that Drake reads into one zip; builds judges from it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 class BundleFiles:
     """Names of the files at the top of a bundle."""
 
-    places = "places.json"  # Where the model files lie in the bundle.
+    places = "places.json"  # Paths of the model files in the bundle.
     scene = "scene.yaml"  # Scene document.
     station = "station.yaml"  # Station document.
     hand = "hand.yaml"  # Hand document.
@@ -51,7 +51,7 @@ class Bundle:
         name: SHA-256 of `data`.
         data: a zip.
         content: `world_content` of scene and station.
-        scene_content, station_content: their own, to say which of them differs.
+        scene_content, station_content: hash of each, to name the one that differs.
     """
 
     name: str
@@ -65,13 +65,13 @@ def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundl
     """Packs a scene and a station.
 
     Args:
-        scene, station: the two.
-        looks: with materials and textures, for images; no grasp depends on them.
+        scene, station: what to pack.
+        looks: include materials and textures, which only images need.
 
     Raises:
         MeshError: a texture is too large.
         InvalidInputError: a file cannot be read.
-        UnknownNameError: a model names a package that is nowhere.
+        UnknownNameError: a model refers to an unknown package.
     """
     used = {i.object: None for i in (*scene.instances.values(), *scene.background.values())}
     entries = {name: scene.library.entry(name) for name in used}
@@ -79,13 +79,13 @@ def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundl
     own = [root / file for entry in entries.values() for file in entry.files]
     models = [root / entry.sdf for entry in entries.values()]
     packages = station.packages
-    # No package name has a dot, so none is that of one of these folders.
+    # Package names have no dot, so they cannot clash with these folders.
     trees = [_BundleTree.of("library.d", root, models, own, packages)]
     for folder, model in (("hand.d", station.hand_model), ("arm.d", station.arm_model)):
         if model is not None:
             trees.append(_BundleTree.of(folder, model, [model], [], packages))
     if looks:
-        trees = [tree.with_looks() for tree in trees]
+        trees = [tree.with_visual_files() for tree in trees]
     folders = {name: folder for tree in trees for name, folder in tree.packages.items()}
     library, hand, *arm = (tree.anchor for tree in trees)
     places = {
@@ -138,10 +138,10 @@ def load_bundle(folder: Path) -> tuple[Scene, Station]:
 
 
 def require_same_content(bundle: Bundle, scene: Scene, station: Station) -> None:
-    """Refuses a world that is not the one that was packed.
+    """Refuses a scene and station that differ from the packed ones.
 
     Args:
-        bundle: its hashes; the data are not needed.
+        bundle: with the hashes; the data are not needed.
         scene, station: unpacked.
 
     Raises:
@@ -164,12 +164,12 @@ def require_same_content(bundle: Bundle, scene: Scene, station: Station) -> None
 
 @dataclass(frozen=True)
 class _BundleTree:
-    """Files whose relative places to each other are kept.
+    """Files that keep their relative paths.
 
     Attributes:
-        anchor: name in the bundle of what the tree is for.
-        files: by name in the bundle.
-        packages: folders of the packages that models in it name.
+        anchor: name in the bundle of the main file or folder.
+        files: files by name in the bundle.
+        packages: folders of the packages that the models refer to.
     """
 
     anchor: str
@@ -188,17 +188,17 @@ class _BundleTree:
         """The tree of some models.
 
         Args:
-            top: folder in the bundle for what is in no package.
+            top: folder in the bundle for files outside packages.
             anchor: a file or folder.
-            models: with the files that they name.
+            models: model files, packed with the files that they refer to.
             others: more files.
-            packages: where packages are looked for.
+            packages: where to look for packages.
         """
         models = [model for model in models if model.is_file()]
         folders = {
             n: f.resolve() for m in models for n, f in referenced_packages(m, packages).items()
         }
-        sought = (packages, NO_PACKAGES)  # as the simulation finds them, and the content's hash
+        sought = (packages, NO_PACKAGES)  # as for the simulation and the content hash
         named = [file for model in models for p in sought for file in referenced_files(model, p)]
         anchor = Path(os.path.abspath(anchor))
         files = [Path(os.path.abspath(file)) for file in (*models, *others, *named)]
@@ -214,8 +214,8 @@ class _BundleTree:
 
         return cls(name(anchor), {name(file): file for file in files}, folders)
 
-    def with_looks(self) -> _BundleTree:
-        """The same with the materials and textures that its meshes refer to."""
+    def with_visual_files(self) -> _BundleTree:
+        """A copy with the materials and textures that its meshes refer to."""
         beside = {
             (PurePosixPath(name).parent / file.relative_to(path.parent).as_posix()).as_posix(): file
             for name, path in self.files.items()
@@ -225,13 +225,13 @@ class _BundleTree:
 
 
 def _package_of(path: Path, folders: Mapping[str, Path]) -> str | None:
-    """The package that a file is in; of several, the innermost."""
+    """The innermost package that contains a file."""
     inside = [name for name, folder in folders.items() if path.is_relative_to(folder)]
     return max(inside, key=lambda name: len(folders[name].parts), default=None)
 
 
 def _manifest_bytes(name: str, folder: Path) -> bytes:
-    """By which a package is known wherever it is; one that has none gets one."""
+    """The manifest that identifies a package; generated if the package has none."""
     manifest = folder / "package.xml"
     return _read_bytes(manifest) if manifest.is_file() else package_manifest(name, "").encode()
 
@@ -260,7 +260,7 @@ class BundledJudgeFactory:
     Attributes:
         bundle: its name and hashes, without data.
         engine, mode, settings: as in `StationJudgeFactory`.
-        folder: where it is unpacked; the worker says so.
+        folder: where the bundle is unpacked; set by the worker.
     """
 
     bundle: Bundle
@@ -277,7 +277,7 @@ class BundledJudgeFactory:
 
 
 def make_recipe(make_judge: Callable[[], Judge]) -> tuple[JudgeRecipe, Bundle | None]:
-    """Recipe and bundle for a judge; where there is no `StationJudgeFactory`, no bundle is needed.
+    """Recipe and bundle for a judge; no bundle if the factory contains no `StationJudgeFactory`.
 
     Raises:
         BurgError: see `make_bundle`.
@@ -290,8 +290,7 @@ def make_recipe(make_judge: Callable[[], Judge]) -> tuple[JudgeRecipe, Bundle | 
 
 
 class _Packer(pickle.Pickler):
-    """Puts a `BundledJudgeFactory` in the place of a `StationJudgeFactory`, wherever that is in
-    what it pickles.
+    """Pickles objects, with a `BundledJudgeFactory` in place of any `StationJudgeFactory` in them.
 
     Attributes:
         bundle: scene and station of that factory.

@@ -25,7 +25,7 @@ from burg_drake.evaluation.cluster.node import LocalNodes
 from burg_drake.evaluation.executor import Job, OnFailure, WorkerLimits
 
 SCHEDULER_TIMEOUT = 5.0
-"""Seconds in which a scheduler has to answer."""
+"""Seconds until a scheduler must have answered."""
 
 Work = TypeVar("Work")
 Result = TypeVar("Result")
@@ -36,8 +36,8 @@ class DaskExecutor:
 
     Attributes:
         client: of `distributed`.
-        limits: what the workers' children may take.
-        maintain: called from time to time while they work.
+        limits: limits of the workers' children.
+        maintain: called from time to time during the work.
     """
 
     def __init__(
@@ -46,12 +46,11 @@ class DaskExecutor:
         limits: WorkerLimits | None = None,
         maintain: Callable[[], None] | None = None,
     ) -> None:
-        """Uses a cluster that one is connected to.
+        """Uses a connected cluster.
 
         Args:
-            client: a `distributed.Client`; what it is connected to has to be safe, see
-                `require_safe_address`.
-            limits: the usual ones if None.
+            client: a `distributed.Client`; its connection must be safe, see `require_safe_address`.
+            limits: limits of the workers' children; the defaults if None.
             maintain: called from time to time while grasps are judged, such as to restart workers;
                 may be None.
 
@@ -62,7 +61,7 @@ class DaskExecutor:
 
         address = client.scheduler.address if client.scheduler is not None else ""
         require_safe_address(address, "the scheduler at ")
-        with scheduler_errors(client):  # it may listen elsewhere, too, than where it was reached
+        with scheduler_errors(client):  # its listening addresses may differ from the one used here
             require_safe_address(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
@@ -70,7 +69,7 @@ class DaskExecutor:
 
     @property
     def workers(self) -> int:
-        """Number of children that judge at a time, as the cluster is now."""
+        """Number of children that judge at a time in the present cluster."""
         from burg_drake.evaluation.cluster.members import threads_by_address
 
         return sum(threads_by_address(self.client).values())
@@ -81,12 +80,12 @@ class DaskExecutor:
         """See `executor.Executor.judge`.
 
         Raises:
-            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+            ClusterError: a worker has other software versions, or the scheduler is lost.
         """
         from burg_drake.evaluation.cluster.dispatch import Dispatch
         from burg_drake.evaluation.cluster.jobs import grasp_jobs
 
-        # A thread has one chunk under way and one that waits.
+        # Each thread has one chunk in progress and one waiting.
         dispatch = Dispatch(self.client, self.maintain, chunks_per_thread=2)
         yield from dispatch.run(grasp_jobs(jobs, self.limits, on_failure))
 
@@ -98,22 +97,23 @@ def map_on_cluster(
     bundle: Bundle,
     pack: Callable[[Work], Any],
 ) -> Generator[tuple[Work, Result | BaseException], None, None]:
-    """Results of a function as they come, as `core.map_unordered` gives them.
+    """Yields results of a function on the cluster in the order of completion, like
+    `core.map_unordered`.
 
     Args:
         executor: the cluster.
-        function: importable; called in a child process of a worker with what `pack` gives and the
-            folder of the bundle.
-        work: what is to be done, begun in this order.
-        bundle: which all calls need; each machine gets it once.
-        pack: makes of work what is sent; called when a worker is free.
+        function: importable; called in a child process of a worker with the result of `pack` and
+            the folder of the bundle.
+        work: pieces of work, begun in this order.
+        bundle: needed by all calls; sent to each machine once.
+        pack: converts a piece of work to the argument that is sent; called when a worker is free.
 
     Yields:
-        The work, and the result or the error: of the function, of `pack`, or because workers were
-        lost at it one after the other. Closing the iterator ends the children.
+        Each piece of work with its result or error: the function's or `pack`'s error, or the loss
+        of several workers at it. Closing the iterator ends the children.
 
     Raises:
-        ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+        ClusterError: a worker has other software versions, or the scheduler is lost.
     """
     from burg_drake.evaluation.cluster.dispatch import Dispatch
     from burg_drake.evaluation.cluster.jobs import CallJob
@@ -124,12 +124,12 @@ def map_on_cluster(
 
 @contextlib.contextmanager
 def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterator[DaskExecutor]:
-    """An executor on a cluster, until the block is left.
+    """Context manager that yields an executor on a cluster.
 
     Args:
-        cluster: `local:4` starts four workers on this machine; `tls://HOST:PORT` is a scheduler
-            that runs; else the path of a cluster file, see `document.ClusterDocument`.
-        limits: what the workers' children may take; the usual ones if None.
+        cluster: `local:4` starts four workers on this machine; `tls://HOST:PORT` is a running
+            scheduler; else the path of a cluster file, see `document.ClusterDocument`.
+        limits: limits of the workers' children; the defaults if None.
 
     Raises:
         MissingDependencyError: Dask is not installed.
@@ -165,9 +165,10 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
 
 
 def _make_client(distributed: Any, where: Any, security: Any) -> Any:
-    """A client of the scheduler. It is made in a thread, as Dask's own time-out does not cover a
-    listener that stays silent; the thread is then left behind."""
-    timeout_factor = 3  # A connection takes several steps, each of which keeps to the timeout.
+    """A client of the scheduler. It connects in a thread, because Dask's own time-out does not
+    cover a silent listener; the thread is then abandoned.
+    """
+    timeout_factor = 3  # A connection takes several steps, each with this timeout.
     made: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def make() -> None:
@@ -193,11 +194,11 @@ def _make_client(distributed: Any, where: Any, security: Any) -> Any:
 
 
 def _connection_failure_reason(where: object, error: BaseException) -> str:
-    """The reason why a client was not connected, in one line.
+    """The reason for a failed connection, in one line.
 
     Args:
-        where: the address that was tried, or an object of Dask.
-        error: of Dask.
+        where: the address, or a cluster object of Dask.
+        error: Dask's error.
     """
     connect_timeout = 2.0  # Seconds.
     words = _innermost_error(error)
@@ -222,7 +223,7 @@ def _connection_failure_reason(where: object, error: BaseException) -> str:
 
 
 def _innermost_error(error: BaseException) -> str:
-    """Message of the innermost cause of an error that has one."""
+    """Message of the innermost cause of an error."""
     words = type(error).__name__
     cause: BaseException | None = error
     while cause is not None:
@@ -232,7 +233,7 @@ def _innermost_error(error: BaseException) -> str:
 
 
 def _close_client(client: Any) -> None:
-    with contextlib.suppress(Exception):  # of a scheduler that is gone
+    with contextlib.suppress(Exception):  # the scheduler may be gone
         client.close(timeout=SCHEDULER_TIMEOUT)
 
 

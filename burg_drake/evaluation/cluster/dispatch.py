@@ -36,12 +36,12 @@ def send_bundle(
     Args:
         client: of Dask.
         bundle: with its data.
-        what: the bundle is for, as messages name it.
-        deliveries: number of times that it was sent, by the worker's address; counted on.
+        what: purpose of the bundle, for messages.
+        deliveries: number of deliveries by the worker's address; updated.
         addresses: of the workers.
 
     Raises:
-        ClusterError: a worker cannot unpack it, or lacks it after several attempts; or the
+        ClusterError: a worker cannot unpack the bundle, or lacks it after several attempts; or the
             scheduler is lost.
     """
     if not addresses:
@@ -71,14 +71,14 @@ WORKER_POLL_INTERVAL = 1.0
 
 
 class Dispatch:
-    """Work of one run under way on a cluster.
+    """Work of one run on a cluster.
 
     Attributes:
         client: of Dask.
         cluster: the workers.
-        chunks_per_thread: chunks that a worker has at a time, those that wait included.
+        chunks_per_thread: chunks that a worker holds per thread, including waiting ones.
         name: of the plugin that runs tasks on a worker.
-        jobs: those under way.
+        jobs: jobs with unfinished work.
         sent: chunks that workers have, by the key of their future.
     """
 
@@ -100,14 +100,14 @@ class Dispatch:
         self._waiting = WorkerWait(client)
 
     def run(self, jobs: Iterator[ClusterJob | None]) -> Generator[Any, None, None]:
-        """Yields the results of jobs as they come.
+        """Yields the results of jobs in the order of completion.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work. None says that no
-                job is ready yet, and that there are others to work on meanwhile.
+            jobs: requested one by one when workers run out of work. None means that no job is ready
+                yet and that the workers go on with the others.
 
         Raises:
-            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+            ClusterError: a worker has other software versions, or the scheduler is lost.
         """
         self._coming = jobs
         self.begin()
@@ -115,8 +115,8 @@ class Dispatch:
             while True:
                 if self.poll_is_due():
                     yield from self.update_workers()
-                yield from self.hand_out(self.cluster.workers)
-                if not self.sent and not any(job.left for job in self.jobs):
+                yield from self.send_chunks(self.cluster.workers)
+                if not self.sent and not any(job.unsent_count for job in self.jobs):
                     if self.open_next_job() is not None:
                         continue
                     if self._exhausted:
@@ -126,8 +126,8 @@ class Dispatch:
             self.end()
 
     def begin(self) -> None:
-        """Registers the plugin of the run on all workers and on those that join later. A worker
-        that dies meanwhile is no reason to stop.
+        """Registers the plugin of the run on all present and future workers. Workers that die
+        meanwhile are ignored.
 
         Raises:
             ClusterError: as `ClusterWorkers.update`.
@@ -144,7 +144,7 @@ class Dispatch:
                 time.sleep(retry_interval)
 
     def end(self) -> None:
-        """Cancels the tasks that are under way, and ends the children of the run."""
+        """Cancels all unfinished tasks, and ends the child processes of the run."""
         self._waiting.end()
         if self.client.status != "running":
             return
@@ -158,13 +158,14 @@ class Dispatch:
         """Whether it is time to check for new and lost workers."""
         return time.monotonic() > self._last_poll + WORKER_POLL_INTERVAL
 
-    def poll_soon(self) -> None:
+    def request_poll(self) -> None:
         """Makes the next check for new and lost workers due."""
         self._last_poll = -WORKER_POLL_INTERVAL
 
     def update_workers(self) -> Iterator[Any]:
-        """Takes on new workers, and takes the work of lost ones back; yields the results of what is
-        given up."""
+        """Adds new workers, and takes back the work of lost ones; yields the results of items that
+        are given up.
+        """
         self._maintain()
         for worker in self.cluster.update():
             yield from self.handle_lost_worker(worker)
@@ -172,21 +173,21 @@ class Dispatch:
         if self.cluster.workers:
             self._waiting.end()
         else:
-            self._waiting.go_on()
+            self._waiting.continue_wait()
 
     def handle_lost_worker(self, worker: ClusterWorker) -> Iterator[Any]:
-        """Takes back the chunks of a lost worker; the items of those under way are sent alone."""
+        """Takes back the chunks of a lost worker; items of begun chunks are sent alone."""
         suspects = [chunk for chunk in worker.chunks if not chunk.done][: worker.threads]
         for chunk in list(worker.chunks):
-            self.forget(chunk)
+            self.drop_chunk(chunk)
             chunk.future.cancel()
             if chunk in suspects:
-                yield from chunk.job.suspect(chunk)
+                yield from chunk.job.retry_alone(chunk)
             else:
                 chunk.job.take_back(chunk)
 
-    def hand_out(self, addresses: Collection[str]) -> Iterator[Any]:
-        """Gives workers as many chunks as they have room for; those with the least come first.
+    def send_chunks(self, addresses: Collection[str]) -> Iterator[Any]:
+        """Gives workers as many chunks as they have room for, the least loaded workers first.
 
         Args:
             addresses: of the workers; others are left alone.
@@ -203,30 +204,30 @@ class Dispatch:
                 if len(worker.chunks) < self.chunks_per_thread * worker.threads
             ]
             for worker in idle:
-                worker.job = self.choose(worker)
+                worker.job = self.choose_job(worker)
             idle = [worker for worker in idle if worker.job is not None]
             if not idle:
                 return
             least = min(worker.load for worker in idle)
             for worker in idle:
-                if worker.load <= least and worker.job is not None and worker.job.left:
+                if worker.load <= least and worker.job is not None and worker.job.unsent_count:
                     yield from self.send(worker.job.take_chunk(places), worker)
 
-    def choose(self, worker: ClusterWorker) -> ClusterJob | None:
-        """The job that a worker goes on with: its own, the next one, or one that others work on."""
-        if worker.job is not None and worker.job.left:
+    def choose_job(self, worker: ClusterWorker) -> ClusterJob | None:
+        """The job for a worker: its current one, the next one, or one of other workers."""
+        if worker.job is not None and worker.job.unsent_count:
             return worker.job
         job = self.open_next_job()
         if job is not None:
             return job
-        self.jobs = [job for job in self.jobs if job.left or job.sent]
-        open_jobs = [job for job in self.jobs if job.left]
-        return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
+        self.jobs = [job for job in self.jobs if job.unsent_count or job.sent]
+        open_jobs = [job for job in self.jobs if job.unsent_count]
+        return max(open_jobs, key=lambda job: job.unsent_count / (1 + job.sent), default=None)
 
     def open_next_job(self) -> ClusterJob | None:
         """The next job, if one is ready."""
         for job in self._coming:
-            if job is not None:  # otherwise none is ready yet
+            if job is not None:  # None: no job is ready yet
                 self.jobs.append(job)
             return job
         self._exhausted = True
@@ -265,32 +266,32 @@ class Dispatch:
         chunk.worker.chunks.append(chunk)
         chunk.job.sent += 1
 
-    def forget(self, chunk: SentChunk) -> None:
+    def drop_chunk(self, chunk: SentChunk) -> None:
         """Notes that no worker has a chunk any more."""
         del self.sent[chunk.future.key]
         chunk.worker.chunks.remove(chunk)
         chunk.job.sent -= 1
 
     def collect(self) -> Iterator[Any]:
-        """Waits a while for answers, and yields the results of all that have come."""
+        """Waits a while for answers, and yields the results of all answers received."""
         missing: dict[str, tuple[ClusterJob, list[str]]] = {}
         ended = self.wait_for_chunks()
         for chunk in ended:
-            self.forget(chunk)
-        yield from self.hand_out(self._answering)  # they go on while results are on their way
+            self.drop_chunk(chunk)
+        yield from self.send_chunks(self._answering)  # workers go on while results are transferred
         for chunk in ended:
             job, address = chunk.job, chunk.worker.address
             try:
                 answer = self.read_answer(chunk)
             except KilledWorker:
-                yield from job.suspect(chunk)
+                yield from job.retry_alone(chunk)
                 continue
             except OSError:
                 self.retry_answer(chunk)
                 continue
             if answer is None or answer.ended:
                 job.take_back(chunk)
-                self.poll_soon()
+                self.request_poll()
             elif answer.missing:
                 job.take_back(chunk)
                 assert job.bundle is not None
@@ -305,7 +306,7 @@ class Dispatch:
             send_bundle(self.client, job.bundle, job.what, job.deliveries, there)
 
     def wait_for_chunks(self) -> list[SentChunk]:
-        """Waits a while for a chunk whose task ends, and returns all whose tasks have ended."""
+        """Waits a while for a task to end, and returns the chunks of all ended tasks."""
         try:
             futures = [self._ended.get(timeout=WORKER_POLL_INTERVAL)]
         except queue.Empty:
@@ -319,20 +320,20 @@ class Dispatch:
 
         Raises:
             KilledWorker: its worker was lost.
-            OSError: it does not come within the time-out; see `retry_answer`.
+            OSError: the answer does not arrive within the time-out; see `retry_answer`.
             ClusterError: the task failed.
         """
         try:
             return chunk.future.result(timeout=chunk.job.result_timeout)
         except (KilledWorker, OSError):
             raise
-        except CancelledError:  # by the loss of the scheduler, or by somebody else
+        except CancelledError:  # by the loss of the scheduler, or by another client
             return None
         except Exception as error:
             raise ClusterError(f"worker {chunk.worker.address}: {one_line(error)}") from error
 
     def retry_answer(self, chunk: SentChunk) -> None:
-        """Reads an answer again later: its worker is busy, or the next check shows its loss.
+        """Schedules another attempt to read an answer whose worker is busy or lost.
 
         Raises:
             ClusterError: the scheduler is lost.
@@ -342,4 +343,4 @@ class Dispatch:
         self.note_sent(chunk)
         if chunk.worker.address in self.cluster.workers:
             self._ended.put(chunk.future)
-        self.poll_soon()
+        self.request_poll()

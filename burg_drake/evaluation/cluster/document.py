@@ -147,8 +147,8 @@ def read_cluster(text: str) -> int | ClusterDocument:
         Number of workers on this machine; or a document, with the paths of its TLS files.
 
     Raises:
-        InvalidInputError: it is none of them.
-        ClusterError: an address that is not safe.
+        InvalidInputError: the text is none of these.
+        ClusterError: the address is not safe.
         DocumentError: the file does not fit the schema.
         UnknownNameError: there is no such file.
     """
@@ -175,7 +175,7 @@ def read_cluster(text: str) -> int | ClusterDocument:
 
 
 def require_safe_address(address: str, prefix: str = "") -> None:
-    """Refuses an address at which anybody could listen, or run code.
+    """Refuses an address at which others could eavesdrop or run code.
 
     Args:
         address: where a scheduler or a worker listens.

@@ -24,7 +24,7 @@ from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, Wo
 
 
 class ChunkSettings:
-    """How many grasps travel together, and how often a grasp or a call is sent."""
+    """Chunk size, and number of attempts for a grasp or a call."""
 
     max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
     max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
@@ -35,10 +35,10 @@ class ClusterWorker:
     """A worker.
 
     Attributes:
-        address: where it is.
-        threads: number of chunks that it works on at a time.
-        chunks: those that it has, the first ones first.
-        job: the one that it works on.
+        address: its network address.
+        threads: number of chunks that it processes at a time.
+        chunks: chunks sent to it, oldest first.
+        job: its current job.
     """
 
     address: str
@@ -48,21 +48,21 @@ class ClusterWorker:
 
     @property
     def load(self) -> float:
-        """Chunks a thread."""
+        """Chunks per thread."""
         return len(self.chunks) / self.threads
 
 
 @dataclass(eq=False)
 class SentChunk:
-    """Grasps or a call that a worker has.
+    """Grasps or a call sent to a worker.
 
     Attributes:
-        job: what they belong to.
+        job: the job that they belong to.
         items: grasps, or the argument of the call.
-        losses: workers that were lost at the one item before.
+        losses: workers lost so far at the chunk's only item.
         worker: the worker.
         future: of Dask.
-        done: whether the worker has done it; the answer may be lost with it nonetheless.
+        done: whether the worker has finished; the answer is lost if the worker is lost now.
     """
 
     job: ClusterJob
@@ -77,20 +77,20 @@ class ClusterJob(ABC):
     """Items of work that need the same bundle.
 
     Attributes:
-        what: the bundle is for, as messages name it.
+        what: purpose of the bundle, for messages.
         bundle: the bundle; None if none is needed.
         waiting: items that no worker has.
-        suspects: items at which a worker was lost, with the number of workers; each of them is
-            sent alone.
-        sent: number of chunks that workers have.
+        suspects: items at which a worker was lost, with the number of lost workers; each is sent
+            alone.
+        sent: number of chunks held by workers.
         failed: whether it is given up.
-        deliveries: how often its bundle was sent, by the worker's address.
+        deliveries: number of deliveries of the bundle by the worker's address.
     """
 
     max_items = 1
-    """Items in a chunk, at most."""
+    """Maximum number of items in a chunk."""
     result_timeout = 60.0
-    """Seconds for a result: it may have many megabytes, or its worker may be lost."""
+    """Seconds to wait for a result, which may have many megabytes or be lost with its worker."""
 
     def __init__(self, what: str, bundle: Bundle | None, items: Iterable[Any]) -> None:
         self.what, self.bundle = what, bundle
@@ -102,10 +102,10 @@ class ClusterJob(ABC):
 
     @abstractmethod
     def task(self, run: str, items: Sequence[Any]) -> ClusterTask:
-        """What a worker is sent for items.
+        """The task that a worker gets for some items.
 
         Raises:
-            BurgError: they cannot be sent.
+            BurgError: the items cannot be sent.
         """
 
     @abstractmethod
@@ -114,18 +114,18 @@ class ClusterJob(ABC):
 
     @abstractmethod
     def failure(self, item: Any, error: BurgError) -> Any:
-        """The result of an item that has no other."""
+        """The result of an item that failed with an error."""
 
     @property
-    def left(self) -> int:
+    def unsent_count(self) -> int:
         """Number of items that no worker has."""
         return len(self.waiting) + len(self.suspects)
 
     def take_chunk(self, places: int) -> SentChunk:
-        """Takes items for a chunk, fewer as the end comes near.
+        """Takes items for the next chunk; chunks shrink towards the end of the work.
 
         Args:
-            places: number of chunks into which the items that are left could go.
+            places: number of chunks among which the remaining items could be divided.
         """
         if self.suspects:
             item, losses = self.suspects.popleft()
@@ -134,7 +134,7 @@ class ClusterJob(ABC):
         return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
 
     def take_back(self, chunk: SentChunk) -> None:
-        """Takes the items of a chunk back, as none of them was begun."""
+        """Returns the items of a chunk that was not begun to the queue."""
         if self.failed:
             return
         if chunk.losses:
@@ -142,19 +142,19 @@ class ClusterJob(ABC):
         else:
             self.waiting.extendleft(reversed(chunk.items))
 
-    def suspect(
+    def retry_alone(
         self,
         chunk: SentChunk,
         items: Sequence[Any] | None = None,
         what: str = "were lost while working on it",
     ) -> Iterator[Any]:
-        """Takes items back that a lost worker had or that it left out. Each of them is sent alone
-        next time, as it may be the cause.
+        """Takes back items that a lost worker had or left out. Each is sent alone next time, as it
+        may be the cause.
 
         Args:
-            chunk: that it had.
+            chunk: the worker's chunk.
             items: those of the chunk; all if None.
-            what: the last workers did, for the reason of the failure.
+            what: what the last workers did, as the failure's reason names it.
 
         Yields:
             Results of items at which too many workers were lost.
@@ -177,11 +177,11 @@ class ClusterJob(ABC):
 
 
 class GraspJob(ClusterJob):
-    """Grasps that are judged on the cluster; see `executor.Executor.judge`.
+    """Grasps to be judged on the cluster; see `executor.Executor.judge`.
 
     Attributes:
         job: the job.
-        crashes_in_a_row: grasps that ended their children since one was judged.
+        crashes_in_a_row: grasps that crashed their child process since the last verdict.
     """
 
     max_items = ChunkSettings.max_grasps
@@ -220,7 +220,7 @@ class GraspJob(ClusterJob):
         if answer.error is not None:
             self.fail(answer.error)
         open_ones = [grasp for k, grasp in enumerate(chunk.items) if k not in judged]
-        yield from self.suspect(chunk, open_ones, "gave no answer about it")
+        yield from self.retry_alone(chunk, open_ones, "gave no answer about it")
 
     def failure(self, item: Candidate, error: BurgError) -> Answer:
         """See `ClusterJob.failure`."""
@@ -228,14 +228,14 @@ class GraspJob(ClusterJob):
         return self.job, item, Verdict(failed, Stage.CLEAR, reason=str(error), interrupted=True)
 
     def fail(self, error: BurgError) -> None:
-        """Gives the job up, and reports that once."""
+        """Gives the job up, and reports the failure once."""
         if not self.failed:
             self.give_up()
             report_failure(JobFailed(self.job, error), self._on_failure)
 
 
 def report_failure(failure: JobFailed, on_failure: OnFailure | None) -> None:
-    """Tells of a job that failed; raises its error if there is nobody to tell."""
+    """Passes the failure of a job to `on_failure`; raises its error if that is None."""
     if on_failure is None:
         raise failure.error
     on_failure(failure)
@@ -244,7 +244,7 @@ def report_failure(failure: JobFailed, on_failure: OnFailure | None) -> None:
 def grasp_jobs(
     jobs: Iterable[Job | None], limits: WorkerLimits, on_failure: OnFailure | None
 ) -> Iterator[GraspJob | None]:
-    """Packs jobs as they are asked for; None where none is ready yet."""
+    """Packs jobs on request; yields None while no job is ready."""
     for job in jobs:
         if job is None:
             yield None
@@ -258,7 +258,7 @@ def grasp_jobs(
 
 
 class CallJob(ClusterJob):
-    """Calls of a function, one for each piece of work; see `dask_executor.map_on_cluster`."""
+    """Calls of a function, one per piece of work; see `dask_executor.map_on_cluster`."""
 
     def __init__(
         self,

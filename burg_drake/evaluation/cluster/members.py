@@ -1,4 +1,4 @@
-"""Workers of a cluster that may be used: their versions and addresses, and the loss of any."""
+"""Checks versions and addresses of a cluster's workers, and notices lost workers."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from burg_drake.station import ENGINES
 
 @functools.cache
 def deciding_versions() -> dict[str, str]:
-    """Versions by name; of burg_drake also a hash of its code, as releases under way differ."""
-    # Packages that decide about verdicts or images, of all engines.
+    """Software versions by name, with a hash of burg_drake's code (unreleased versions differ)."""
+    # Packages of all engines that affect verdicts or images.
     packages = {
         **JUDGING_PACKAGES,
         **{name: package for e in ENGINES.values() for name, package in e.packages.items()},
@@ -40,8 +40,8 @@ def deciding_versions() -> dict[str, str]:
 
 
 def code_hash(package: Path) -> str:
-    """Hash of all files of an installed package that decide about results."""
-    code_suffixes = (".py", ".json")  # Modules, and curves of confidences.
+    """Hash of all files of an installed package that affect results."""
+    code_suffixes = (".py", ".json")  # Modules and confidence curves.
     files = sorted(file for file in package.rglob("*") if file.suffix in code_suffixes)
     names = [file.relative_to(package).as_posix() for file in files]
     return content_hash(names, files)[:12]
@@ -51,7 +51,7 @@ def require_same_versions(workers: Mapping[str, Mapping[str, str] | BaseExceptio
     """Refuses workers with other versions than ours.
 
     Args:
-        workers: what `deciding_versions` returned or raised, by the worker's address.
+        workers: result or error of `deciding_versions` by the worker's address.
 
     Raises:
         ClusterError: names the first such worker, and how many there are.
@@ -84,7 +84,7 @@ CONNECTION_ERRORS = (
     concurrent.futures.CancelledError,
     asyncio.CancelledError,
 )
-"""Errors that are raised when the other side is gone."""
+"""Errors raised when the scheduler or worker is gone."""
 
 
 class ClusterWorkers:
@@ -100,14 +100,14 @@ class ClusterWorkers:
 
     @property
     def threads(self) -> int:
-        """Number of chunks that they work on at a time."""
+        """Number of chunks that all workers process at a time."""
         return sum(worker.threads for worker in self.workers.values())
 
     def update(self) -> list[ClusterWorker]:
-        """Takes on new workers whose versions are ours and whose addresses are safe.
+        """Adds new workers after checks of their versions and addresses.
 
         Returns:
-            Those that are gone.
+            Lost workers.
 
         Raises:
             ClusterError: the scheduler is lost, or a worker has other versions or is not safe.
@@ -131,7 +131,7 @@ def threads_by_address(client: Any) -> dict[str, int]:
         ClusterError: it does not answer.
     """
     answer_timeout = 20.0  # Seconds after which a scheduler that does not answer counts as lost.
-    if client.status != "running":  # a scheduler that is started again knows nothing of us
+    if client.status != "running":  # a restarted scheduler does not know this client
         raise lost_scheduler_error(client)
     with scheduler_errors(client):
         found: dict[str, int] = client.sync(
@@ -142,7 +142,7 @@ def threads_by_address(client: Any) -> dict[str, int]:
 
 @contextlib.contextmanager
 def scheduler_errors(client: Any) -> Iterator[None]:
-    """Around what asks the scheduler: its loss is said in one line.
+    """Converts errors of calls to the scheduler into a one-line error.
 
     Raises:
         ClusterError: it is lost.
@@ -160,7 +160,7 @@ def scheduler_errors(client: Any) -> Iterator[None]:
 
 
 def lost_scheduler_error(client: Any) -> ClusterError:
-    """What is said when it does not answer."""
+    """The error for a scheduler that does not answer."""
     address = client.scheduler.address if client.scheduler is not None else "the given address"
     return ClusterError(
         f"the scheduler at {address} does not answer any more; the results so far are"
@@ -169,7 +169,7 @@ def lost_scheduler_error(client: Any) -> ClusterError:
 
 
 def check_versions(client: Any, addresses: Iterable[str]) -> list[str]:
-    """Those of some workers that are still there, after a look at their versions.
+    """Checks the versions of workers; returns the addresses of those that still run.
 
     Raises:
         ClusterError: a worker has other versions, or the scheduler is lost.
@@ -189,8 +189,7 @@ WORKER_TIMEOUT = 600.0
 
 
 class WorkerWait:
-    """The time without workers; while it lasts a task waits at the scheduler, from which Dask sees
-    that workers are wanted."""
+    """Wait for workers. A task at the scheduler meanwhile tells Dask that workers are wanted."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
@@ -198,14 +197,14 @@ class WorkerWait:
         self._call: Any = None
 
     def end(self) -> None:
-        """There are workers, or none is needed any more."""
+        """Ends the wait, because there are workers or no work is left."""
         self._since = self._call = None
 
-    def go_on(self) -> None:
-        """There is no worker.
+    def continue_wait(self) -> None:
+        """Begins or continues the wait.
 
         Raises:
-            ClusterError: for too long, or the scheduler is lost.
+            ClusterError: there was no worker for too long, or the scheduler is lost.
         """
         if self._since is None:
             self._since = time.monotonic()

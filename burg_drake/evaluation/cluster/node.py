@@ -1,4 +1,4 @@
-"""A Dask scheduler and workers as processes of this machine, which end with their driver.
+"""Dask scheduler and workers as processes of this machine, which end with their driver.
 
 Unlike `distributed.LocalCluster` they do not import the main module of the caller, so scripts and
 notebooks need no special guard.
@@ -21,11 +21,11 @@ NO_DASHBOARD = {"dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
 
 
 def main(handle: int) -> None:
-    """Runs it until it is ended.
+    """Runs a scheduler or worker until it is ended.
 
     Args:
-        handle: file descriptor of the pipe to the parent, who sends the scheduler's address, or an
-            empty text for the scheduler itself, and gets the address of what has started.
+        handle: file descriptor of the pipe to the parent. The parent sends the scheduler's address,
+            or an empty text to start the scheduler, and receives the address of the new process.
     """
     from distributed import Scheduler, Worker
 
@@ -53,22 +53,22 @@ Node = tuple[subprocess.Popen[bytes], Connection]
 
 
 class LocalNodes:
-    """The processes.
+    """A scheduler and workers on this machine.
 
     Attributes:
-        address: of the scheduler.
-        scheduler: its process.
-        workers: those of the workers.
+        address: address of the scheduler.
+        scheduler: process of the scheduler.
+        workers: processes of the workers.
     """
 
     def __init__(self, count: int) -> None:
-        """Starts them.
+        """Starts the processes.
 
         Args:
             count: number of workers.
 
         Raises:
-            ClusterError: one does not start.
+            ClusterError: a process does not start.
         """
         self._nodes: list[Node] = []
         try:
@@ -88,7 +88,7 @@ class LocalNodes:
         return [process for process, _ in self._nodes[1:]]
 
     def restart_workers(self) -> None:
-        """Starts a worker in the place of each that has ended."""
+        """Replaces workers that have ended."""
         if self.scheduler.poll() is not None:
             return
         for k, (process, connection) in enumerate(self._nodes[1:], 1):
@@ -97,7 +97,7 @@ class LocalNodes:
                 self._nodes[k] = _start_node(self.address)
 
     def close(self) -> None:
-        """Ends all."""
+        """Ends all processes."""
         for process, _ in reversed(self._nodes):
             process.kill()
         for process, connection in self._nodes:
@@ -112,7 +112,7 @@ def _start_node(scheduler: str) -> Node:
 
 
 def _receive_address(node: Node) -> str:
-    start_timeout = 60.0  # Seconds in which a process has to start.
+    start_timeout = 60.0  # Seconds until a process must have started.
     process, connection = node
     try:
         if connection.poll(start_timeout):

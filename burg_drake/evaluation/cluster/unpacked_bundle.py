@@ -24,29 +24,29 @@ BUNDLES_FOLDER = "burg-drake-bundles"  # Folder of all unpacked bundles of a mac
 
 
 def bundle_folder(place: Path, name: str) -> Path | None:
-    """Where a bundle is; None if it is not on this machine. It is kept for a day from now."""
+    """Folder of an unpacked bundle; None if absent. Keeps the bundle for another day."""
     folder = place / BUNDLES_FOLDER / name
     if not folder.is_dir():
         return None
-    with contextlib.suppress(OSError):  # another user's, who can read it nonetheless
+    with contextlib.suppress(OSError):  # belongs to another user; readable nonetheless
         os.utime(folder)
     return folder
 
 
 def unpack(data: bytes, place: Path, name: str) -> Path:
-    """Unpacks a bundle, unless it is there.
+    """Unpacks a bundle unless this was done before.
 
     Args:
         data: the zip.
-        place: folder of this machine for what is of passing use.
+        place: folder of this machine for temporary files.
         name: SHA-256 of `data`.
 
     Returns:
         The folder.
 
     Raises:
-        InvalidInputError: the data are others, or cannot be written, or something else is in
-            their place.
+        InvalidInputError: the data do not match the name or cannot be written, or the folder has
+            other content.
     """
     if hashlib.sha256(data).hexdigest() != name:
         raise InvalidInputError(f"bundle {name[:12]} was damaged on the way")
@@ -56,14 +56,14 @@ def unpack(data: bytes, place: Path, name: str) -> Path:
         every.mkdir(mode=0o700, parents=True, exist_ok=True)
         _remove_unused(every)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if _is_whole(folder, archive):
+            if _is_complete(folder, archive):
                 return folder
-            shutil.rmtree(folder, ignore_errors=True)  # what somebody has removed files of
+            shutil.rmtree(folder, ignore_errors=True)  # an incomplete folder
             archive.extractall(unfinished)
             try:
                 unfinished.rename(folder)
             except OSError:
-                if not _is_whole(folder, archive):  # otherwise another process was first
+                if not _is_complete(folder, archive):  # whole if another process was first
                     raise
     except OSError as error:
         raise InvalidInputError(
@@ -75,8 +75,8 @@ def unpack(data: bytes, place: Path, name: str) -> Path:
     return folder
 
 
-def _is_whole(folder: Path, archive: zipfile.ZipFile) -> bool:
-    """Whether a folder has the files of an archive, as they are there."""
+def _is_complete(folder: Path, archive: zipfile.ZipFile) -> bool:
+    """Whether a folder has all files of an archive, unchanged."""
     try:
         return all((folder / n).read_bytes() == archive.read(n) for n in archive.namelist())
     except OSError:
@@ -84,7 +84,7 @@ def _is_whole(folder: Path, archive: zipfile.ZipFile) -> bool:
 
 
 def _remove_unused(every: Path) -> None:
-    """Removes old bundles, and what killed processes left."""
+    """Removes old bundles and remains of killed processes."""
     max_age = 86_400.0  # Seconds since the last use.
     for path in every.iterdir():
         with contextlib.suppress(OSError):
@@ -98,8 +98,8 @@ class JudgeRecipe:
 
     Attributes:
         make_judge: a factory, pickled.
-        bundle: name of the bundle whose folder the factory is to be told; empty if it needs none.
-        folder: of that bundle on this machine.
+        bundle: name of the bundle that the factory needs; empty if none.
+        folder: the bundle's folder on this machine.
     """
 
     make_judge: bytes
@@ -108,7 +108,7 @@ class JudgeRecipe:
 
     @cached_property
     def key(self) -> str:
-        """Names the judge."""
+        """Key of the judge."""
         return hashlib.sha256(self.make_judge).hexdigest()
 
     def __call__(self) -> Judge:

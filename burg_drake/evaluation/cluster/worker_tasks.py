@@ -19,7 +19,7 @@ from burg_drake.evaluation.cluster.unpacked_bundle import JudgeRecipe, bundle_fo
 from burg_drake.evaluation.executor import Job, JobFailed, JudgePool, WorkerLimits
 
 CHILD_IDLE_TIMEOUT = 60.0
-"""Seconds after which a child without work ends, as its driver may be gone."""
+"""Seconds after which an idle child ends, as its driver may be gone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +27,10 @@ class TaskAnswer:
     """Result of a task, or why there is none.
 
     Attributes:
-        missing: whether the bundle is not on this machine, and nothing was done.
-        ended: whether the worker closes or the run has ended, and nothing is known.
-        error: what the call has raised or what has ended its process, or why the judge of the
-            grasps could not be built.
+        missing: whether the task was not run because the bundle is not on this machine.
+        ended: whether the task was not run to its end because the worker closes or the run has
+            ended.
+        error: what the call raised, how its process ended, or why the judge could not be built.
     """
 
     missing: bool = False
@@ -43,8 +43,8 @@ class ChunkAnswers(TaskAnswer):
     """Verdicts of a chunk.
 
     Attributes:
-        verdicts: in the order of completion, with the place of the grasp in the chunk.
-        crashing: places of the grasps at which the child crashes.
+        verdicts: in the order of completion, with the index of the grasp in the chunk.
+        crashing: indices of the grasps at which the child crashes.
     """
 
     verdicts: Sequence[tuple[int, Verdict]] = ()
@@ -56,7 +56,7 @@ class CallAnswer(TaskAnswer):
     """Result of a call.
 
     Attributes:
-        result: of the function, pickled.
+        result: the function's result, pickled.
     """
 
     result: bytes = b""
@@ -67,20 +67,20 @@ class ClusterTask(ABC):
     """Work for a worker.
 
     Attributes:
-        run: name of the plugin whose child does it.
-        bundle: name of the bundle that it needs; empty if it needs none.
+        run: name of the plugin whose child runs the task.
+        bundle: name of the required bundle; empty if none.
     """
 
     run: str
     bundle: str
 
     @abstractmethod
-    def do(self, children: Supervisor, folder: Path | None) -> TaskAnswer:
-        """Has a child do it.
+    def execute(self, children: Supervisor, folder: Path | None) -> TaskAnswer:
+        """Runs the task in a child.
 
         Args:
-            children: of this worker.
-            folder: of the bundle; None if none is needed.
+            children: children of this worker.
+            folder: folder of the bundle; None if none is needed.
         """
 
 
@@ -90,16 +90,16 @@ class GraspChunk(ClusterTask):
 
     Attributes:
         recipe: how to build the judge.
-        grasps: of one job.
-        limits: what the child may take.
+        grasps: grasps of one job.
+        limits: time and memory limits of the child.
     """
 
     recipe: JudgeRecipe
     grasps: tuple[Candidate, ...]
     limits: WorkerLimits
 
-    def do(self, children: Supervisor, folder: Path | None) -> ChunkAnswers:
-        """See `ClusterTask.do`."""
+    def execute(self, children: Supervisor, folder: Path | None) -> ChunkAnswers:
+        """See `ClusterTask.execute`."""
         make_judge = replace(self.recipe, folder=folder)
         return children.judge(Job(self.recipe.key, make_judge, self.grasps), self.limits)
 
@@ -114,24 +114,24 @@ class ClusterCall(ClusterTask):
 
     work: bytes
 
-    def do(self, children: Supervisor, folder: Path | None) -> CallAnswer:
-        """See `ClusterTask.do`."""
+    def execute(self, children: Supervisor, folder: Path | None) -> CallAnswer:
+        """See `ClusterTask.execute`."""
         assert folder is not None
         return children.call(self.work, folder)
 
 
 class _Child(Protocol):
-    """A child process, which is started when it has work."""
+    """A child process, started on demand."""
 
     def stop(self) -> None:
-        """Ends it at once, and what another thread waits for."""
+        """Ends the child at once, and any call of another thread that waits for it."""
 
     def release(self) -> None:
-        """Lets it end by itself, as it is idle."""
+        """Lets the idle child end by itself."""
 
 
 class _CallingChild:
-    """A child that calls functions. What ends its process is not tried again."""
+    """A child that calls functions. A call that ends its process is not repeated."""
 
     def __init__(self) -> None:
         self._pool = WorkerPool(1, retries=0, own_group=True)
@@ -143,8 +143,8 @@ class _CallingChild:
 
 
 class Supervisor(WorkerPlugin):
-    """Children of a worker for one run: each judges grasps with a judge of its own, or calls
-    functions. They end with the run, or when nobody has needed them for a while.
+    """Children of a worker for one run: each judges grasps with its own judge, or calls functions.
+    They end with the run, or after a while without work.
 
     Attributes:
         name: of the run.
@@ -214,7 +214,7 @@ class Supervisor(WorkerPlugin):
 
     @contextmanager
     def _child(self, make: Callable[[], Any]) -> Iterator[Any]:
-        """An idle child, or a new one, until the block is left; None if the run has ended."""
+        """Context manager that lends an idle or new child; None if the run has ended."""
         with self._lock:
             child = None
             if not self._stopped:
@@ -250,22 +250,22 @@ def call_pickled(work: bytes, folder: Path) -> bytes:
 
 
 def run_task(task: ClusterTask) -> TaskAnswer:
-    """The task of Dask."""
+    """Runs a task in a worker; the function that Dask calls."""
     worker = get_worker()
     folder = None
     if task.bundle:
-        folder = bundle_folder(bundle_place(worker), task.bundle)
+        folder = bundle_folder(bundles_parent(worker), task.bundle)
         if folder is None:
             return TaskAnswer(missing=True)
     supervisor: Supervisor | None = worker.plugins.get(task.run)
-    return TaskAnswer(ended=True) if supervisor is None else task.do(supervisor, folder)
+    return TaskAnswer(ended=True) if supervisor is None else task.execute(supervisor, folder)
 
 
 def unpack_on_worker(data: bytes, name: str, dask_worker: Any = None) -> None:
     """Unpacks a bundle on a worker's machine; runs in the worker, see `Client.run`."""
-    unpack(data, bundle_place(dask_worker), name)
+    unpack(data, bundles_parent(dask_worker), name)
 
 
-def bundle_place(worker: Any) -> Path:
+def bundles_parent(worker: Any) -> Path:
     """A folder that all workers of a machine share."""
     return Path(worker.local_directory).parent

@@ -1,4 +1,4 @@
-"""Sets of grasps: sampled ones, those of files and runs, their counts, and their usual mistakes.
+"""Grasp sets: sampling, reading from files and runs, counts, and common mistakes.
 
-Read `input` and `given_grasps` for grasps from elsewhere, `sampling` and `sampled_sets` for others.
+Read `input` and `given_grasps` for grasps of files, `sampling` and `sampled_sets` for sampled ones.
 """

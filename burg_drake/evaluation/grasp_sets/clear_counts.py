@@ -1,7 +1,7 @@
 """Counts of clear and reachable grasps for each object, and acceptance of a scene by them.
 
-Grasps of an object are sampled as if it stood on the table alone, so they are the same wherever it
-stands. A page shows these counts while a scene is composed; sampled scenes are accepted by them.
+Grasps are sampled on an object that stands alone on the table, so they do not depend on its place.
+A page shows these counts while a scene is composed; sampled scenes are accepted by them.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ from burg_drake.station import GraspMotion, Station, StationLike, as_station
 
 @dataclass(frozen=True, eq=False)
 class ObjectGrasps:
-    """Grasps of an object that stands on the table alone.
+    """Grasps of an object that stands alone on the table.
 
     Attributes:
         X_OG: (N, 4, 4) grasps in the object frame; the open hand overlaps neither object nor table,
             and its pads touch the object antipodally.
         width: (N,) distance between the contacts [m].
-        note: why there are fewer than asked; "" if there are not fewer.
+        note: reason for fewer grasps than requested; "" if there are enough.
     """
 
     X_OG: Array
@@ -59,13 +59,13 @@ class ObjectGrasps:
 def object_grasps(
     library: ObjectLibrary, object: str, X_WO: Array, station: Station, n: int, seed: int = 0
 ) -> ObjectGrasps:
-    """Samples antipodal grasps from above on an object that stands on the table alone, as
-    `sample_grasps` does, but with fewer tries; what was sampled before comes from the user's cache.
+    """Samples antipodal grasps from above on an object that stands alone on the table, like
+    `sample_grasps` with fewer tries; uses the user's cache.
 
     Args:
         library: has the object.
         object: its name.
-        X_WO: (4, 4) how it stands; where, and how it is turned about the vertical, does not matter.
+        X_WO: (4, 4) its pose; position and turn about the vertical do not matter.
         station: has hand and table.
         n: number of grasps.
         seed: of the random numbers.
@@ -75,7 +75,7 @@ def object_grasps(
         UnknownNameError: the library has no such object, or a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
-    cache_version = 2  # Raise it when this code gives other grasps for the same arguments.
+    cache_version = 2  # Increase if this code yields other grasps for the same arguments.
     library.entry(object)
     # turns below a twentieth of a degree and changes in height below 1 mm keep the cached grasps
     down_O = np.round((0.0, 0.0, -1.0) @ X_WO[:3, :3], 3) + 0.0
@@ -95,8 +95,9 @@ def object_grasps(
 
 
 def _upright_pose(down_O: Array, height: float) -> Array:
-    """(4, 4) pose of an object with a direction (3,) of its frame straight down, turned about the
-    vertical in any one way."""
+    """(4, 4) pose of an object whose direction (3,) points straight down; its turn about the
+    vertical is arbitrary but fixed.
+    """
     turn, _ = Rotation.align_vectors([(0.0, 0.0, -1.0)], [down_O])
     return make_pose(turn.as_matrix(), (0.0, 0.0, height))
 
@@ -134,21 +135,21 @@ def _sample_alone(
 Blockers = NDArray[np.object_]
 
 ARM_LIMITS = "the arm"
-"""Counted as blocker for joint limits and self-collision; no instance has a space."""
+"""Blocker name for joint limits and self-collision; instance names have no space."""
 
 
 @dataclass(frozen=True)
 class GraspCount:
-    """What becomes of the grasps of one object.
+    """Counts of the grasps of one object.
 
     Attributes:
-        sampled: grasps that hand and object allow when it stands on the table alone.
-        clear: those at which the open hand overlaps nothing.
-        reachable: clear ones that the arm can execute, all the way; None if it was not asked.
-        in_the_way: of the others, numbers by what is in the way, the most first: instances,
-            obstacles of the station, `table`, or `ARM_LIMITS`. Where several things are, the one
-            counts that would be in the way in an emptier scene, too.
-        note: why fewer grasps were sampled than asked, in words; "" if not fewer were.
+        sampled: sampled grasps, free of collisions when the object stands alone on the table.
+        clear: sampled grasps at which the open hand overlaps nothing in the scene.
+        reachable: clear grasps that the arm can execute all the way; None if it was not checked.
+        in_the_way: counts of the other grasps by blocker, most first: instances, obstacles of the
+            station, `table`, or `ARM_LIMITS`. Of several blockers, the one counts that would also
+            block in an emptier scene.
+        note: reason for fewer sampled grasps than requested; "" if there are enough.
     """
 
     sampled: int
@@ -159,7 +160,7 @@ class GraspCount:
 
     @property
     def good(self) -> int:
-        """Reachable grasps; clear ones where no arm was asked."""
+        """Reachable grasps; clear grasps if no arm was checked."""
         return self.clear if self.reachable is None else self.reachable
 
 
@@ -174,18 +175,18 @@ def count_grasps(
     exact: bool = True,
     seed: int = 0,
 ) -> dict[str, GraspCount]:
-    """Counts grasps of a scene's free objects, which need not be sound: overlaps are tolerated.
+    """Counts grasps of a scene's free objects. The objects may overlap.
 
     Args:
-        scene: what stands where.
+        scene: the scene.
         station: hand, arm and surroundings.
         only: names of instances, or of objects for all their instances; all if None.
         grasps_per_object: grasps that are sampled for each object.
-        reach: whether to ask the arm, which takes some ten times as long as the hand alone; a
-            station without an arm is never asked.
-        motion: how the hand goes to a grasp and away from it; as the station says if None.
-        exact: whether Drake's collision checker sees each yes of the arm; without, it takes half
-            the time, and one grasp in some hundred is counted wrong. See `reach`.
+        reach: whether to check the arm, if there is one, which takes about ten times as long as the
+            hand alone.
+        motion: approach and retreat of the hand; the station's if None.
+        exact: whether Drake's collision checker confirms each reachable grasp. Without this it
+            takes half the time, and about one grasp in a hundred is counted wrong. See `reach`.
         seed: of the samples.
 
     Returns:
@@ -223,19 +224,19 @@ def grasp_counts(
     exact: bool = True,
     seed: int = 0,
 ) -> Iterator[tuple[str, GraspCount]]:
-    """Counts as they come: what the hand says of each object at once, with `reachable` None; then
-    each object again when the arm was asked.
+    """Yields the hand's counts of all objects first, with `reachable` None; then the counts of each
+    object again after the arm was checked.
 
     Args:
         scene, station, grasps_per_object, reach, motion, exact, seed: see `count_grasps`.
-        names: of instances, those first whose counts are wanted first.
+        names: names of instances in the order in which counts are wanted.
 
     Yields:
         Names and counts.
 
     Raises:
-        InvalidInputError, UnknownNameError, MeshError: see `count_grasps`; that the arm collides at
-            home is found when the hand's counts are out.
+        InvalidInputError, UnknownNameError, MeshError: see `count_grasps`; a collision of the arm
+            at home is found after the hand's counts.
     """
     if grasps_per_object < 1:
         raise InvalidInputError(f"grasps per object is {grasps_per_object}; give 1 or more")
@@ -263,7 +264,7 @@ def grasp_counts(
 
 
 def _blocker_of(verdict: Reach, others: set[str]) -> str:
-    """What hinders the arm; "" if nothing does."""
+    """The body or limit that hinders the arm; "" if none."""
     if verdict.outcome is None:
         return ""
     body = verdict.blocker.rpartition(" vs ")[2]
@@ -273,7 +274,9 @@ def _blocker_of(verdict: Reach, others: set[str]) -> str:
 def _count_object(
     grasps: ObjectGrasps, blocker: Blockers, hindrance: Blockers | None
 ) -> GraspCount:
-    """What hand (N,) and arm (N,) say of grasps; None where the arm was not asked."""
+    """Counts from the blockers of the hand (N,) and the hindrances of the arm (N,); the latter None
+    if the arm was not checked.
+    """
     last = blocker if hindrance is None else hindrance
     return GraspCount(
         sampled=len(blocker),
@@ -287,21 +290,20 @@ def _count_object(
 def within_reach(scene: SceneLike, station: StationLike) -> tuple[str, ...]:
     """Objects that are out of the arm's reach.
 
-    An object is within reach if the arm can execute one of 24 sampled grasps, all the way from
-    home to the end of the lift, as if it stood in its place alone: among the station's obstacles,
-    but with no other object, so that the answer stays as it is when others are moved. What the hand
-    carries is not looked at. An object that the hand takes nowhere as it stands is out of reach.
-    What other objects block is counted by `count_grasps`.
+    An object is within reach if the arm can execute one of 24 sampled grasps from home to the end
+    of the lift, among the station's obstacles but without other objects; so the answer does not
+    change when others are moved. Collisions of the carried object are ignored. An object without
+    collision-free grasps is out of reach. `count_grasps` counts what other objects block.
 
     Args:
-        scene: what stands where; it need not be sound.
-        station: with an arm, which is made ready once a process for the same `Station`.
+        scene: the scene; objects may overlap.
+        station: with an arm, which is prepared once per process for the same `Station`.
 
     Returns:
-        Names of free instances, in the scene's order; none if all is well.
+        Names of free instances out of reach, in the scene's order.
 
     Raises:
-        InvalidInputError: the station has no arm, or one that collides in its home posture.
+        InvalidInputError: the station has no arm, or the arm collides in its home posture.
         UnknownNameError: a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
@@ -319,7 +321,7 @@ def _is_within_reach(scene: Scene, object: str, X_WO: Array, station: Station) -
     reach = reach_without_objects(station)
     grasps = object_grasps(scene.library, object, X_WO, station, 24)
     X_WG = X_WO @ grasps.X_OG
-    # the arm can execute one of the first few for most objects
+    # for most objects one of the first few is reachable
     for some in (slice(0, 2), slice(2, 6), slice(6, 12), slice(12, 24)):
         found = reach.check_all([""] * len(X_WG[some]), X_WG[some], grasps.width[some])
         if any(verdict.outcome is None for verdict in found):
@@ -330,15 +332,15 @@ def _is_within_reach(scene: Scene, object: str, X_WO: Array, station: Station) -
 def clear_grasp_counts(
     scene: SceneLike, station: StationLike, *, grasps_per_object: int = 50
 ) -> dict[str, int]:
-    """How many grasps of each free object the open hand can take; the arm is not asked.
+    """Number of collision-free grasps of the open hand for each free object, without the arm.
 
     Args:
-        scene: what stands where; it need not be sound.
+        scene: the scene; objects may overlap.
         station: has the hand.
-        grasps_per_object: how many are sampled for each object.
+        grasps_per_object: number of grasps sampled for each object.
 
     Returns:
-        Numbers by instance, in the scene's order.
+        Counts by instance, in the scene's order.
 
     Raises:
         InvalidInputError, UnknownNameError, MeshError: see `count_grasps`.

@@ -42,19 +42,19 @@ from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
 
 MAX_BOX_DISTANCE = 0.25
-"""Metres from G to the bounding box at the nearest grasp; no hand opens that far."""
+"""Maximum distance from G to the bounding box at the nearest grasp [m]; no hand opens that far."""
 
 
 def require_near(
     grasps: GraspSet, library: ObjectLibrary, source: str, *, is_file: bool = True
 ) -> None:
-    """Refuses grasps of an object that are all far from it.
+    """Refuses grasps if all grasps of an object are far from it.
 
     Args:
-        grasps: in the frames of their objects; objects that the library lacks do not matter.
+        grasps: in the frames of their objects; objects missing from the library are ignored.
         library: has the objects.
-        source: where the grasps are from, for the message.
-        is_file: whether that is a file, of which a user can say what its names mean.
+        source: origin of the grasps, for the message.
+        is_file: whether the origin is a file, whose object names the user can map.
 
     Raises:
         InvalidInputError: the nearest grasp of an object is more than `MAX_BOX_DISTANCE` from it.
@@ -78,12 +78,11 @@ Owners = NDArray[np.str_]
 def held_instances(
     scene: Scene, X_SG: Array, gripper: Gripper, among: Sequence[str] | None = None
 ) -> tuple[Owners, NDArray[np.bool_]]:
-    """The free instance that each grasp is about.
+    """The free instance that each grasp holds.
 
-    It is the one whose surface is nearest to the grasp point among all that lies between the open
-    fingers, along the closing direction. Where nothing does, it is the one with the nearest
-    surface, as GraspNet's evaluation assigns its grasps (`eval_grasp` in
-    graspnetAPI/utils/eval_utils.py).
+    This is the instance with the surface nearest to the grasp point between the open fingers, along
+    the closing direction. If no surface is between them, it is the instance with the nearest
+    surface, as in GraspNet's evaluation (`eval_grasp` in graspnetAPI/utils/eval_utils.py).
 
     Args:
         scene: the scene.
@@ -92,28 +91,30 @@ def held_instances(
         among: names of free instances; all if None.
 
     Returns:
-        (N,) names, and (N,) whether something of it lies between the fingers.
+        (N,) names, and (N,) whether a part of the instance is between the fingers.
 
     Raises:
-        InvalidInputError: there are grasps, but no instance.
+        InvalidInputError: the scene has no free instance for the grasps.
     """
     names = list(scene.instances) if among is None else list(among)
     if not names:
         if len(X_SG):
             raise InvalidInputError(f"scene {scene.name!r} has no free objects to grasp")
         return np.empty(0, dtype=str), np.empty(0, dtype=bool)
-    between = np.stack([_distance_between(scene, name, X_SG, gripper) for name in names])
+    between = np.stack([_distance_between_fingers(scene, name, X_SG, gripper) for name in names])
     held = np.asarray(np.isfinite(between).any(axis=0))
     owner = between.argmin(axis=0)
     if not held.all():
         missed = X_SG[~held, :3, 3]
-        beside = np.stack([_distance_beside(scene, name, missed) for name in names])
+        beside = np.stack([_surface_distance(scene, name, missed) for name in names])
         owner[~held] = beside.argmin(axis=0)
     return np.array(names)[owner], held
 
 
-def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) -> Array:
-    """(N,) distance from G to what of an instance lies between the fingers [m]; inf if nothing."""
+def _distance_between_fingers(scene: Scene, name: str, X_SG: Array, gripper: Gripper) -> Array:
+    """(N,) distance from G to the part of an instance between the fingers [m]; inf if there is
+    none.
+    """
     from burg_drake.geometry import RayCaster
 
     mesh = scene.library.surface(scene.instance(name).object)
@@ -125,7 +126,7 @@ def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) ->
         0.0,
         1.0,
         -1.0,
-    ):  # grasp point, finger tips, as far behind; in reaches of the tips
+    ):  # grasp point, finger tips, and as far behind, in units of the tips' reach
         origins = X_OG[:, :3, 3] + height * gripper.tip * X_OG[:, :3, 2]
         for side in (1.0, -1.0):
             _, along = rays.first_hits(origins, side * X_OG[:, :3, 0], reach)
@@ -134,8 +135,8 @@ def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) ->
     return nearest
 
 
-def _distance_beside(scene: Scene, name: str, p_SG: Array) -> Array:
-    """(N,) distance from points (N, 3) to an instance, good to 2.5 mm or so [m]."""
+def _surface_distance(scene: Scene, name: str, p_SG: Array) -> Array:
+    """(N,) distance from points (N, 3) to an instance [m], accurate to about 2.5 mm."""
     from scipy.spatial import cKDTree
     from trimesh.remesh import subdivide_to_size
 
@@ -152,7 +153,7 @@ def group_by_instance(
 
     Args:
         scene: the scene.
-        grasps: N grasps; their poses and objects do not matter.
+        grasps: N grasps, whose own poses and objects are ignored.
         X_SG: (N, 4, 4) their poses in the scene frame.
         owner: (N,) names of instances.
     """
@@ -167,7 +168,8 @@ def group_by_instance(
 
 
 def join_in_frame(scene: Scene, grasps: Mapping[str, GraspSet], X_SF: Array) -> GraspSet:
-    """One set of grasps of instances, measured in a frame of the scene: the way back.
+    """Joins grasps of instances into one set measured in a frame of the scene; inverse of
+    `group_by_instance`.
 
     Args:
         scene: the scene.
@@ -191,10 +193,10 @@ def join_in_frame(scene: Scene, grasps: Mapping[str, GraspSet], X_SF: Array) -> 
 
 
 class MisplacedGraspsError(InvalidInputError):
-    """Grasps of a file are nowhere near their objects.
+    """Grasps of a file are far from their objects.
 
     Attributes:
-        grasps: by instance, in which `find_mistake` may find why.
+        grasps: grasps by instance, for `find_mistake`.
     """
 
     def __init__(self, message: str, grasps: Mapping[str, GraspSet] | None = None) -> None:
@@ -203,16 +205,16 @@ class MisplacedGraspsError(InvalidInputError):
 
 
 class NoSceneIdsError(InvalidInputError):
-    """A file does not say which scene its grasps are of."""
+    """A file does not name the scene of its grasps."""
 
 
 @dataclass(frozen=True)
 class GivenGrasps:
-    """What was read of a file.
+    """Grasps read from a file.
 
     Attributes:
         by_instance: grasps in the object frame by name of an instance, for `given_candidates`.
-        notes: what of the file was left behind or changed, one sentence each.
+        notes: sentences about omitted or changed parts of the file.
     """
 
     by_instance: dict[str, GraspSet]
@@ -234,9 +236,8 @@ def read_grasps(
     """Reads a grasp file and gives each grasp to an instance of the scene.
 
     Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
-    are measured in the frame of their object go to every instance of it. Those that are measured
-    in one frame for all, a camera's or a world's, go to the instance that they hold; see
-    `held_instances`.
+    are measured in the frame of their object go to every instance of it. Grasps in one common
+    frame, a camera's or a world's, go to the instance that they hold; see `held_instances`.
 
     Example::
 
@@ -247,18 +248,19 @@ def read_grasps(
         scene: the scene.
         path: a file of any format in `formats.grasp_files`, or the folder of a run.
         gripper: the hand that the grasps are for.
-        format: of the file; None to tell by the content. A `FileReading` corrects mistakes, too.
+        format: format of the file; None to detect it by content. A `FileReading` also corrects
+            mistakes.
         objects: names of the scene's objects, or of its instances, by the names that the file has;
             a name by the empty text is for all grasps.
-        frame: what the poses are measured in, in place of what the format says.
+        frame: reference frame of the poses, in place of the format's.
         X_SF: (4, 4) pose of the file's camera, or of its world, in the scene frame; a world is the
             scene frame if None.
         object_ids: names of instances by the file's object ids.
         scene_id: the one to take of a file of several scenes.
 
     Raises:
-        InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
-        UnknownNameError: an object, instance, scene or correction that is not there.
+        InvalidInputError: the file cannot be read, or the objects of its grasps are unknown.
+        UnknownNameError: an object, instance, scene or correction does not exist.
     """
     scene = as_scene(scene)
     reading = format if isinstance(format, FileReading) else FileReading(format)
@@ -291,14 +293,14 @@ def read_grasps(
 
 
 def _wide_grasps_notes(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ...]:
-    """Notes about widths to which the hand does not open."""
+    """Notes about widths beyond the opening of the hand."""
     widest, notes = gripper.opening[1], []
     widths = {
         "width": grasps.width,
         PREGRASP_WIDTH_COLUMN: grasps.columns.get(PREGRASP_WIDTH_COLUMN),
     }
     for name, values in widths.items():
-        if values is None or not (values > widest + 1e-6).any():  # error of single precision
+        if values is None or not (values > widest + 1e-6).any():  # rounding of single precision
             continue
         notes.append(
             f"{name} of {(values > widest + 1e-6).sum()} of {len(grasps)} grasps of {path} is more"
@@ -310,31 +312,31 @@ def _wide_grasps_notes(grasps: GraspSet, path: str | Path, gripper: Gripper) -> 
 
 
 def _repeated_grasps_note(by_instance: Mapping[str, GraspSet], path: str | Path) -> tuple[str, ...]:
-    """A note about grasps that are there several times, which `given_candidates` leaves out."""
+    """A note about duplicate grasps, which `given_candidates` leaves out."""
     count = sum(len(part) - len(np.unique(part.id)) for part in by_instance.values())
     return (f"{count} grasps of {path} are duplicates; each is judged once.",) if count else ()
 
 
 def group_by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
-    """Gives grasps in the frames of their objects to the instances of a scene.
+    """Assigns grasps in object frames to the instances of a scene.
 
     Args:
         scene: the scene.
-        grasps: with a column `instance` they stay on the instances that it names; else they go to
-            every instance of their object.
+        grasps: with a column `instance` they stay on the named instances; else they go to every
+            instance of their object.
 
     Returns:
         The grasps by name of an instance, for `given_candidates`.
 
     Raises:
-        InvalidInputError: the set does not say which object its grasps are of.
+        InvalidInputError: the set does not name the objects of its grasps.
         UnknownNameError: the scene has no such object.
     """
     return _group_by_file_names(grasps, InstanceNames(scene, "the set", {}, is_file=False))
 
 
 def _group_by_file_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
-    """The same, with the names of a file."""
+    """As `group_by_names`, for grasps of a file with its names of objects."""
     on_instances = INSTANCE_COLUMN in grasps.columns and not names.given
     found = split_by_instance(grasps) if on_instances else _group_by_objects(grasps, names)
     require_instances(names.scene, found, names.path)
@@ -394,8 +396,9 @@ def _find_owners(
     object_ids: Mapping[int, str],
     gripper: Gripper,
 ) -> tuple[Owners, NDArray[np.bool_]]:
-    """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and which of them are told
-    by the file, or have something of it between their fingers."""
+    """(N,) instances of grasps (N, 4, 4) in the scene frame, and (N,) which grasps are assigned by
+    the file or have a part of the instance between the fingers.
+    """
     names.require_used([""])
     among = names.instances_of("") if names.given else None
     owner = _named_owners(grasps, names, object_ids)
@@ -411,7 +414,7 @@ def _missed_objects_note(
     """A note about grasps that hold nothing.
 
     Raises:
-        MisplacedGraspsError: none holds anything.
+        MisplacedGraspsError: no grasp holds anything.
     """
     missed = int((~held).sum())
     if not missed:
@@ -432,7 +435,7 @@ def _missed_objects_note(
 def _named_owners(
     grasps: GraspSet, names: InstanceNames, object_ids: Mapping[int, str]
 ) -> NDArray[np.object_]:
-    """(N,) instances that object ids tell; empty texts where they do not."""
+    """(N,) instances by object ids; empty texts for unknown ids."""
     named = np.full(len(grasps), "", dtype=object)
     if not object_ids:
         return named
@@ -461,19 +464,20 @@ def _named_owners(
 
 
 FRAME_WORDS = {"object": "the frame of their object", "world": "a scene", "camera": "a camera"}
-"""Frames in which files measure grasps, in words."""
+"""Descriptions of the reference frames of files."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeenScene:
-    """What is known of the scene in which a file's grasps were seen, or are to be placed.
+    """Known facts about the scene in which a file's grasps were seen or are to be placed.
 
     Attributes:
-        scene: where objects stand.
-        X_SF: (4, 4) the camera in the scene frame; where a world is not the scene frame, that.
+        scene: the scene.
+        X_SF: (4, 4) pose in the scene frame of the camera, or of a world that is not the scene
+            frame.
         object_ids: names of instances by the file's object ids.
         scene_id: the one to take of a file of several scenes.
-        correction: mistakes of the file that are made up for, see `pose_mistakes`.
+        correction: corrections of mistakes in the file, see `pose_mistakes`.
     """
 
     scene: Scene | None = None
@@ -493,20 +497,20 @@ def read_in_frame(
     objects: Mapping[str, str] | None = None,
     seen: SeenScene | None = None,
 ) -> ImportedGrasps:
-    """Reads grasps and measures them in another frame, with the help of a scene where it takes one.
+    """Reads grasps and converts them to another frame, with a scene if necessary.
 
     Args:
         path: the file, or the folder of a run.
-        wanted: the frame; in that of their object, grasps get the column `instance`.
+        wanted: the new frame; in object frames, grasps get the column `instance`.
         gripper: the hand that they are for.
         format: of the file; None to tell by the content.
-        frame: what its poses are measured in, in place of what the format says.
-        objects: new names of objects by those that the file has; one by the empty text is for all.
-        seen: the scene, as far as it is known.
+        frame: reference frame of its poses, in place of the format's.
+        objects: new names of objects by the file's names; a name by the empty text is for all.
+        seen: the scene, as far as known.
 
     Raises:
         InvalidInputError: the file cannot be read, or a scene or the camera's pose is missing.
-        UnknownNameError: an object, instance or scene that is not there.
+        UnknownNameError: an object, instance or scene does not exist.
     """
     seen = seen or SeenScene()
     imported = read_input(path, format, gripper, seen.correction)
@@ -555,7 +559,7 @@ def read_in_frame(
 
 
 def _add_object_ids(grasps: GraspSet, object_ids: Mapping[int, str]) -> GraspSet:
-    """With the column `object_id` of GraspNet's files, where ids of instances are given."""
+    """Adds the column `object_id` of GraspNet's files, if ids of instances are given."""
     if not object_ids:
         return grasps
     ids = {name: number for number, name in object_ids.items()}

@@ -1,4 +1,4 @@
-"""Grasps to work on: a file of any project or the folder of a run, and their hand."""
+"""Reads grasps from a file of any project or the folder of a run, with their hand."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ from burg_drake.visualization import OUTCOME_GROUPS, outcome_group
 def set_documents(
     library: ObjectLibrary, scene: Scene | None, station: Station, objects: Iterable[str]
 ) -> dict[str, Any]:
-    """Documents, the content that they had, and versions of the software, as JSON values.
+    """Documents, their content, and versions of the software, as JSON values.
 
     Args:
         library: has the objects.
-        scene: where they stand; then it is named, else the library.
-        station: whose hand it is.
-        objects: names of those that there are grasps of.
+        scene: scene of the objects, named in place of the library.
+        station: station with the hand.
+        objects: names of the objects with grasps.
     """
     kind, document = ("library", library.root) if scene is None else ("scene", scene.path)
     return {
@@ -70,12 +70,12 @@ def set_documents(
 
 
 def hand_entry(hand: Hand, document: Path | None) -> dict[str, str]:
-    """How a provenance names the hand that grasps are for."""
+    """The entry of a hand in a provenance."""
     return {"name": hand.name, **({"document": str(document.resolve())} if document else {})}
 
 
 def object_files(library: ObjectLibrary, objects: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Mesh and physics of objects, under the names that `formats.grasp_conversion` knows."""
+    """Mesh and physics of objects, with the keys of `formats.grasp_conversion`."""
     entries = {name: library.entry(name) for name in objects}
     return {
         name: {
@@ -96,13 +96,13 @@ def run_grasps(run: Run) -> GraspSet:
         run: complete or not.
 
     Returns:
-        The grasps with the column `instance` and those of the results table, see
-        `evaluation.results_table`; NaN or empty for grasps that are not judged yet. What came with
-        the grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column
-        of that name. The identifier of a grasp is the run's without the instance. The provenance
-        names the run, its copies of scene and station, and the hand, and describes the objects.
+        The grasps with the column `instance` and the columns of the results table, see
+        `evaluation.results_table`; NaN or empty for grasps that are not judged yet. Columns of
+        given grasps keep their names, prefixed with `INPUT_PREFIX` if the run has a column of that
+        name. The identifier of a grasp is the run's without the instance. The provenance names the
+        run, its copies of scene and station, and the hand, and describes the objects.
     """
-    # Columns of the results that a grasp set has as attributes.
+    # Columns of the results that are attributes of a grasp set.
     own_columns = ("id", "object", "width", "score", "X_OG", *"xyz", "qw", "qx", "qy", "qz")
     candidates, results = run.candidates, run.results
     row = {id: i for i, id in enumerate(candidates.id)}
@@ -126,14 +126,15 @@ def run_grasps(run: Run) -> GraspSet:
 
 
 def result_column(grasps: GraspSet, name: str) -> str:
-    """The column of `run_grasps` that goes by a name of the results table."""
+    """The column of `run_grasps` for a column name of the results table."""
     plain = name.removeprefix(INPUT_PREFIX)
     return plain if name not in grasps.column_names and plain in grasps.column_names else name
 
 
 def run_documents(run: Run) -> dict[str, Any]:
-    """What the provenance of a run's grasps names; without the hand and the objects where those
-    are gone or have changed since."""
+    """Documents for the provenance of a run's grasps; without hand and objects if their files are
+    gone or have changed.
+    """
     folder = run.path.resolve()
     named: dict[str, Any] = {
         "run": str(folder),
@@ -152,7 +153,7 @@ def run_documents(run: Run) -> dict[str, Any]:
 
 
 def split_by_instance(grasps: GraspSet) -> dict[str, GraspSet]:
-    """Grasps of a file that names instances, each set with its own provenance."""
+    """Splits grasps of a file by instance, each set with its own provenance."""
     owner = grasps.columns[INSTANCE_COLUMN]
     given = grasps.provenance.get("parts")
     parts = given if isinstance(given, Mapping) else {}
@@ -170,13 +171,13 @@ def split_by_instance(grasps: GraspSet) -> dict[str, GraspSet]:
 
 
 def without_instance(grasps: GraspSet) -> GraspSet:
-    """The same grasps without the column that candidates have in their own way."""
+    """The grasps without the column `instance`."""
     columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN}
     return dataclasses.replace(grasps, columns=columns)
 
 
 OWN_FORMAT = "burg_drake"
-"""The format in which sets name their hand."""
+"""Format in which sets name their hand."""
 
 
 def read_input(
@@ -190,17 +191,17 @@ def read_input(
     Args:
         path: a file of any format in `formats.grasp_files`, or the folder of a run, whose grasps
             come with their outcomes, see `run_grasps`.
-        format: of the file; None to tell by the content.
-        gripper: the hand that grasps are taken for; the Panda's if None, without a note where
-            they name another one.
-        correction: mistakes of the file that are made up for, see `pose_mistakes`.
+        format: format of the file; None to detect it by content.
+        gripper: hand that grasps are taken for; the Panda's if None, without a note if the file
+            names another hand.
+        correction: corrections of mistakes in the file, see `pose_mistakes`.
 
     Returns:
         The grasps; their provenance names the hand.
 
     Raises:
         InvalidInputError: the file cannot be read, or is the table of a run.
-        UnknownNameError: there is no such format or correction.
+        UnknownNameError: the format or correction does not exist.
     """
     path, hand_taken = Path(path), gripper or PANDA_GRIPPER
     correction = check_corrections(correction)
@@ -231,27 +232,28 @@ def read_input(
 
 
 def format_name(path: str | Path) -> str:
-    """Name of the format that a file's content is of; a run's grasps are in ours."""
+    """Name of a file's format by its content; a run's grasps have our own format."""
     return OWN_FORMAT if Path(path).is_dir() else format_of(path).name
 
 
 def hand_of(grasps: GraspSet) -> dict[str, str] | None:
-    """The hand that a set is for: its name and, where it is known, the path of its document."""
-    hands = _hands_of(grasps.provenance)
+    """The hand of a set: its name and, if known, the path of its document."""
+    hands = _named_hands(grasps.provenance)
     return hands[0] if len({hand["name"] for hand in hands}) == 1 else None
 
 
-def _hands_of(provenance: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The hand that a provenance names, or else those of its parts."""
+def _named_hands(provenance: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The hand named in a provenance, or else the hands of its parts."""
     hand = provenance.get("hand")
     if isinstance(hand, Mapping) and isinstance(hand.get("name"), str):
         return [{key: value for key, value in hand.items() if isinstance(value, str)}]
-    return [hand for part in provenance_parts(provenance) for hand in _hands_of(part)]
+    return [hand for part in provenance_parts(provenance) for hand in _named_hands(part)]
 
 
 def hand_reference(path: str | Path) -> str | None:
-    """Document or built-in name of the hand that a run, or a file of ours, is for; None if neither
-    tells it."""
+    """Document or built-in name of the hand of a run or of a file in our own format; None if
+    unknown.
+    """
     path = Path(path)
     hand: dict[str, str] | None
     if path.is_dir():
@@ -267,8 +269,9 @@ def hand_reference(path: str | Path) -> str | None:
 
 
 def station_reference(path: str | Path) -> str | None:
-    """Document of the station of a run, or of the one that a file of ours was sampled for; None if
-    neither tells it."""
+    """Document of the station of a run, or of the station that a file in our own format was sampled
+    for; None if unknown.
+    """
     path = Path(path)
     if path.is_dir():
         return str(run_documents(load_run(path))["station"])
@@ -278,18 +281,18 @@ def station_reference(path: str | Path) -> str | None:
 
 
 def _read_own_format(path: Path) -> GraspSet | None:
-    """The grasps of a file of ours."""
+    """Reads a file in our own format."""
     is_ours = path.is_file() and GRASP_FORMATS[OWN_FORMAT].recognises(path)
     return GraspSet.load(path) if is_ours else None
 
 
 @dataclass(frozen=True, eq=False)
 class RankedGrasps:
-    """Grasps, best first.
+    """Ranking of grasps, best first.
 
     Attributes:
-        order: (N,) their indices.
-        by: what they are ranked by, for people; empty if nothing tells them apart.
+        order: (N,) indices of the grasps.
+        by: displayed criterion of the ranking; empty if there is none.
     """
 
     order: NDArray[np.int64]
@@ -297,12 +300,12 @@ class RankedGrasps:
 
 
 def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
-    """Those of a run: lifted ones as `Run.best` has them, then by the groups of their outcomes, as
-    legends list them: held ones before lost ones, and those before what was not executed.
+    """Ranks grasps of a run: lifted ones as in `Run.best`, then by outcome group in the order of
+    legends: held before lost before not executed.
 
     Args:
         run: the run.
-        grasps: of the run, as a set.
+        grasps: the run's grasps as a set.
     """
     row = {id: i for i, id in enumerate(run.candidates.id)}
     best = [row[id] for id in run.best(len(row))]
@@ -318,7 +321,7 @@ def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
 
 
 def rank_by_score(grasps: GraspSet) -> RankedGrasps:
-    """Those of a set, by score; unknown scores last."""
+    """Ranks grasps of a set by score; unknown scores come last."""
     if not np.isfinite(grasps.score).any():
         return RankedGrasps(np.arange(len(grasps)), "")
     order = np.argsort(-np.where(np.isfinite(grasps.score), grasps.score, -np.inf), kind="stable")
@@ -330,16 +333,16 @@ def rank_by_score(grasps: GraspSet) -> RankedGrasps:
 def best_of_each(
     holder: NDArray[np.str_], among: NDArray[np.bool_], ranking: RankedGrasps, most: int | None
 ) -> list[int]:
-    """The best grasps of each object, best first; taken evenly where nothing tells them apart.
+    """The best grasps of each object, best first; evenly spaced ones if there is no ranking.
 
     Args:
         holder: (N,) object or instance of each grasp.
-        among: (N,) which grasps there are to choose from.
-        ranking: of all N.
-        most: of each object; all if None.
+        among: (N,) which grasps to choose from.
+        ranking: ranking of all N grasps.
+        most: maximum number for each object; all if None.
 
     Returns:
-        Their indices, object by object in the order of the set.
+        Indices of the grasps, object by object in the order of the set.
     """
     chosen: list[int] = []
     for name in dict.fromkeys(holder[among].tolist()):
@@ -351,10 +354,10 @@ def best_of_each(
 
 
 def grasp_index(grasps: GraspSet, id: str, where: str) -> int:
-    """The grasp of an identifier, with or without its instance in front.
+    """Index of a grasp by its identifier, with or without the instance as prefix.
 
     Raises:
-        UnknownNameError: there is none, or one for each of several instances.
+        UnknownNameError: no grasp, or grasps of several instances, have this identifier.
     """
     names = shown_ids(grasps)
     if id in names:
@@ -367,7 +370,7 @@ def grasp_index(grasps: GraspSet, id: str, where: str) -> int:
 
 
 def shown_ids(grasps: GraspSet) -> list[str]:
-    """Identifiers as tables of results have them, with the instance in front where there is one."""
+    """Identifiers as in tables of results, with the instance as prefix if there is one."""
     if "instance" not in grasps.columns:
         return [str(id) for id in grasps.id]
     instances = grasps.column("instance").tolist()

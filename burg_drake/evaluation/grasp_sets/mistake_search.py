@@ -1,4 +1,4 @@
-"""Finds the usual mistake that a set of grasps shows, by clearance of the hand and pad contacts."""
+"""Finds the common pose mistake of a grasp set by clearance of the hand and pad contacts."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ if TYPE_CHECKING:
 
 
 class MistakeLimits:
-    """MistakeLimits of the search, tuned on sets with and without mistakes.
+    """Limits of the search, tuned on sets with and without mistakes.
 
-    Of random grasps up to 0.67 fit after two mistakes at once are corrected. Correct widths are
-    0.75 to 1.07 of the distance of the contacts, half widths half of that.
+    Up to 0.67 of random grasps fit after two corrections. Correct widths are 0.75 to 1.07 times the
+    distance of the contacts, half widths half of that.
     """
 
     max_grasps = 100  # Maximum number of grasps of a set that are examined.
     min_fitting = 3  # Minimum number of grasps that fit after the correction.
     min_share = 0.6  # Minimum share of grasps that fit after the correction.
-    min_share_combined = 0.8  # The same of two mistakes at once.
-    min_share_about = 0.9  # The same of turns about the closing direction, and above max_closing.
+    min_share_combined = 0.8  # The same for two mistakes at once.
+    min_share_about = 0.9  # The same for turns about the closing direction, and above max_closing.
     min_gain = 2.5  # Minimum ratio of fitting grasps after to before the correction.
     min_gained = 10  # Minimum number that fit only after, where more fit before.
     max_lost_share = 0.1  # Maximum ratio to that of grasps that fit only before.
@@ -79,18 +79,18 @@ Fits = NDArray[np.bool_]
 def find_mistake(
     grasps: Mapping[str, GraspSet], station: StationLike, source: SceneLike | ObjectLibrary
 ) -> MistakeFound | None:
-    """Finds the usual mistake that a set of grasps shows, if it shows one.
+    """Finds the common pose mistake of a grasp set, if it has one.
 
     Args:
-        grasps: in the frames of their objects, by instance of the scene, or else by object of the
+        grasps: in the frames of their objects, by instance of the scene or by object of the
             library. Their provenance says how a file was read.
-        station: whose hand it is.
-        source: where the objects stand, or else where they are.
+        station: station with the hand.
+        source: scene or library of the objects.
 
     Returns:
-        The mistake that makes most grasps fit, where few fit as they are; where all grasps together
-        show none, that of the first object whose own grasps very likely have one. None if there is
-        none.
+        The mistake whose correction makes most grasps fit, where few fit as read. If all grasps
+        together show none, the likely mistake of the first object whose own grasps show one. None
+        if there is none.
     """
     held = {name: part for name, part in grasps.items() if len(part)}
     if not held:
@@ -105,7 +105,7 @@ def find_mistake(
     many = {name: part for name, part in held.items() if len(part) >= MIN_LIKELY_GRASPS}
     for name, part in many.items() if len(held) > 1 else ():
         found = _find_common_mistake(_MistakeSearch({name: part}, station, source, gripper))
-        if found and found.is_likely:  # with many objects, one of them would show one by chance
+        if found and found.is_likely:  # among many objects, one may show a mistake by chance
             return replace(found, only=name)
     return None
 
@@ -126,12 +126,12 @@ def mistake_notes(
     *,
     format_option: str = "--grasps-format",
 ) -> tuple[str, ...]:
-    """What is said of the usual mistake that a set of grasps shows, with the option that corrects
-    it, and of widths that are half as large as they should be.
+    """Notes about the common mistake of a grasp set, with the option that corrects it, and about
+    half widths.
 
     Args:
         grasps, station, source: see `find_mistake`.
-        format_option: what the caller's option about the format of a file is called.
+        format_option: name of the caller's option for the file format.
     """
     found = find_mistake(grasps, station, source)
     mistaken = () if found is None else (found.text(format_option),)
@@ -140,15 +140,14 @@ def mistake_notes(
 
 
 def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...]:
-    """The same of a run whose grasps were given, each with the command that evaluates them again
-    as they are meant, in a line of its own; none of sampled ones.
+    """The same notes for a run on given grasps, each with the command that evaluates the
+    corrected grasps on its own line; none for sampled grasps.
 
-    Mistakes about poses are looked for where both fingers did not touch the object at more than a
-    few grasps.
+    Pose mistakes are searched only if both fingers missed the object at more than a few grasps.
 
     Args:
         run: of one scene.
-        asked: run that the command made, of this scene or of many; `run` if None.
+        asked: run of the repeated command, of this scene or of many; `run` if None.
     """
     if run.document.grasps.origin != "given":
         return ()
@@ -171,8 +170,9 @@ def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...
 
 
 def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
-    """The same of a run over many scenes, all of which got their grasps from one file: what the
-    first scene shows, of a few with many grasps at which the fingers did not touch the object."""
+    """The same notes for a run over many scenes with grasps from one file: those of the first scene
+    with a mistake, among a few scenes where the fingers often did not touch the object.
+    """
     if campaign.document.grasps.origin != "given":
         return ()
     rows = campaign.rows(["outcome"])
@@ -189,8 +189,9 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _repeat_command(run: Run | Campaign, options: Sequence[str]) -> str:
-    """How to evaluate again with further options. Verdicts on grasps as they were read stay where
-    they are, so that it takes another folder."""
+    """The command that evaluates again with further options, into another folder, as the first one
+    keeps its verdicts.
+    """
     words = shlex.split(run.document.command)
     if not options or words[:2] != ["burg-drake", "evaluate"] or not _has_grasp_file(words):
         return " Evaluate them again in another folder."
@@ -201,14 +202,14 @@ def _repeat_command(run: Run | Campaign, options: Sequence[str]) -> str:
 
 
 def _has_grasp_file(words: Sequence[str]) -> bool:
-    """Whether the grasps of a command can be read again, which those of a pipe cannot."""
+    """Whether the grasps of a command can be read again (not from a pipe)."""
     files = [value for word, value in pairwise(words) if word == "--grasps"]
     files += [word.partition("=")[2] for word in words if word.startswith("--grasps=")]
     return any(Path(file).is_file() and not file.startswith("/dev/") for file in files)
 
 
 def _drop_options(words: Sequence[str], *options: str) -> list[str]:
-    """The words of a command but for some of its options that have one value each."""
+    """The words of a command without some of its options, each with one value."""
     before = ["", *words]
     return [
         word
@@ -220,7 +221,7 @@ def _drop_options(words: Sequence[str], *options: str) -> list[str]:
 def half_width_note(
     grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
 ) -> str:
-    """A note if most widths are half of the distance of the contacts; "" if they are not."""
+    """A note if most widths are half of the distance of the contacts; else ""."""
     from burg_drake.grasping import grasp_contacts
 
     test, ratios = _FitTest(station, source), []
@@ -241,7 +242,7 @@ def half_width_note(
 
 
 class _MistakeSearch:
-    """Grasps of a set, as they were read and as each mistake would have them."""
+    """Examined grasps of a set, as read and after the correction of each mistake."""
 
     def __init__(
         self,
@@ -274,11 +275,11 @@ class _MistakeSearch:
 
     @property
     def count(self) -> int:
-        """How many grasps are looked at."""
+        """Number of examined grasps."""
         return len(self._name)
 
     def mistakes(self) -> list[Mistake]:
-        """Those that can have been made."""
+        """Mistakes that are possible for these grasps."""
         # A camera's optical frame (OpenCV) in its body frame (ROS, x forward).
         optical_rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
         found = usual_mistakes(self.format, self._gripper)
@@ -301,13 +302,14 @@ class _MistakeSearch:
         return found
 
     def fits(self, mistakes: Sequence[Mistake]) -> tuple[Fits, Fits | None]:
-        """(K + 1, N) which grasps fit their object as they were read and once each mistake is
-        corrected, and which of those are clear of all else in the scene."""
-        meant = [self._X_MG, *(self._as_meant(mistake) for mistake in mistakes)]
-        placed = self._placed(np.stack(meant))
+        """(K + 1, N) which grasps fit their object as read and after each correction, and which of
+        these are also clear of the rest of the scene.
+        """
+        meant = [self._X_MG, *(self._corrected_poses(mistake) for mistake in mistakes)]
+        placed = self._in_object_frames(np.stack(meant))
         for k, mistake in enumerate(mistakes, 1):
             if mistake.frame is not None:
-                placed[k] = self._in_frame(mistake.frame)
+                placed[k] = self._from_frame(mistake.frame)
         names = np.concatenate([name for name, _ in placed])
         X_OG = np.concatenate([X for _, X in placed])
         alone, clear = self._test(names, X_OG)
@@ -317,40 +319,41 @@ class _MistakeSearch:
 
     @cached_property
     def closing_share(self) -> float:
-        """Share of the grasps, as they were read, at which the pads close on the object, whatever
-        else the hand hits."""
-        return float(self._test.closes(*self._placed(self._X_MG[None])[0]).mean())
+        """Share of the grasps as read at which the pads close on the object, regardless of
+        collisions.
+        """
+        return float(self._test.pads_close(*self._in_object_frames(self._X_MG[None])[0]).mean())
 
     def keeps_closing_line(self, mistake: Mistake) -> bool:
-        """Whether the fingers close along the same line once a mistake is corrected."""
+        """Whether a correction keeps the closing line of the fingers."""
         if not mistake.moves_frame:
             return False
         X_GN = correct_poses(np.eye(4), self.format.X_GF(self._gripper), mistake.correction)
         return bool(np.abs([X_GN[1:3, 0], X_GN[1:3, 3]]).max() < 1e-3)
 
-    def _as_meant(self, mistake: Mistake) -> Array:
-        """(N, 4, 4) the grasps in M once a mistake about grasps or the camera is corrected."""
+    def _corrected_poses(self, mistake: Mistake) -> Array:
+        """(N, 4, 4) grasps in M after the correction of their poses or of the camera."""
         if mistake.camera is not None and self._X_SM is not None:
             return np.asarray(inverse(self._X_SM) @ mistake.camera @ self._X_MG)
         return correct_poses(self._X_MG, self._X_GF, mistake.correction)
 
-    def _placed(self, X_MG: Array) -> list[tuple[Owners, Array]]:
-        """Instances, or objects, and grasps in their frames, of K times N grasps (K, N, 4, 4)."""
+    def _in_object_frames(self, X_MG: Array) -> list[tuple[Owners, Array]]:
+        """Instances or objects of grasps (K, N, 4, 4) in M, and the grasps in their frames."""
         if self._X_SM is None or self._scene is None:
             return [(self._name, X) for X in X_MG]
         X_SG = (self._X_SM @ X_MG).reshape(-1, 4, 4)
-        names, _ = held_instances(self._scene, X_SG, self._gripper)  # at once: it reads meshes
+        names, _ = held_instances(self._scene, X_SG, self._gripper)  # one call, as it reads meshes
         X_OG = inverse(self._X_SO(names)) @ X_SG
         return list(zip(names.reshape(len(X_MG), -1), X_OG.reshape(X_MG.shape), strict=True))
 
-    def _in_frame(self, frame: PoseFrame) -> tuple[Owners, Array]:
-        """Instances, and grasps whose poses are measured in another frame than M."""
+    def _from_frame(self, frame: PoseFrame) -> tuple[Owners, Array]:
+        """Instances and grasps if the poses are measured in another frame than M."""
         if frame == "object":
-            return self._held_as_objects()
+            return self._as_object_frame_poses()
         return self._name, inverse(self._X_SO(self._name)) @ self._X_MG
 
-    def _held_as_objects(self) -> tuple[Owners, Array]:
-        """The poses taken as those in the frame of one object: of the one that most grasps fit."""
+    def _as_object_frame_poses(self) -> tuple[Owners, Array]:
+        """The poses taken as measured in the frame of the one object that most grasps fit."""
         assert self._scene is not None
         among = list(self._scene.instances)
         names = np.repeat(among, self.count)
@@ -363,12 +366,12 @@ class _MistakeSearch:
         poses = {name: self._scene.X_SO(name) for name in set(names.tolist())}
         return np.stack([poses[name] for name in names.tolist()])
 
-    def is_shown(self, mistake: Mistake, before: Fits, after: Fits) -> bool:
-        """Whether enough grasps fit once a mistake is corrected for it to be named.
+    def is_supported(self, mistake: Mistake, before: Fits, after: Fits) -> bool:
+        """Whether enough grasps fit after a correction to report the mistake.
 
         Args:
-            mistake: it.
-            before, after: (N,) which grasps fit as they were read, and once it is corrected.
+            mistake: the mistake.
+            before, after: (N,) which grasps fit as read and after the correction.
         """
         about, n = self.keeps_closing_line(mistake), int(after.sum())
         if self.closing_share <= MistakeLimits.max_closing or about:
@@ -376,7 +379,7 @@ class _MistakeSearch:
             share = MistakeLimits.min_share_combined if combined else MistakeLimits.min_share
             share = MistakeLimits.min_share_about if about else share
             least = max(MistakeLimits.min_fitting, share * self.count)
-        elif mistake.reads_otherwise:
+        elif mistake.changes_reading:
             least = max(
                 MistakeLimits.min_fitting_closing, MistakeLimits.min_share_about * self.count
             )
@@ -389,10 +392,10 @@ class _MistakeSearch:
             gained >= MistakeLimits.min_gained and lost <= MistakeLimits.max_lost_share * gained
         )
         nearly_all = n >= MistakeLimits.min_share_about * self.count
-        return enough and mistake.reads_otherwise and nearly_all
+        return enough and mistake.changes_reading and nearly_all
 
     def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
-        """Other formats that measure grasps as those are once a mistake is corrected."""
+        """Titles of other formats with the grasp frame of the corrected grasps."""
         if not mistake.moves_frame:
             return ()
         X_GF = self.format.X_GF(self._gripper)
@@ -407,7 +410,7 @@ class _MistakeSearch:
 
 
 class _FitTest:
-    """Tells which grasps fit: the open hand is clear of the object, and its pads close on it."""
+    """Test for grasps that fit: the open hand is clear of the object, and its pads close on it."""
 
     def __init__(self, station: Station, source: Scene | ObjectLibrary) -> None:
         from burg_drake.grasping import jaws_of
@@ -418,21 +421,21 @@ class _FitTest:
         self._surfaces: dict[str, Surface] = {}
 
     def __call__(self, names: Owners, X_OG: Array) -> tuple[Fits, Fits | None]:
-        """(N,) which grasps fit their object, and which the rest of the scene does not hinder."""
+        """(N,) which grasps fit their object, and which are clear of the rest of the scene."""
         fits = np.zeros(len(names), dtype=bool)
         clear = np.zeros(len(names), dtype=bool)
         for name in dict.fromkeys(names.tolist()):
             mine = np.flatnonzero(names == name)
             X_WO = self._X_WO(name)
             free = mine[self._screen(name).is_clear(X_WO @ X_OG[mine])]
-            held = free[self.closes(names[free], X_OG[free])]
+            held = free[self.pads_close(names[free], X_OG[free])]
             fits[held] = True
-            if self._everything is not None:
-                clear[held] = self._everything.is_clear(X_WO @ X_OG[held])
-        return fits, None if self._everything is None else clear
+            if self._scene_clearance is not None:
+                clear[held] = self._scene_clearance.is_clear(X_WO @ X_OG[held])
+        return fits, None if self._scene_clearance is None else clear
 
-    def closes(self, names: Owners, X_OG: Array) -> Fits:
-        """(N,) at which grasps the pads close on their object, whatever else the hand hits."""
+    def pads_close(self, names: Owners, X_OG: Array) -> Fits:
+        """(N,) at which grasps the pads close on their object, regardless of collisions."""
         from burg_drake.grasping import are_antipodal, grasp_contacts
 
         closing = np.zeros(len(names), dtype=bool)
@@ -447,7 +450,7 @@ class _FitTest:
 
     @cached_property
     def _diagram(self) -> StationDiagram | None:
-        """Of the scene, if there is one."""
+        """Diagram of the scene, if there is one."""
         from burg_drake.station import build_station_diagram
 
         if not isinstance(self._source, Scene):
@@ -455,7 +458,7 @@ class _FitTest:
         return build_station_diagram(self._source, self._station, robot="hand")
 
     @cached_property
-    def _everything(self) -> HandClearance | None:
+    def _scene_clearance(self) -> HandClearance | None:
         from burg_drake.grasping import HandClearance
 
         return None if self._diagram is None else HandClearance(self._diagram)
@@ -493,18 +496,18 @@ class _FitTest:
 def _choose_mistake(
     search: _MistakeSearch, mistakes: Sequence[Mistake], fits: Fits
 ) -> MistakeFound | None:
-    """The mistake that makes most grasps fit; None if it does not make enough of them fit.
+    """The mistake whose correction makes most grasps fit; None if too few fit.
 
     Args:
-        search: has the grasps.
-        mistakes: K of them.
-        fits: (K + 1, N) which grasps fit, as they were read and once each is corrected.
+        search: search with the grasps.
+        mistakes: K mistakes.
+        fits: (K + 1, N) which grasps fit as read and after each correction.
     """
     before = int(fits[0].sum())
     count = {
         mistake: int(after.sum())
         for mistake, after in zip(mistakes, fits[1:], strict=True)
-        if search.is_shown(mistake, fits[0], after)
+        if search.is_supported(mistake, fits[0], after)
     }
     if not count:
         return None
@@ -542,7 +545,7 @@ def _choose_mistake(
 def _adjacent_mistakes(
     chosen: Mistake, count: Mapping[Mistake, int], least: float
 ) -> list[Mistake]:
-    """Mistakes with the same turn and neighbouring distances that do about as well."""
+    """Mistakes with the same turn and neighbouring distances that fit about as well."""
     same = [m for m in count if m.moves_frame and m.turn == chosen.turn]
     line = sorted(same, key=lambda mistake: mistake.forward)
     low = high = line.index(chosen)
@@ -554,7 +557,7 @@ def _adjacent_mistakes(
 
 
 def _other_reader(name: str, others: Sequence[str]) -> str:
-    """A format by which a file of the one called `name` can be read, too; "" if there is none."""
+    """Another format by which a file of format `name` can be read; "" if none."""
     interchangeable = ("isaac_grasp", "graspgen_yaml")  # Formats that can be read as one another.
     if name not in interchangeable:
         return ""
@@ -562,7 +565,7 @@ def _other_reader(name: str, others: Sequence[str]) -> str:
 
 
 def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str, GraspSet]:
-    """The grasps on one instance of each object: those of an object go to all of its instances."""
+    """The grasps of one instance per object, as all instances of an object get the same grasps."""
     chosen: dict[str, str] = {}
     for name in grasps:
         chosen.setdefault(scene.instance(name).object, name)
@@ -570,7 +573,7 @@ def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str
 
 
 def _spread_rows(grasps: Mapping[str, GraspSet]) -> dict[str, NDArray[np.int64]]:
-    """Rows of the grasps to look at, by name of a set: spread evenly over all promising ones."""
+    """Rows of the grasps to examine, by name of a set, spread evenly over the promising ones."""
     promising = {name: _promising_rows(part) for name, part in grasps.items()}
     total = sum(map(len, promising.values()))
     count = min(MistakeLimits.max_grasps, total)
@@ -585,8 +588,9 @@ def _spread_rows(grasps: Mapping[str, GraspSet]) -> dict[str, NDArray[np.int64]]
 
 
 def _promising_rows(grasps: GraspSet) -> NDArray[np.int64]:
-    """Grasps to look at: the successes, where scores are 0 and 1, or else the half with the highest
-    scores, where there are so many; data sets have failures, and networks poor grasps."""
+    """Rows of promising grasps: successes if scores are 0 and 1, else the half with the highest
+    scores, if these are enough. Data sets contain failures, and networks predict poor grasps.
+    """
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
     success = score == 1.0
     known = np.unique(score)

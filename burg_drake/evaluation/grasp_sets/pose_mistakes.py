@@ -1,4 +1,4 @@
-"""Usual mistakes in grasp poses from elsewhere, and how each is corrected."""
+"""Common mistakes in grasp poses of other projects, and their corrections."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _replace_rotations(X: Array, R: Array) -> Array:
 
 
 def _shift_quaternions(X: Array, shift: int) -> Array:
-    """The poses with the four numbers wxyz of their quaternions shifted."""
+    """Poses with the elements wxyz of their quaternions rolled by `shift`."""
     flat = quaternion_from_rotation(X[..., :3, :3].reshape(-1, 3, 3))
     R = rotation_from_quaternion(np.roll(flat, shift, axis=-1))
     return _replace_rotations(X, R.reshape(*X.shape[:-2], 3, 3))
@@ -69,9 +69,9 @@ POSE_CORRECTIONS: Mapping[str, tuple[Callable[[Array], Array], str]] = {
         "with lengths in millimetres",
     ),
 }
-"""Corrections of poses (..., 4, 4) in the file's convention, with words."""
+"""Corrections of poses (..., 4, 4) in the file's convention, with descriptions."""
 HALF_WIDTHS = "half_widths"
-MIN_LIKELY_GRASPS = 8  # Number of examined grasps from which a mistake can be called likely.
+MIN_LIKELY_GRASPS = 8  # Minimum number of examined grasps for a likely mistake.
 _TURN_PATTERN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
 _FORWARD_PATTERN = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
 
@@ -82,11 +82,11 @@ def _quarter_turn(degrees: float) -> Array:
 
 @dataclass(frozen=True)
 class FileReading:
-    """How a file is read.
+    """How to read a file.
 
     Attributes:
-        format: of the file; None to tell by the content.
-        correction: mistakes of the file that are made up for, such as `("turn:z90",)`; see
+        format: format of the file; None to detect it by content.
+        correction: corrections of mistakes in the file, such as `("turn:z90",)`; see
             `correct_poses`.
     """
 
@@ -95,10 +95,10 @@ class FileReading:
 
 
 def check_corrections(correction: Iterable[str]) -> tuple[str, ...]:
-    """The corrections, if all of them are known.
+    """Returns the corrections if all are known.
 
     Raises:
-        UnknownNameError: one is not.
+        UnknownNameError: a correction is unknown.
     """
     names = tuple(correction)
     for name in names:
@@ -113,13 +113,13 @@ def check_corrections(correction: Iterable[str]) -> tuple[str, ...]:
 
 
 def correct_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Array:
-    """Grasps as they are once mistakes are corrected, one after the other.
+    """Applies corrections to grasps, one after the other.
 
     Args:
-        X_MG: (..., 4, 4) grasps as read, in the frame M that they are measured in.
-        X_GF: (..., 4, 4) the grasp frame F of the file in ours, as it was taken to be.
-        correction: such as `("turn:z90", "forward:103.4")`. A turn is about an axis of G, through
-            the origin of F; `forward` is along the approach as it is then.
+        X_MG: (..., 4, 4) grasps as read, in their reference frame M.
+        X_GF: (..., 4, 4) the file's grasp frame F in G, as assumed when reading.
+        correction: such as `("turn:z90", "forward:103.4")`. A turn is about an axis of G through
+            the origin of F; `forward` is along the approach after the corrections before it.
 
     Returns:
         (..., 4, 4) grasps.
@@ -138,16 +138,16 @@ def correct_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Array:
 def correct_grasps(
     imported: ImportedGrasps, gripper: Gripper, correction: Iterable[str]
 ) -> ImportedGrasps:
-    """What was read of a file, once mistakes are corrected; see `correct_poses`.
+    """Applies corrections to grasps read from a file; see `correct_poses`.
 
     Args:
-        imported: what was read.
-        gripper: the hand that it was read for.
+        imported: grasps as read.
+        gripper: hand that they were read for.
         correction: names of `POSE_CORRECTIONS`, `half_widths`, which doubles widths, and forms such
             as `turn:z90` and `forward:103.4`.
 
     Raises:
-        UnknownNameError: there is no such correction.
+        UnknownNameError: a correction is unknown.
     """
     names = check_corrections(correction)
     grasps = imported.grasps
@@ -161,14 +161,15 @@ def correct_grasps(
 
 
 def with_poses(grasps: GraspSet, X_OG: Array, **changes: Any) -> GraspSet:
-    """The grasps at other poses (N, 4, 4), with identifiers of these; and other changed fields."""
+    """A copy of the grasps with other poses (N, 4, 4), their new identifiers, and other changed
+    fields.
+    """
     names = ("object", "width", "score", "provenance", "columns")
     return GraspSet.create(X_OG, **{name: getattr(grasps, name) for name in names} | changes)
 
 
 def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """A provenance without the correction with which the grasps of a file were once read from
-    another file, which the poses of this one have already."""
+    """A provenance without corrections applied before the grasps were saved to this file."""
     found = {key: value for key, value in provenance.items() if key != "correction"}
     parts = found.get("parts")
     if isinstance(parts, Mapping):
@@ -179,18 +180,18 @@ def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def correction_of(grasps: GraspSet) -> tuple[str, ...]:
-    """The correction with which a set was read, as its provenance says."""
+    """The correction with which a set was read, by its provenance."""
     provenances = (grasps.provenance, *provenance_parts(grasps.provenance))
     return next((tuple(p["correction"]) for p in provenances if p.get("correction")), ())
 
 
 def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
-    """(N, 4, 4) poses in G of the grasp frame that the file of a set has."""
+    """(N, 4, 4) poses in G of the grasp frame in a set's file."""
     return format_of_set(grasps).frames(grasps, gripper)
 
 
 def format_of_set(grasps: GraspSet) -> GraspFormat:
-    """The format that a set was read from, as its provenance says; else ours."""
+    """The format from which a set was read, by its provenance; else our own format."""
     provenances = (grasps.provenance, *provenance_parts(grasps.provenance))
     names = [found.get("format") for found in provenances]
     known = (name for name in names if isinstance(name, str) and name in GRASP_FORMATS)
@@ -199,14 +200,14 @@ def format_of_set(grasps: GraspSet) -> GraspFormat:
 
 @dataclass(frozen=True)
 class Mistake:
-    """A way in which grasps may be meant otherwise than they were read.
+    """A way in which grasps may have been misread.
 
     Attributes:
-        words: what makes up for it, as in "turned by 90 degrees about the approach".
-        correction: the same as `correct_poses` takes it.
-        frame: what poses are measured in, if that is the mistake; then nothing else is.
+        words: description of the correction, such as "turned by 90 degrees about the approach".
+        correction: the correction as `correct_poses` takes it.
+        frame: true reference frame of the poses, if only that is the mistake.
         camera: whether the camera's pose is the mistake.
-        step: whether it is one of many distances, none of which is that of a known frame.
+        step: whether its distance is a step of the search instead of the offset of a known frame.
     """
 
     words: str
@@ -217,7 +218,7 @@ class Mistake:
 
     @property
     def turn(self) -> tuple[str, ...]:
-        """Its turns."""
+        """Turns of the correction."""
         return tuple(name for name in self.correction if name.startswith("turn:"))
 
     @property
@@ -229,25 +230,25 @@ class Mistake:
 
     @property
     def moves_frame(self) -> bool:
-        """Whether it is about the grasp frame of a file: turns, and a distance."""
+        """Whether it changes the grasp frame of a file by turns and a distance."""
         kinds = ("turn:", "forward:")
         return bool(self.correction) and all(name.startswith(kinds) for name in self.correction)
 
     @property
-    def reads_otherwise(self) -> bool:
-        """Whether it is one of a few ways to read rotations and poses, and no distance."""
+    def changes_reading(self) -> bool:
+        """Whether it changes how rotations and poses are read, without a distance."""
         return bool(self.correction) and not self.forward
 
 
 def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
-    """The table of mistakes, those first that are made most.
+    """Mistakes to look for, the most common first.
 
-    Turns are all by right angles, but one by 180 degrees about the approach, which exchanges the
-    fingers, and those by which the Panda's flange differs from its hand. Distances are those
-    between the origins of known frames, and steps.
+    Turns are by right angles and by the angle between the Panda's flange and hand; 180 degrees
+    about the approach only exchanges the fingers and is left out. Distances are offsets between the
+    origins of known frames, and steps.
 
     Args:
-        format: that the grasps were read as.
+        format: format as which the grasps were read.
         gripper: the hand.
     """
     origin = _frame_offset_mm(format, gripper)
@@ -278,12 +279,12 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
 
 
 def _frame_offset_mm(format: GraspFormat, gripper: Gripper) -> float:
-    """How far the origin of a format's frame is behind G [mm]."""
+    """Distance of the origin of a format's frame behind G [mm]."""
     return -1e3 * float(format.X_GF(gripper)[2, 3])
 
 
 def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
-    """A mistake about the grasp frame of a file."""
+    """A mistake in the grasp frame of a file."""
     # Axes of G.
     axis_words = {
         "z": "the approach",
@@ -304,19 +305,19 @@ def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
 
 @dataclass(frozen=True)
 class MistakeFound:
-    """A mistake that a set of grasps shows.
+    """A mistake found in a set of grasps.
 
     Attributes:
-        mistake: it.
-        before, after: number of grasps that fit as they are, and once it is corrected.
-        count: number of grasps that were looked at.
+        mistake: the mistake.
+        before, after: number of grasps that fit before and after the correction.
+        count: number of examined grasps.
         total: number of grasps in the set.
-        likeness: titles of formats that measure grasps as the corrected ones are.
-        format: another format by which the same file can be read, which corrects it.
-        alternatives: what else does as well, in words.
-        reach_mm: least and largest distance along the approach that does as well [mm].
-        given: the correction with which the grasps were read.
-        only: the instance or object whose grasps alone show it; empty if all of them do.
+        likeness: titles of formats with the grasp frame of the corrected grasps.
+        format: another format for the same file that corrects the mistake.
+        alternatives: other corrections that fit as well, in words.
+        reach_mm: smallest and largest distance along the approach that fits as well [mm].
+        given: correction with which the grasps were read.
+        only: instance or object that alone shows the mistake; empty if all do.
     """
 
     mistake: Mistake
@@ -333,17 +334,17 @@ class MistakeFound:
 
     @property
     def is_likely(self) -> bool:
-        """Whether nearly all grasps fit once it is corrected, and nothing else does as well."""
+        """Whether nearly all grasps fit after the correction, and after no other one."""
         enough = self.count >= MIN_LIKELY_GRASPS and self.after >= 0.9 * self.count
         return enough and not self.alternatives
 
     def text(self, format_option: str = "--grasps-format") -> str:
-        """What was found, how sure that is, and which option corrects it, in sentences.
+        """Sentences about the mistake, its certainty, and the option that corrects it.
 
         Args:
-            format_option: what the caller's option about the format of a file is called.
+            format_option: name of the caller's option for the file format.
         """
-        sentences = [self._found()]
+        sentences = [self._finding_sentence()]
         if self.reach_mm is not None and self.reach_mm[0] < self.reach_mm[1]:
             low, high = sorted(map(abs, self.reach_mm))
             sentences.append(f"Any distance from {low:g} to {high:g} mm fits equally well.")
@@ -354,7 +355,7 @@ class MistakeFound:
         return " ".join([*sentences, self._remedy(format_option)])
 
     def options(self, format_option: str = "--grasps-format") -> list[str]:
-        """Words of a command line that correct it; none if a file would have to be written."""
+        """Command-line options of the correction; none if it needs a rewritten file."""
         mistake = self.mistake
         only = ["--only", self.only] if self.only else []
         if mistake.camera is not None:
@@ -365,7 +366,7 @@ class MistakeFound:
             return [format_option, self.format, *only]
         return ["--correction", ",".join((*self.given, *mistake.correction)), *only]
 
-    def _found(self) -> str:
+    def _finding_sentence(self) -> str:
         words = self.mistake.words
         others = f" that were checked, of {self.total} in all," if self.total > self.count else ""
         grasps = f"grasps of {self.only}" if self.only else "grasps"

@@ -1,4 +1,4 @@
-"""Grasp sets of several objects: sampled ones with provenance, and analytic quality of any set."""
+"""Grasp sets of several objects: sampling with provenance, and analytic quality of any set."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ def sample_grasps(
         grasps.save("grasps.h5")
 
     Args:
-        source: the scene, or the library, in which objects lie nowhere.
+        source: the scene, or the library, whose objects have no pose.
         station: gives the hand and, in a scene, the place of the arm.
-        n: grasps for each instance or object; there are fewer where there are no more.
-        seed: of the random numbers. The grasps of an object follow from it, the object and, unless
-            they are sampled blind, what stands around it.
-        settings: how; the defaults if None.
+        n: grasps for each instance or object; fewer if no more exist.
+        seed: seed of the random numbers. It determines the grasps of an object, together with the
+            object and, unless they are sampled blind, its surroundings.
+        settings: sampling settings; the defaults if None.
         only: names of objects, or of instances of the scene; all if None.
 
     Returns:
@@ -106,20 +106,19 @@ def sampled_set(
     seed: int,
     settings: SamplingSettings,
 ) -> GraspSet:
-    """One set of all grasps.
+    """Joins all grasps to one set.
 
     Args:
-        sampled: grasps by name of the instance, or of the object where there is no scene; one or
-            more.
+        sampled: grasps by name of the instance, or of the object without a scene; one or more.
         library: has the objects.
-        scene: where they stand, if anywhere; the set then has the column `instance`.
-        station, n, seed, settings: what `sample_on_scene` or `sample_library` was called with.
+        scene: scene of the objects, if any; the set then has the column `instance`.
+        station, n, seed, settings: arguments of `sample_on_scene` or `sample_library`.
 
     Returns:
-        The grasps, with all that it takes to sample them again: the documents and the content that
-        they had, `n`, `seed`, `settings`, versions, and under `parts` the provenance of each
-        object's grasps. Weights of faces are there by their hashes. `object_files` describes each
-        object as files of other projects do.
+        The grasps, with all inputs to sample them again: documents and their content, `n`, `seed`,
+        `settings`, versions, and under `parts` the provenance of each object's grasps. Weights of
+        faces are named by their hashes. `object_files` describes each object as files of other
+        projects do.
     """
     objects = sorted({name for grasps in sampled.values() for name in grasps.object.tolist()})
     provenance: dict[str, Any] = {
@@ -138,7 +137,7 @@ def sampled_set(
 
 
 def _settings_data(settings: SamplingSettings) -> dict[str, Any]:
-    """The settings as JSON values; of the weights, whose objects have some."""
+    """The settings as JSON values; weights are replaced by the names of their objects."""
     return {
         **vars(settings),
         "standoffs": list(settings.standoffs),
@@ -147,7 +146,7 @@ def _settings_data(settings: SamplingSettings) -> dict[str, Any]:
 
 
 SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
-"""Columns that only a scene gives."""
+"""Columns that need a scene."""
 
 
 def scored_set(
@@ -171,24 +170,24 @@ def scored_set(
     Args:
         grasps: in the frames of their objects.
         library: has the objects.
-        station: whose hand it is.
-        scene: where the objects stand. A grasp is on the instance that its column `instance` names,
-            or on the only one of its object.
+        station: station with the hand.
+        scene: scene of the objects. A grasp is on the instance in its column `instance`, or on the
+            only instance of its object.
         friction: coefficients by object, in place of the library's; under "" for all others.
-        by: the metric that becomes the score, `grasping.METRICS`.
+        by: metric of `grasping.METRICS` that becomes the score.
         progress: True shows it on standard error; a function gets the events.
 
     Returns:
-        The same grasps in the same order; `provenance["quality"]` tells with what they were scored.
-        In a scene `gravity_margin` is known, and there are the `SCENE_COLUMNS`, which grasps from
-        elsewhere lose without one: `clearance` [m], negative where the hand overlaps something;
-        `nearest`, what it overlaps or is nearest to; `screened`, the outcome of the screen, `clear`
-        or one of `Outcome`; and `collides_with`, what decided it, "" if clear.
+        The same grasps in the same order; `provenance["quality"]` names the inputs of the scores.
+        In a scene `gravity_margin` is known and the `SCENE_COLUMNS` are added; without a scene they
+        are removed: `clearance` [m], negative if the hand overlaps a body; `nearest`, the
+        overlapping or nearest body; `screened`, the outcome of the screen, `clear` or one of
+        `Outcome`; and `collides_with`, the deciding body, "" if clear.
 
     Raises:
         UnknownNameError: an object, an instance or the metric does not exist.
-        InvalidInputError: an object has several instances and grasps do not say which one they are
-            on, or the metric needs a scene.
+        InvalidInputError: an object has several instances and its grasps do not name theirs, or the
+            metric needs a scene.
         MeshError: the surface of an object cannot be used.
     """
     station = as_station(station)
@@ -234,7 +233,7 @@ def scored_set(
 
 
 def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Indices of the rows chosen (N,), 2000 at a time; metrics do not depend on the number."""
+    """Indices of the chosen rows (N,) in batches of 2000; the metrics do not depend on it."""
     rows = np.flatnonzero(chosen)
     return [rows[k : k + 2000] for k in range(0, len(rows), 2000)]
 
@@ -258,7 +257,7 @@ def _surface(library: ObjectLibrary, name: str) -> Surface:
 
 
 def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
-    """(N,) names of the instances that the grasps are on."""
+    """(N,) names of the grasps' instances."""
     if INSTANCE_COLUMN in grasps.columns:
         names = grasps.column(INSTANCE_COLUMN)
         for name in set(names.tolist()) - {""}:

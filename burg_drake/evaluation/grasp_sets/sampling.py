@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
 
 def approach_cone_from_above(X_WO: Array, angle_deg: float) -> tuple[ApproachCone, ...]:
-    """The cone about straight down, in the object frame.
+    """Cone of approach directions about straight down, in the object frame.
 
     Args:
-        X_WO: (4, 4) where the object lies.
-        angle_deg: largest angle to straight down; nothing is forbidden from 180 on.
+        X_WO: (4, 4) pose of the object.
+        angle_deg: largest angle to straight down; 180 or more allows all directions.
     """
     if angle_deg >= 180.0:
         return ()
@@ -61,17 +61,17 @@ def approach_cone_from_above(X_WO: Array, angle_deg: float) -> tuple[ApproachCon
 def approach_half_space_of_arm(
     X_WO: Array, p_WM: Array, station: Station, name: str
 ) -> ApproachCone:
-    """The half space of approaches that do not point back to the arm, in the object frame: those
-    that make no obtuse angle with the horizontal direction from the arm's base to the object.
+    """Half space of approaches that do not point back to the arm, in the object frame: at most 90
+    degrees from the horizontal direction from the arm's base to the object.
 
     Args:
-        X_WO: (4, 4) where the object lies.
+        X_WO: (4, 4) pose of the object.
         p_WM: (3,) its middle [m].
         station: has the arm.
-        name: of the instance, for messages.
+        name: name of the instance, for messages.
 
     Raises:
-        InvalidInputError: there is no arm, or the object is right above its base.
+        InvalidInputError: the station has no arm, or the object is right above its base.
     """
     arm = station.document.arm
     if arm is None:
@@ -91,32 +91,32 @@ def approach_half_space_of_arm(
 def _direction_in_object(
     X_WO: Array, v_W: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """A direction of the world as a rounded unit vector in the object frame."""
+    """A world direction as a rounded unit vector in the object frame."""
     v_O = np.asarray(v_W) @ X_WO[:3, :3] / np.linalg.norm(v_W)
-    # rounded, so objects turned about the vertical share their grasps; and no negative zeros
+    # rounded, so that objects turned about the vertical share grasps; without negative zeros
     x, y, z = np.round(v_O, 6) + 0.0
     return float(x), float(y), float(z)
 
 
 PAD_CONTACT = "pads"
-"""Counted as blocker where the pads do not meet the object antipodally."""
+"""Blocker name for grasps at which the pads do not meet the object antipodally."""
 
 
 class ClearanceFilter:
-    """Keeps grasps of one object, see `grasping.Accept`.
+    """Accepts clear grasps of one object; see `grasping.Accept`.
 
     Args:
-        screen: of the open hand.
-        name: of the object in the screen.
-        X_WO: (4, 4) where it is in the screen's world.
-        surface: the object's.
-        jaws: the hand's.
+        screen: collision screen of the open hand.
+        name: name of the object in the screen.
+        X_WO: (4, 4) its pose in the screen's world.
+        surface: surface of the object.
+        jaws: jaws of the hand.
         friction: coefficient between object and pads.
         settings: margin and mode of the screen.
 
     Attributes:
-        blocked: number of grasps by the body that the open hand hits, the object itself among them,
-            and under `PAD_CONTACT`.
+        blocked: number of rejected grasps by the body that the open hand hits (maybe the object
+            itself), or under `PAD_CONTACT`.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class ClearanceFilter:
         self.blocked: Counter[str] = Counter()
 
     def __call__(self, X_OG: Array) -> NDArray[np.bool_]:
-        """Which of the grasps (N, 4, 4) to keep, (N,)."""
+        """(N,) whether to keep each of the grasps (N, 4, 4)."""
         X_WG = self._X_WO @ X_OG
         found = self._screen.measure(self._name, X_WG, mode=self._mode, margin=self._margin)
         passed = found.clear
@@ -171,16 +171,15 @@ def sample_on_scene(
 ) -> Iterator[tuple[str, GraspSet]]:
     """Samples grasps on the instances of a scene, one after the other.
 
-    All instances of an object get the same grasps that lie on the same side and have the same
-    limits, if they are sampled blind.
+    Sampled blind, instances of an object that lie on the same side and have the same limits get the
+    same grasps.
 
     Args:
         scene: the scene.
-        station: gives the opening of the hand, its body, and the place of the arm.
-        n: grasps for each instance; there are fewer where there are (almost) no more, and
-            `shortfall_note` says why.
-        seed: of the random numbers.
-        settings: how.
+        station: has the hand (opening and body) and the place of the arm.
+        n: grasps for each instance; fewer if (almost) no more exist, and `shortfall_note` says why.
+        seed: seed of the random numbers.
+        settings: sampling settings.
         only: names of free instances, or of objects for all their instances; all if None.
 
     Returns:
@@ -226,7 +225,7 @@ def sample_library(
 
     Args:
         library: the library.
-        station: gives the opening of the hand and its body.
+        station: has the hand (opening and body).
         n, seed, settings: as for `sample_on_scene`.
         objects: names in the library; all if None.
 
@@ -234,8 +233,8 @@ def sample_library(
         Names and grasps, in the frames of the objects.
 
     Raises:
-        InvalidInputError: n is below 1, or a setting does not fit, such as limits of the approach:
-            the objects of a library lie nowhere.
+        InvalidInputError: n is below 1, or a setting does not fit, such as limits of the approach,
+            as the objects of a library have no pose.
         UnknownNameError: no such object, or a mesh file is missing.
     """
     _check_count(n)
@@ -263,7 +262,7 @@ def sample_library(
 
 
 class ObjectSampler:
-    """Samples on objects of one library with the same settings."""
+    """Samples grasps on objects of one library with the same settings."""
 
     def __init__(
         self,
@@ -326,8 +325,9 @@ class ObjectSampler:
         name: str,
         X_WO: Array,
     ) -> GraspSet:
-        """Grasps of an object, by this name and at this place (4, 4) in the screen, that the hand
-        can take; their provenance counts what `blocked` the others."""
+        """Collision-free grasps of an object, with this name and pose (4, 4) in the screen; their
+        provenance counts what `blocked` the others.
+        """
         test = self.clear_test(object, screen, name, X_WO)
         grasps = self(object, cones, test)
         notes = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
@@ -336,7 +336,7 @@ class ObjectSampler:
     def clear_test(
         self, object: str, screen: HandClearance, name: str, X_WO: Array
     ) -> ClearanceFilter:
-        """Tells which grasps of an object the hand can take; see `clear`."""
+        """The filter of collision-free grasps of an object; see `clear`."""
         from burg_drake.geometry import Surface
         from burg_drake.grasping import jaws_of
 
@@ -358,7 +358,7 @@ def _check_count(n: int) -> None:
 def _require_known_names(
     names: Iterable[str] | None, known: Iterable[str], what: str
 ) -> tuple[str, ...]:
-    """The names, each once; all known ones if None."""
+    """The names without repetitions; all known names if None."""
     chosen = tuple(dict.fromkeys(known if names is None else names))
     for name in chosen:
         if name not in known:
@@ -373,7 +373,7 @@ def _approach_cones(
     instance: str,
     settings: SamplingSettings,
 ) -> tuple[ApproachCone, ...]:
-    """The limits of the approach to an instance; none where they hold every direction."""
+    """Limits of the approach to an instance; none if they allow every direction."""
     angle = settings.approach_angle_deg
     cones = approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG if angle is None else angle)
     if settings.from_arm_side:
@@ -398,19 +398,19 @@ SAMPLING_REMEDIES = {
     PairRejection.no_approach: "wider limits of the approach would help",
     PAD_CONTACT: "smaller pads would help",
 }
-"""What would help against each cause of a shortfall."""
+"""Remedies for each cause of a shortfall."""
 TARGET_WORDS = "the object itself"  # The target and the table in messages.
 TABLE_WORDS = "the table"
 
 
 def shortfall_note(name: str, asked: int, provenance: Mapping[str, Any], found: int) -> str:
-    """Why there are fewer grasps than asked, counted by the sampler; "" if there are not fewer.
+    """Reason for fewer grasps than requested, by the sampler's counts; "" if there are enough.
 
     Args:
-        name: of the instance or object.
-        asked: number of grasps.
-        provenance: what `sample_on_scene` or `sample_library` says of its grasps.
-        found: number of grasps.
+        name: name of the instance or object.
+        asked: number of requested grasps.
+        provenance: provenance of its grasps by `sample_on_scene` or `sample_library`.
+        found: number of sampled grasps.
     """
     if found >= asked:
         return ""
@@ -418,7 +418,7 @@ def shortfall_note(name: str, asked: int, provenance: Mapping[str, Any], found: 
     lines, blocked = provenance.get("left_out", {}), provenance.get("blocked", {})
     parts, causes = [], {}
     tried = provenance.get("tried", 0)
-    if tried < max(asked, 10 * found) and lines:  # it is lines that are rare
+    if tried < max(asked, 10 * found) and lines:  # lines are rare
         parts.append(_describe_lines(provenance))
         causes = dict(lines)
     if sum(blocked.values()):
@@ -432,7 +432,7 @@ def shortfall_note(name: str, asked: int, provenance: Mapping[str, Any], found: 
 
 
 def _name_blockers(blocked: Mapping[str, int], target: str) -> dict[str, int]:
-    """Counts by what people call a body, the most first."""
+    """Counts by displayed name of the body, largest first."""
     names = {target: TARGET_WORDS, "table": TABLE_WORDS}
     counts = sorted(blocked.items(), key=lambda item: -item[1])
     return {names.get(body, body): count for body, count in counts if count}
@@ -459,7 +459,7 @@ def _describe_bodies(bodies: Mapping[str, int], margin: float) -> str:
 
 
 def _remedy(causes: Mapping[str, int], provenance: Mapping[str, Any]) -> str:
-    """What would help against the most frequent cause."""
+    """Remedy for the most frequent cause."""
     cause = max(causes, key=causes.__getitem__)
     if provenance.get("margin") and cause not in SAMPLING_REMEDIES:
         return "a smaller margin would help"

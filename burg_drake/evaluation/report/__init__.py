@@ -1,5 +1,5 @@
 """The report of a run as one self-contained HTML page.
 
-Read `report.html.jinja` first: it is the page, from top to bottom. `pages` gives it the values,
-which the sections (`*_sections`) compute.
+Read `report.html.jinja` first, which is the page from top to bottom. `pages` passes it the values
+computed by the `*_sections`.
 """

@@ -53,18 +53,18 @@ TYPICAL_MARGINS = (
     ("slip", ("slipped", "dropped")),
     ("lift", ("blocked",)),
 )
-"""Margin that ranks cases of an outcome by strength, by beginning of its name."""
+"""Margin that ranks the cases of an outcome by severity, by prefix of the outcome's name."""
 CAUSE_MARGINS = tuple(name for name, _ in TYPICAL_MARGINS)
 
 
 @dataclass(frozen=True, eq=False)
 class CauseRows:
-    """The grasps of one run or of many, by outcome, object and blocker.
+    """Outcome, object and blocker of the grasps of one run or of many.
 
     Attributes:
         outcomes: (N,) indices into `Outcome`.
         objects, blockers: of each grasp.
-        margins: (N,) by name of `CAUSE_MARGINS`; those that the runs have.
+        margins: (N,) the available margins of `CAUSE_MARGINS` by name.
         replay: the command that shows the grasp of a row.
     """
 
@@ -81,10 +81,10 @@ class Cause:
 
     Attributes:
         outcome: the outcome.
-        number: of grasps.
-        objects, blockers: of these grasps, with their counts, most frequent first.
-        share: of all grasps.
-        replay: the command that shows the median one.
+        number: number of grasps.
+        objects, blockers: counts of the grasps' objects and blockers, most frequent first.
+        share: share of all grasps.
+        replay: command that shows the median grasp.
     """
 
     outcome: Outcome
@@ -96,7 +96,7 @@ class Cause:
 
     @property
     def name(self) -> str:
-        """The outcome for people."""
+        """Displayed name of the outcome."""
         return outcome_text(self.outcome)
 
     @property
@@ -106,7 +106,7 @@ class Cause:
 
 
 def rows_of_run(columns: ResultRows, path: str) -> CauseRows:
-    """Those of a run in a folder."""
+    """The rows of a run in a folder."""
 
     def replay(row: int) -> str:
         (id,) = columns.cells("id", np.array([row])).tolist()
@@ -122,9 +122,9 @@ def rows_of_run(columns: ResultRows, path: str) -> CauseRows:
 
 
 def find_causes(rows: CauseRows) -> list[Cause]:
-    """Why grasps did not succeed, the most frequent cause first."""
-    successes = (Outcome.LIFTED, Outcome.REACHABLE)  # Outcomes without a cause to look for.
-    max_named = 3  # Objects and blockers that are listed for each outcome.
+    """Causes of failure, most frequent first."""
+    successes = (Outcome.LIFTED, Outcome.REACHABLE)  # Outcomes that are no failures.
+    max_named = 3  # Number of objects and blockers listed for each outcome.
     found = []
     for place, outcome in enumerate(Outcome):
         mine = np.flatnonzero(rows.outcomes == place).astype(np.int64)
@@ -138,8 +138,9 @@ def find_causes(rows: CauseRows) -> list[Cause]:
 
 
 def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: Outcome) -> int:
-    """The median row of those with an outcome: by the margin that tells how strong a case it is,
-    and by their order among equal ones; half of the cases are weaker, and half are stronger."""
+    """Index of the median row of an outcome by the margin of its severity, and by order among
+    equals.
+    """
     name = next((m for m, starts in TYPICAL_MARGINS if outcome.value.startswith(starts)), "")
     values = margins[name][rows] if name in margins else np.zeros(len(rows))
     known = np.isfinite(values)
@@ -150,7 +151,9 @@ def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: 
 
 
 def collision_section(columns: ResultRows) -> ReportSection | None:
-    """What the open hand collided with at the start and how deep; nothing if it never did."""
+    """Section of the bodies that the open hand collided with at the start and how deep; None if
+    none.
+    """
     outcomes, blockers = columns.codes("outcome"), columns.codes("blocker")
     overlap = columns["overlap"]
     collision = [name.startswith("collision_") for name in outcomes.names]
@@ -186,14 +189,14 @@ def collision_section(columns: ResultRows) -> ReportSection | None:
 
 
 def disturbed_section(columns: ResultRows, disturbance: float) -> ReportSection | None:
-    """Which objects were moved, turned and toppled in trials on others; nothing if all stayed where
-    they were.
+    """Section of objects that were moved, turned or toppled in trials on others; None if there are
+    none.
 
     Args:
         columns: the results.
-        disturbance: displacement from which on a lifted grasp counts as disturbing [m].
+        disturbance: displacement above which a lifted grasp counts as disturbing [m].
     """
-    min_displacement = 1e-3  # Metres from which an object counts as moved.
+    min_displacement = 1e-3  # Metres above which an object counts as moved.
     names = [name.removeprefix(MOVED_PREFIX) for name in columns if name.startswith(MOVED_PREFIX)]
     moved = {name: columns[MOVED_PREFIX + name] for name in names}
     found = {name: int((far >= min_displacement).sum()) for name, far in moved.items()}
@@ -212,7 +215,7 @@ def disturbed_section(columns: ResultRows, disturbance: float) -> ReportSection 
         "toppled",
         "main causes: trials",
     ]
-    toppled = _toppled(columns)
+    toppled = _count_toppled(columns)
     rows = []
     for name in names:
         far = moved[name]
@@ -239,8 +242,8 @@ def disturbed_section(columns: ResultRows, disturbance: float) -> ReportSection 
     )
 
 
-def _toppled(columns: ResultRows) -> Counter[str]:
-    """In how many trials each object was toppled."""
+def _count_toppled(columns: ResultRows) -> Counter[str]:
+    """Number of trials in which each object was toppled."""
     texts = columns.get("toppled", np.empty(0, dtype=np.str_))
     return Counter(name for text in texts[texts != ""].tolist() for name in text.split(", "))
 
@@ -252,7 +255,7 @@ def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
 
 
 def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
-    """What hindered the arm, and what was in its way; nothing if it was not asked."""
+    """Section of what hindered the arm, and of its obstacles; None if the arm was not checked."""
     # Outcomes between a clear hand and the trial.
     arm_outcomes = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
     if summary.mode == "hand":
@@ -262,7 +265,7 @@ def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
     for outcome in arm_outcomes:
         count = summary.total.outcomes[outcome]
         if count:
-            share, blockers = format_percent(count / clear), _blockers(columns, outcome)
+            share, blockers = format_percent(count / clear), _count_blockers(columns, outcome)
             rows.append([outcome_text(outcome), count, share, outcome.meaning, blockers])
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
@@ -276,14 +279,14 @@ def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
     return ReportSection("What stopped the arm", text, found)
 
 
-def _blockers(columns: ResultRows, outcome: Outcome) -> str:
+def _count_blockers(columns: ResultRows, outcome: Outcome) -> str:
     named = columns["blocker"][(columns["outcome"] == outcome) & (columns["blocker"] != "")]
     found = Counter(named.tolist()).most_common(3)
     return ", ".join(f"{name} ({count})" for name, count in found)
 
 
 def execution_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
-    """How the arm executed its plans; None if it did not."""
+    """Section on the arm's execution of its plans; None if there was none."""
     if "tracking_error" not in columns or not np.isfinite(columns["tracking_error"]).any():
         return None
     rows = []
@@ -312,18 +315,18 @@ def execution_section(summary: Summary, columns: ResultRows) -> ReportSection | 
 
 
 PICTURE_SETTINGS = ReachabilitySettings(spacing=0.043, redundant=(2, 6))
-"""Half the points of the default, for a picture."""
+"""Half the default number of points, which suffices for a picture."""
 
 
 @dataclass(frozen=True)
 class ReachCharts:
-    """Maps of the board without its objects.
+    """Reachability maps of the board without objects.
 
     Attributes:
-        charts: one for each height.
-        key: what their colours stand for.
-        orientations: number of orientations of the hand that were tried at each place.
-        max_tilt_deg: their largest tilt.
+        charts: a map for each height.
+        key: legend of their colours.
+        orientations: number of hand orientations that were tried at each place.
+        max_tilt_deg: largest tilt of the orientations.
     """
 
     charts: Sequence[Html]
@@ -333,8 +336,9 @@ class ReachCharts:
 
 
 def reachability_section(run: Run) -> ReachCharts | None:
-    """The board without its objects, and where these stand on it; nothing for a run of the hand
-    alone, nor if the files that it was judged with are gone or have changed."""
+    """Reachability of the board without objects, with the objects' places; None for a run of the
+    hand alone, or if the run's input files are gone or have changed.
+    """
     if run.document.mode == "hand":
         return None
     try:
@@ -353,7 +357,7 @@ def reachability_section(run: Run) -> ReachCharts | None:
 
 
 def _board_map(scene: Scene, station: Station) -> ReachabilityMap:
-    """The map of a scene without objects; made once a process for the same contents."""
+    """The map of a scene without objects; made once per process for the same content."""
     key = scene.content, station.content
     if key not in _CACHED_MAPS:
         _CACHED_MAPS[key] = map_reachability(scene, station, settings=PICTURE_SETTINGS)

@@ -37,18 +37,18 @@ from burg_drake.visualization import (
 )
 
 MAIN_MARGINS = ("clearance", "slip", "tilt", "others_moved")
-"""Margins that tell most: tolerance to errors, firmness, disturbance of others."""
+"""Main margins: tolerance to errors, firmness, disturbance of other objects."""
 FURTHER_MARGINS = display_order(
     ("pad_force", "patch_area", "arm_clearance", "pushed", "tracking_distance"),
     MarginNames.all,
     without=(
         *MAIN_MARGINS,
         *("overlap", "joint_excess"),  # 0 of all that was executed
-        *("lift", MarginNames.lift_height, "end_time"),  # follow from what was asked for
+        *("lift", MarginNames.lift_height, "end_time"),  # follow from the settings
         *("duration", "tracking_error"),  # in the section about the arm
     ),
 )
-"""All others that differ between executed grasps."""
+"""All other margins that differ between executed grasps."""
 
 
 def margin_charts(
@@ -57,16 +57,16 @@ def margin_charts(
     """Distributions of the main margins; none if nothing was executed.
 
     Args:
-        columns: (N,) by name, of grasps that came to a trial.
-        groups: (N,) of each, see `group_indices`.
-        trial: settings of the trial's phases, with the limits of what counts as lifted.
+        columns: columns (N,) of executed grasps by name.
+        groups: (N,) groups of the grasps, see `group_indices`.
+        trial: settings of the trial's phases, with the limits of a successful lift.
     """
-    # Settings from whose value on a held object does not count as lifted.
+    # Settings that limit what counts as lifted.
     limiting_settings = {"others_moved": "disturbance", "slip": "slip_limit", "tilt": "tilt_limit"}
     limits = {
         name: Limit(trial[limit] * display_unit(name)[1], "limit")
         for name, limit in limiting_settings.items()
-        if trial.get(limit, math.inf) < math.pi  # an angle or a length that limits nothing
+        if trial.get(limit, math.inf) < math.pi  # no limit
     }
     return _margin_charts(MAIN_MARGINS, columns, groups, limits)
 
@@ -86,7 +86,7 @@ def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> R
 def executed_margins(
     columns: ResultRows, groups: NDArray[np.int8]
 ) -> tuple[dict[str, Array], NDArray[np.int8]]:
-    """What `margin_charts` asks for, of a table of results and its groups (N,)."""
+    """Columns and groups of the executed grasps, the arguments of `margin_charts`."""
     tried = columns["stage"] == Stage.EXECUTED.value
     names = [name for name in (*MAIN_MARGINS, *FURTHER_MARGINS) if name in columns]
     return {name: columns[name][tried] for name in names}, groups[tried]
@@ -123,9 +123,9 @@ def _margin_chart(
 
 
 def best_section(run: Run) -> ReportSection | None:
-    """The best grasps and how to watch them; nothing where none was lifted."""
+    """Section of the best grasps and the commands that show them; None if none was lifted."""
     per_object = 3  # Rows for each object.
-    # Columns, with the decimals that tell the best grasps apart.
+    # Columns with their number of decimals.
     decimals = dict(clearance=1, slip=2, tilt=2, pad_force=1, patch_area=0, others_moved=2)
     best = run.best(per_object, each=True)
     if not best:
@@ -149,7 +149,7 @@ def best_section(run: Run) -> ReportSection | None:
 
 
 def failure_section(run: Run) -> ReportSection | None:
-    """What could not be simulated and why; nothing if all could."""
+    """Section of the grasps that could not be simulated, with reasons; None if there are none."""
     max_rows = 50  # Rows of the table of failures.
     failures = run.failures
     if not failures:

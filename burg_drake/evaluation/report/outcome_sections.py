@@ -23,7 +23,7 @@ STAGE_LOSSES = {
     stage: tuple(o for o in Outcome if o.stage is stage and o is not Outcome.SIMULATION_FAILED)
     for stage in Stage
 }
-"""Outcomes by the stage that they end at, but for failed simulations."""
+"""Outcomes by the stage at which they end, without failed simulations."""
 STEP_LOSSES = {
     "clear": STAGE_LOSSES[Stage.CLEAR],
     "reachable": STAGE_LOSSES[Stage.REACHABLE],
@@ -32,11 +32,11 @@ STEP_LOSSES = {
     "held": tuple(o for o in STAGE_LOSSES[Stage.EXECUTED] if not o.held),
     "lifted": (Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED),
 }
-"""Outcomes that stop a grasp on its way to each step of the funnel."""
+"""Outcomes that end a grasp before each step of the funnel."""
 
 
 CountedBar = tuple[OutcomeCounts, list[tuple[int, str, str]]]
-"""Counts of grasps, and the parts of their bar: count, CSS class and tip of each."""
+"""Counts of grasps, and count, CSS class and tooltip of each part of their bar."""
 
 
 def outcome_bar(counts: OutcomeCounts) -> CountedBar:
@@ -50,23 +50,25 @@ def outcome_bar(counts: OutcomeCounts) -> CountedBar:
 
 
 def object_bars(summary: Summary) -> list[CountedBar]:
-    """A bar for each object, and for their sum if there are several. Of more than 40 objects,
-    those with the lowest shares of successes are shown."""
+    """A bar for each object, and one for the total of several objects. Of more than 40 objects,
+    those with the lowest success rates are shown.
+    """
     max_objects = 40
     objects = list(summary.objects)
     if len(objects) > max_objects:
         objects = worst_first(objects)[:max_objects]
-    return [outcome_bar(group) for group in _with_total(objects, summary)]
+    return [outcome_bar(group) for group in _add_total(objects, summary)]
 
 
-def _with_total(objects: list[OutcomeCounts], summary: Summary) -> list[OutcomeCounts]:
-    """Objects, and their sum if they are several."""
+def _add_total(objects: list[OutcomeCounts], summary: Summary) -> list[OutcomeCounts]:
+    """The objects, and the total of several objects."""
     return [*objects, summary.total] if len(objects) > 1 else objects
 
 
 def worst_first(groups: Sequence[OutcomeCounts]) -> list[OutcomeCounts]:
-    """Groups by their success when executed; those of which nothing was executed come first, and
-    of equal shares those that are less certain."""
+    """Groups sorted by success rate of executed grasps; groups without executed grasps come first,
+    and of equal rates the less certain ones.
+    """
 
     def rank(group: OutcomeCounts) -> tuple[float, float]:
         return (group.lifted / group.executed if group.executed else -1.0), group.interval[0]
@@ -77,7 +79,7 @@ def worst_first(groups: Sequence[OutcomeCounts]) -> list[OutcomeCounts]:
 def count_section(summary: Summary) -> ReportSection:
     """Matrix of objects and outcomes."""
     seen = [o for o in Outcome if summary.total.outcomes[o]]
-    groups = _with_total(list(summary.objects), summary)
+    groups = _add_total(list(summary.objects), summary)
     rows = [[group.name, *(group.outcomes[o] or "·" for o in seen)] for group in groups]
     head = ["object", *(outcome_text(o) for o in seen)]
     matrix = PageTable(head, rows, range(1, len(head)), "matrix", total=len(groups) > 1)
@@ -100,7 +102,7 @@ def cost_section(summary: Summary) -> ReportSection:
 
 
 def outcome_text(outcome: Outcome) -> str:
-    """An outcome for people."""
+    """Displayed name of an outcome."""
     return outcome.value.replace("_", " ")
 
 
@@ -113,7 +115,7 @@ STEP_MEANINGS = {
     "held": "both fingers hold the object to the end",
     "lifted": "not turned in the hand, and nothing else was disturbed",
 }
-"""What grasps have passed that are counted at each step."""
+"""What the grasps counted at each step have passed."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +123,10 @@ class CascadeStep:
     """Grasps that pass a stage.
 
     Attributes:
-        name: of the step.
+        name: name of the step.
         passed: number of grasps.
-        before: number of grasps that passed the step before; 0 for the first step.
-        lost: grasps that end here, by outcome, the most frequent first.
+        before: number of grasps that passed the previous step; 0 for the first step.
+        lost: grasps that end here, by outcome, most frequent first.
     """
 
     name: str
@@ -147,7 +149,7 @@ class CascadeStep:
 
 
 def cascade_steps(summary: Summary) -> list[CascadeStep]:
-    """What passes each stage, and what is lost there."""
+    """Grasps that pass or end at each stage."""
     found: list[CascadeStep] = []
     for step in summary.steps:
         counts = {o: summary.total.outcomes[o] for o in STEP_LOSSES.get(step, ())}
@@ -170,7 +172,7 @@ def certainty_bars(summary: Summary) -> list[CountedBar]:
     if not summary.knows_confidence or not summary.total.executed:
         return []
     tried = [group for group in summary.objects if group.executed]
-    return [_certainty_bar(group) for group in _with_total(tried, summary)]
+    return [_certainty_bar(group) for group in _add_total(tried, summary)]
 
 
 def _certainty_bar(group: OutcomeCounts) -> CountedBar:
@@ -185,11 +187,11 @@ def _certainty_bar(group: OutcomeCounts) -> CountedBar:
 
 
 def success_interval(summary: Summary, *, executed: bool) -> str:
-    """The 95 % interval of the share of grasps that were lifted, such as "79 to 93 %".
+    """The 95 % interval of the share of lifted grasps, such as "79 to 93 %".
 
     Args:
-        summary: of a run, of one scene or of many.
-        executed: of those that were executed, not of all.
+        summary: summary of a run, of one scene or of many.
+        executed: share of the executed grasps, not of all.
     """
     groups = summary.scenes or (summary.total,)
     whole = [group.executed if executed else group.judged for group in groups]
@@ -198,7 +200,7 @@ def success_interval(summary: Summary, *, executed: bool) -> str:
 
 
 def early_losses(summary: Summary) -> list[tuple[str, int]]:
-    """What stopped grasps before the trial, and how many."""
+    """Outcomes that end grasps before the trial, with their counts."""
     words = {
         "clear": "the open hand collides",
         "reachable": "hand or arm cannot reach the grasp",
@@ -213,14 +215,16 @@ def early_losses(summary: Summary) -> list[tuple[str, int]]:
 
 
 def spread_sentences(summary: Summary) -> list[str]:
-    """How success differs between scenes, and between objects, where several were tried."""
+    """Sentences about differences of success between scenes and between objects, if there are
+    several.
+    """
     found = _spread_sentence(summary.scenes, "scene"), _spread_sentence(summary.objects, "object")
     return [text for text in found if text]
 
 
 def _spread_sentence(groups: Sequence[OutcomeCounts], what: str) -> str:
-    """The best and the worst object or scene of those that were tried."""
-    min_scenes = 8  # From so many scenes on, quartiles tell more than the extremes.
+    """Sentence about the best and the worst of the tried objects or scenes."""
+    min_scenes = 8  # From this number on, quartiles are shown in place of the extremes.
     tried = [group for group in groups if group.executed]
     if len(tried) < 2:
         return ""

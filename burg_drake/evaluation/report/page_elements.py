@@ -28,14 +28,14 @@ from burg_drake.visualization import (
 
 @dataclass(frozen=True)
 class ReportSection:
-    """A section of the report, mostly a table. Those at the end are folded on the screen.
+    """A section of the report, mostly a table.
 
     Attributes:
-        title: its heading.
-        text: below the heading.
-        table: what the section shows ...
+        title: heading.
+        text: text below the heading.
+        table: table of the section ...
         charts: ... or charts in place of it.
-        command: to be copied, above them.
+        command: command to copy, above the table or charts.
         facts: names and texts in a list.
     """
 
@@ -54,16 +54,16 @@ _THEMED_COLOURS = {
     "arm has no path": ("#1a3373", "#8fa6e8"),
     "simulation failed": ("#1d2328", "#f4f6f7"),
 }
-"""Colours that need one tone on a light page and another on a dark one."""
+"""Colours with different tones on a light and on a dark page."""
 
 
 def style_sheet() -> str:
-    """All styles of the page."""
+    """Style sheet of the page."""
     return page_style("burg_drake.evaluation.report", "style.css") + group_style()
 
 
 def group_style() -> Html:
-    """The rules of the colours of outcomes."""
+    """CSS rules for the colours of outcomes."""
     light = "".join(
         _group_rule(g.name, _THEMED_COLOURS.get(g.name, (g.hex,))[0]) for g in OUTCOME_GROUPS
     )
@@ -72,7 +72,7 @@ def group_style() -> Html:
 
 
 def _group_rule(group: str, colour: str) -> str:
-    # Yellow lines cannot be seen on white: a darker tone of the same hue.
+    # Yellow lines are invisible on white, so a darker tone of the same hue is used.
     stroke_colours = {OUTCOME_GROUPS[1].hex: "#b59f00"}
     # Text is dark or white, whichever has more contrast.
     text_colours = ("#101418", "#ffffff")
@@ -86,8 +86,8 @@ def html_page(title: str, *content: Child) -> str:
     """A whole HTML document.
 
     Args:
-        title: of the window.
-        content: of the body.
+        title: title of the window.
+        content: content of the body.
     """
     return html_document(title, style_sheet(), element("main", *content))
 
@@ -139,7 +139,7 @@ def number_cells(values: Iterable[Child]) -> list[Html]:
 
 
 def command(line: str) -> Html:
-    """A command to copy, broken between words only."""
+    """A command to copy, which breaks only between words."""
     words = [element("span", word) for word in line.split(" ")]
     spaced = [part for word in words for part in (word, " ")]
     return element("pre", element("code", *spaced[:-1], class_="copy"))

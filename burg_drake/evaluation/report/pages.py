@@ -113,7 +113,7 @@ def report_page(run: Run) -> str:
     return _render_report(
         summary,
         title=f"{document.scene.name} on {document.station.name}",
-        about=_about(document, document.grasps.count),
+        about=_run_description(document, document.grasps.count),
         notice=_run_notice(run),
         scene_picture=scene_picture(scene, columns, groups) if scene else None,
         scenes=None,
@@ -130,7 +130,7 @@ def report_page(run: Run) -> str:
 
 
 def _render_report(summary: Summary, **values: object) -> str:
-    """The page of a run, of one scene or of many, from what differs between them."""
+    """The page of a run, of one scene or of many, from its summary."""
     present = [g for g in OUTCOME_GROUPS if any(summary.total.outcomes[o] for o in g.outcomes)]
     return render_page(
         "evaluation/report/report.html.jinja",
@@ -152,7 +152,7 @@ def _render_report(summary: Summary, **values: object) -> str:
 
 
 def _run_notice(run: Run) -> str:
-    judged, mine = len(run.results["id"]), len(run.mine)
+    judged, mine = len(run.results["id"]), len(run.assigned_ids)
     parts = []
     if run.document.shard:
         number, _, whole = run.document.shard.partition("/")
@@ -179,7 +179,7 @@ def write_campaign_report(campaign: Campaign) -> None:
 
 
 def renew_report(campaign: Campaign) -> None:
-    """Writes the report, unless it is as new as what is known of the scenes.
+    """Writes the report unless it is newer than all results of the scenes.
 
     Raises:
         InvalidInputError: it cannot be written.
@@ -212,7 +212,7 @@ def campaign_page(campaign: Campaign) -> str:
     return _render_report(
         summary,
         title=f"{scenes} on {document.station.name}",
-        about=_about(document),
+        about=_run_description(document),
         notice=_campaign_notice(campaign, summary),
         scene_picture=None,
         scenes=_scene_shares(campaign, summary.scenes),
@@ -228,7 +228,7 @@ def campaign_page(campaign: Campaign) -> str:
     )
 
 
-def _about(document: RunDocument | CampaignDocument, count: int | None = None) -> str:
+def _run_description(document: RunDocument | CampaignDocument, count: int | None = None) -> str:
     """Origin and number of the grasps, mode, engine, seed and day of a run."""
     how = "sampled" if document.grasps.origin == "sampled" else "given"
     grasps = f"{how} grasps" if count is None else f"{format_count(count)} {how} grasps"
@@ -252,13 +252,13 @@ def _campaign_notice(campaign: Campaign, summary: Summary) -> str:
 
 
 def _report_link(campaign: Campaign, name: str) -> str:
-    """Where the report of a scene is, from that of all; empty if there is none."""
+    """Relative link from the report of all scenes to that of one; empty if it does not exist."""
     there = (campaign.folder(name) / REPORT_FILE).is_file()
     return quote(f"{SCENES_FOLDER}/{name}/{REPORT_FILE}") if there else ""
 
 
 def _report_command(campaign: Campaign, name: str) -> str:
-    """The command that makes the report of a scene."""
+    """Command that writes the report of a scene."""
     return shlex.join(["burg-drake", "report", str(campaign.folder(name))])
 
 
@@ -281,15 +281,15 @@ def _cause_rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int
 
 @dataclass(frozen=True)
 class SceneShares:
-    """Success over scenes, worst first.
+    """Success by scene, worst first.
 
     Attributes:
-        number: of scenes.
-        chart: a dot for each.
-        links: where the report of a scene is, from the page, by name; empty if there is none.
-        worst: the scenes that are shown with their outcomes.
-        listed: all or the worst of them, if they are too many for that.
-        command: that writes the report of one scene; empty if all have theirs.
+        number: number of scenes.
+        chart: chart with a dot for each scene.
+        links: relative links to the reports of scenes by name; empty if there is none.
+        worst: scenes that are shown with their outcomes.
+        listed: all scenes, or the worst if there are too many.
+        command: command that writes the report of one scene; empty if all scenes have one.
     """
 
     number: int

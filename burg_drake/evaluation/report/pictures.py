@@ -53,7 +53,7 @@ from burg_drake.visualization import (
 
 
 class _Layout:
-    """Lengths in a picture of grasps."""
+    """Dimensions of a picture of grasps."""
 
     panel = 220.0  # Side of a picture [SVG units].
     caption = 22.0  # Height of the line above it.
@@ -66,8 +66,8 @@ class DrawnGrasps:
     """Grasps on one instance, to be drawn.
 
     Attributes:
-        ids: (N,) of the run.
-        X_OG: (N, 4, 4) in the object frame.
+        ids: (N,) identifiers in the run.
+        X_OG: (N, 4, 4) grasps in the object frame.
         width: (N,) distance between the fingers [m].
         groups: (N,) indices into `OUTCOME_GROUPS`.
         counts: number of grasps of each group, drawn or not, by index.
@@ -101,7 +101,7 @@ def scene_drawing(
     """
     picture_width = 480.0  # SVG units.
     elevation = float(np.deg2rad(56.0))  # Radians by which the camera looks down.
-    max_named = 16  # Scenes with more objects have no names in their picture.
+    max_named = 16  # Above this number of objects, the picture shows no names.
     dx, dy = scene.board.size
     board = np.array([[0, 0, 0], [dx, 0, 0], [dx, dy, 0], [0, dy, 0]], dtype=float)
     R_SC = camera_rotation(elevation)
@@ -115,7 +115,7 @@ def scene_drawing(
         element("path", d=path_data(view.project(board)), class_="board"),
         *(element("path", d=d, class_="fixed") for d in behind[:1] if d),
         *(element("path", d=footprint(s, view), class_="ground") for s in free.values()),
-        *_solid_tones(list(free.values()), view),
+        *_shaded_surface(list(free.values()), view),
         *(labels if len(free) <= max_named else []),
         viewBox=f"0 0 {width:g} {height:g}",
         class_="drawing scene",
@@ -142,7 +142,8 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
     everything = np.vstack([turned.vertices, project_to_ground(turned), corners.reshape(-1, 3)])
     view = fit_view(everything, R_WC, _Layout.panel, _Layout.panel)
     behind = join(
-        element("path", d=footprint(turned, view), class_="ground"), *_solid_tones([turned], view)
+        element("path", d=footprint(turned, view), class_="ground"),
+        *_shaded_surface([turned], view),
     )
     lifted = grasps.groups == LIFTED_GROUP
     successes = int(grasps.counts[LIFTED_GROUP])
@@ -153,7 +154,7 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
         (_Layout.panel, ~lifted, "not lifted", failures),
     ):
         caption = f"{text}: {format_count(count) if count else 'none'}"
-        drawn = [behind, *_strokes(grasps, mask, corners, view), _ruler(view)]
+        drawn = [behind, *_grasp_paths(grasps, mask, corners, view), _ruler(view)]
         panel = (
             svg_text(caption, _Layout.panel / 2, 15, "panel"),
             element("g", *drawn, transform=f"translate(0 {_Layout.caption:g})"),
@@ -169,11 +170,12 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
     )
 
 
-def _strokes(
+def _grasp_paths(
     grasps: DrawnGrasps, mask: NDArray[np.bool_], corners: Array, view: FlatView
 ) -> list[Html]:
-    """One group of paths for each outcome group, the best ones last and so on top; within a group
-    the nearer grasps on top."""
+    """One SVG group for each outcome group, the best on top, and within it the nearer grasps on
+    top.
+    """
     found = []
     depth = view.depths(corners[:, 0])
     for k in sorted(set(grasps.groups[mask].tolist()), reverse=True):
@@ -187,7 +189,7 @@ def _strokes(
     return found
 
 
-def _solid_tones(solids: Sequence[SolidMesh], view: FlatView) -> list[Html]:
+def _shaded_surface(solids: Sequence[SolidMesh], view: FlatView) -> list[Html]:
     paths = shaded_outline(solids, view)
     return [element("path", d=d, class_=f"tone t{k}") for k, d in enumerate(paths) if d]
 
@@ -286,8 +288,8 @@ class GraspFigures:
     """Drawings of objects with their grasps.
 
     Attributes:
-        figures: one for each object.
-        text: what they show.
+        figures: a drawing for each object.
+        text: description of the drawings.
     """
 
     figures: Sequence[GraspFigure]
@@ -331,7 +333,7 @@ def instance_figures(
 
 
 def _shown_text(figures: Sequence[GraspFigure]) -> str:
-    """How many grasps are drawn, if not all are."""
+    """Sentence with the number of drawn grasps; empty if all are drawn."""
     drawn = sum(len(figure.shown.ids) for figure in figures)
     total = sum(figure.grasps for figure in figures)
     if drawn == total:
@@ -340,8 +342,9 @@ def _shown_text(figures: Sequence[GraspFigure]) -> str:
 
 
 def drawn_rows(groups: NDArray[np.int8], most: int) -> NDArray[np.int64]:
-    """Which grasps (N,) to draw: all, or about `most` of them in the shares of their groups, with
-    at least one of each group."""
+    """Selects grasps (N,) to draw: all, or about `most` in proportion to their groups, with at
+    least one of each group.
+    """
     if len(groups) <= most:
         return np.arange(len(groups))
     order = np.argsort(groups, kind="stable")
@@ -378,8 +381,8 @@ def _drawn_grasps(
 def object_pictures(
     campaign: Campaign, stored: StoredRows, groups: NDArray[np.int8]
 ) -> GraspFigures | None:
-    """The objects with most grasps, each with its grasps of all scenes; None if there are none, or
-    no meshes any more.
+    """Drawings of the objects with most grasps, each with its grasps of all scenes; None without
+    grasps or meshes.
 
     Args:
         campaign: the run.
@@ -420,7 +423,7 @@ def object_pictures(
 
 
 def _unchanged_libraries(campaign: Campaign) -> list[ObjectLibrary]:
-    """Those that are where they were, and as they were."""
+    """The libraries whose files are unchanged."""
     found = []
     for folder in campaign.document.libraries:
         try:

@@ -32,7 +32,7 @@ from burg_drake.station import ENGINES, Engine, StationDocument
 
 
 def reproduce_command(run: Run) -> str:
-    """The command line that makes this run; for given grasps their file is among the run's."""
+    """Command line that repeats a run; given grasps come from the run's copy."""
     document = run.document
     grasps = _sampling_options(document) or ["--grasps", str(run.path / GRASPS_FILE)]
     words = _command_words(document, grasps, run.path / STATION_FILE)
@@ -40,8 +40,9 @@ def reproduce_command(run: Run) -> str:
 
 
 def reproduce_campaign_command(campaign: Campaign) -> str:
-    """The command line that makes this run over many scenes; for given grasps, which it does not
-    keep in one file, the one that began it."""
+    """Command line that repeats a run over many scenes; for given grasps, of which it keeps no
+    single file, the command that began it.
+    """
     document = campaign.document
     grasps = _sampling_options(document)
     if not grasps:
@@ -64,8 +65,8 @@ def _command_words(
 
 
 def _scene_words(paths: Sequence[str]) -> str:
-    """Scenes as a shell has them; those of one folder with a star if it holds no others."""
-    max_paths = 12  # More scenes of one folder are written as all of its files.
+    """Scene paths for a shell, with a wildcard if they are all scenes of a folder."""
+    max_paths = 12  # More scenes of one folder are written with a wildcard.
     folders = {Path(path).parent for path in paths}
     if len(paths) > max_paths and len(folders) == 1:
         (folder,) = folders
@@ -75,7 +76,7 @@ def _scene_words(paths: Sequence[str]) -> str:
 
 
 def _sampling_options(document: RunDocument | CampaignDocument) -> list[str]:
-    """How grasps were sampled; nothing if they were given."""
+    """Options of the sampling; none if grasps were given."""
     grasps = document.grasps
     if grasps.per_object is None:
         return []
@@ -99,7 +100,7 @@ def _settings_options(document: RunDocument | CampaignDocument, station: Path | 
     words: list[str] = []
     if station is not None:
         usual = load_document(station, StationDocument).motion
-        if document.mode == "hand" and not document.trial.get("approach"):  # begins at the grasp
+        if document.mode == "hand" and not document.trial.get("approach"):  # starts at the grasp
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
     limits = limit_settings(document.trial)
@@ -111,8 +112,9 @@ def _settings_options(document: RunDocument | CampaignDocument, station: Path | 
 
 
 def _option_words(**values: Any) -> list[str]:
-    """The options of fields of `EvaluationSettings` with their values; those that take none stand
-    for true."""
+    """Options of the fields of `EvaluationSettings` with their values; options without value mean
+    true.
+    """
     words: list[str] = []
     for name, value in values.items():
         option = option_name(EvaluationSettings, name)
@@ -128,11 +130,11 @@ MODE_MEANINGS = {
     "reach": "the hand alone executes the grasps that the arm can execute",
     "arm": "the whole arm executes the grasps, from the pregrasp on",
 }
-"""What a mode asks of each grasp."""
+"""Description of each mode's checks."""
 
 
 def repeat_section(run: Run) -> ReportSection:
-    """The command that makes the same results again, and the settings that decide about them."""
+    """Section with the command that repeats the results, and the settings that affect them."""
     document = run.document
     facts = [
         ("scene", _content_text(document.scene)),
@@ -140,11 +142,11 @@ def repeat_section(run: Run) -> ReportSection:
         ("run", f"{document.hash} (hash of all of the above; column run of the table)"),
     ]
     line = reproduce_command(run)
-    return ReportSection("How to repeat it", _approach_text(document), command=line, facts=facts)
+    return ReportSection("How to repeat it", _repeat_note(document), command=line, facts=facts)
 
 
 def provenance_section(run: Run) -> ReportSection:
-    """All inputs with their hashes, settings, versions, sessions and files."""
+    """Section with all inputs and their hashes, settings, versions, sessions and files."""
     document = run.document
     files = (
         f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
@@ -157,7 +159,7 @@ def provenance_section(run: Run) -> ReportSection:
 
 
 def repeat_campaign_section(campaign: Campaign) -> ReportSection:
-    """The command that began a run over many scenes, and the settings that decide about it."""
+    """Section with the command that began a run over many scenes, and the settings behind it."""
     document = campaign.document
     scenes = [entry.path for entry in document.scenes]
     text = (
@@ -175,7 +177,7 @@ def repeat_campaign_section(campaign: Campaign) -> ReportSection:
 
 
 def campaign_provenance_section(campaign: Campaign) -> ReportSection:
-    """All settings, versions, and who worked on a run over many scenes."""
+    """Section with all settings, versions and workers of a run over many scenes."""
     document = campaign.document
     facts = [
         (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
@@ -187,8 +189,8 @@ def campaign_provenance_section(campaign: Campaign) -> ReportSection:
 
 
 def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
-    """Settings that people ask for first."""
-    # Software whose version people ask for first, beside that of the engine.
+    """The most important settings."""
+    # Software whose versions are listed first, beside the engine's.
     packages = ("burg_drake", "drake", "python")
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
     names = (*packages, *document.engine.packages)
@@ -206,7 +208,7 @@ def _content_text(given: Input) -> str:
     return f"{given.path}, content {given.content[:HASH_DIGITS]}"
 
 
-def _approach_text(document: RunDocument) -> str:
+def _repeat_note(document: RunDocument) -> str:
     preset = document.engine in ENGINES.values()
     by_hand = "" if preset else " The engine is not a preset; pass it to `evaluate` in Python."
     return (

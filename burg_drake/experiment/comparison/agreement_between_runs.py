@@ -1,4 +1,4 @@
-"""Agreement of two runs when neither is the truth: verdicts, deciding stages, margins."""
+"""Agreement of two runs, neither of which is the truth: verdicts, deciding stages, margins."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class PartedGrasp:
     """A grasp that only one of two runs holds.
 
     Attributes:
-        scene, object, grasp: which grasp on what.
-        first, second: its outcome in either run.
-        confidence: of the first run's verdict; None where it has none.
+        scene, object, grasp: names of scene and object, and id of the grasp.
+        first, second: outcome in each run.
+        confidence: confidence of the first run's verdict; None if it has none.
         replays: commands that show it in the first run, and in the second.
     """
 
@@ -58,8 +58,8 @@ def parted_grasps(
     """Names grasps in the order of the first run.
 
     Args:
-        pairs: N grasps with the verdicts of the first run, and how they ended in the second.
-        parted: (N,) which of them are named.
+        pairs: N grasps with the verdicts of the first run and the outcomes of the second.
+        parted: (N,) which grasps to list.
         scenes: names of the scenes by their content.
         folders: of the two runs, by content of the scene.
     """
@@ -92,16 +92,16 @@ CONFIDENCE_GROUPS = (
 
 @dataclass(frozen=True, kw_only=True)
 class MarginDifference:
-    """How far apart two runs measure a margin of grasps that both executed.
+    """Differences of a margin between two runs, of grasps that both executed.
 
-    All is in the unit of its column.
+    All values are in the unit of the margin's column.
 
     Attributes:
-        name: of the margin.
-        grasps: that both executed and measured.
-        median: of the second run's less the first's: whether one sees more of it.
-        median_size: of the absolute differences.
-        within: what nine of ten absolute differences are within.
+        name: name of the margin.
+        grasps: number of grasps that both executed and measured.
+        median: median of second minus first run.
+        median_size: median of the absolute differences.
+        within: 90 % quantile of the absolute differences.
     """
 
     name: str
@@ -113,24 +113,25 @@ class MarginDifference:
 
 @dataclass(frozen=True, kw_only=True)
 class RunAgreement:
-    """Agreement of two runs on what is held.
+    """Agreement of two runs on which grasps hold their object.
 
-    `lifted`, `lifted_disturbed` and `lifted_turned` are, whatever counts as success elsewhere.
+    `lifted`, `lifted_disturbed` and `lifted_turned` count as held, whatever counts as success
+    elsewhere.
 
     Attributes:
-        alike: share of the grasps that both hold, or both do not, with Wilson's interval.
-        kappa: Cohen's, of the same.
-        same_rows: grasps with the same outcome, stage, engine, confidence and margins in both, to
-            the last digit, as those of a copy have them.
-        objects: the same by object; their accuracy is the share that is alike.
+        alike: share of grasps that both runs hold or both do not, with Wilson's interval.
+        kappa: Cohen's kappa of the same.
+        same_rows: number of grasps with exactly the same outcome, stage, engine, confidence and
+            margins in both runs, as in a copy.
+        objects: agreement by object; its accuracy is the share of alike grasps.
         stages: grasps by the stage that decided in the first run, and in the second.
-        apart: the same of the grasps that are not alike.
-        parted: the grasps that are not alike, by name.
-        confidence: as `objects`, by the confidence of the first run's verdicts, of those that have
-            one; see `CONFIDENCE_GROUPS`.
-        margins: share of alike grasps in quantile bins of the first run's margins, of grasps of
-            which both runs measured it; `is_success_verdict` are the alike ones.
-        differences: of the margins, where both executed.
+        apart: the same for grasps that are not alike.
+        parted: grasps that are not alike.
+        confidence: as `objects`, by confidence of the first run's verdicts, if they have one; see
+            `CONFIDENCE_GROUPS`.
+        margins: share of alike grasps in quantile bins of the first run's margins, for grasps
+            measured by both runs; successes are the alike ones.
+        differences: differences of the margins, if both executed.
     """
 
     alike: Estimate
@@ -156,7 +157,7 @@ def assess_run_agreement(
     """Compares two runs with each other.
 
     Args:
-        pairs: N grasps with the verdicts of the first run, and how they ended in the second.
+        pairs: N grasps with the verdicts of the first run and the outcomes of the second.
         second: the N rows of the second run, with the columns `REFERENCE_COLUMNS`.
         scenes: names of the scenes by their content.
         folders: of the two runs, by content of the scene.
@@ -188,7 +189,7 @@ def assess_run_agreement(
 
 
 def both_executed(first: TextFactor, second: TextFactor) -> Flags:
-    """(N,) whether the trials of both runs came to the grip, by the stages that decided."""
+    """(N,) whether both runs executed the grasp, by the deciding stages."""
     one, other = (
         stage.where([name == Stage.EXECUTED.value for name in stage.names])
         for stage in (first, second)
@@ -216,9 +217,10 @@ def _equal_texts(first: TextFactor, second: TextFactor) -> Flags:
 
 
 def margin_differences(pairs: VerdictPairs, second: ResultTable) -> tuple[MarginDifference, ...]:
-    """How far apart two runs measure what both executed; margins that they never have in common are
-    left out."""
-    covered_share = 0.9  # Share of the differences that `MarginDifference.within` covers.
+    """Differences of the margins of grasps that both runs executed, without margins that they never
+    have in common.
+    """
+    covered_share = 0.9  # Share of the differences covered by `MarginDifference.within`.
     executed = both_executed(pairs.stage, second.texts["stage"])
     found = []
     for name in MEASURED_MARGINS:
@@ -239,7 +241,7 @@ def margin_differences(pairs: VerdictPairs, second: ResultTable) -> tuple[Margin
 
 
 def _agreement_by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup, ...]:
-    """Agreement by the confidence of the first run's verdicts, of those that have one."""
+    """Agreement by confidence of the first run's verdicts, if they have one."""
     known = np.isfinite(held.confidence)
     if not known.any():
         return ()
@@ -252,7 +254,7 @@ def _agreement_by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup
 
 
 def _count_stage_pairs(first: TextFactor, second: TextFactor) -> dict[str, dict[str, int]]:
-    """Grasps by stage and stage in the order of the stages; only what occurs."""
+    """Counts of grasps by the stages of both runs, in their order, without zeros."""
     counts, order = cross_tabulate(first, second), [stage.value for stage in Stage]
     return {
         row: {column: counts[row][column] for column in order if column in counts[row]}

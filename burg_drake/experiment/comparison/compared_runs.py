@@ -34,17 +34,16 @@ from burg_drake.experiment.trials.trial_sheet import TrialSheet
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One of the things compared.
+    """One side of a comparison.
 
     Attributes:
         kind: `run`, or `trials` on the robot.
         path: folder of the run, or the trials file.
-        label: for people, such as `hand, standard`; `reality`.
+        label: displayed name, such as `hand, standard`; `reality`.
         scenes: names of the scenes.
-        hashes: of the runs.
-        station, mode, engine: how it was judged; several are joined by commas.
-        judged_again: how many of the compared grasps another engine has judged again, by the name
-            of that engine.
+        hashes: hashes of the runs.
+        station, mode, engine: settings of the judge; several are joined by commas.
+        judged_again: number of compared grasps judged again by another engine, by engine.
     """
 
     kind: Literal["run", "trials"]
@@ -59,7 +58,7 @@ class Side:
 
     @property
     def engines(self) -> str:
-        """Whose verdicts they are, in words."""
+        """Names of the engines of the verdicts, as text."""
         parts = [f"engine {self.engine}"]
         for name, count in self.judged_again.items():
             parts.append(f"{count:,} grasp{'' if count == 1 else 's'} judged again by {name}")
@@ -68,7 +67,7 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class JudgedRuns:
-    """The runs in a folder.
+    """Runs in a folder.
 
     Attributes:
         found: a run of one scene or of many.
@@ -88,11 +87,11 @@ class JudgedRuns:
 
     @cached_property
     def scenes(self) -> dict[str, str]:
-        """Names of the scenes by content, as tables have it."""
+        """Names of the scenes by content hash, as in tables."""
         if isinstance(self.found, Run):
             scene = self.found.document.scene
             return {scene.content[:HASH_DIGITS]: scene.name}
-        return {e.content[:HASH_DIGITS]: e.name for e in self.found.document.mine}
+        return {e.content[:HASH_DIGITS]: e.name for e in self.found.document.assigned_scenes}
 
     @cached_property
     def folders(self) -> dict[str, str]:
@@ -102,7 +101,7 @@ class JudgedRuns:
         return {content: str(self.found.folder(name)) for content, name in self.scenes.items()}
 
     def runs_of(self, contents: Collection[str]) -> list[Run]:
-        """The runs of some scenes by their content, in full; only these are opened."""
+        """Opens the runs of some scenes; returns them by content of the scene."""
         if isinstance(self.found, Run):
             return [self.found]
         wanted = {content[:HASH_DIGITS] for content in contents}
@@ -120,15 +119,15 @@ class JudgedRuns:
         return ResultTable.of_columns(read_results(self.path, names), names)
 
     @property
-    def grasps_place(self) -> str:
-        """The folder that `evaluate` takes their grasps from, in words; of many scenes one each."""
+    def grasp_folders_text(self) -> str:
+        """Description of the folders from which `evaluate` takes the runs' grasps."""
         if isinstance(self.found, Run):
             return f"folder {self.path}"
         return f"of each scene folder {self.found.folder('SCENE')}"
 
     @property
     def side(self) -> Side:
-        """What it is, for people."""
+        """The side of the comparison with these runs."""
         document = self.found.document
         engine = engine_label(document.engine)
         return Side(
@@ -148,7 +147,7 @@ def add_rejudging_engines(side: Side, judged_again: TextFactor) -> Side:
 
     Args:
         side: a run.
-        judged_again: (N,) of the compared grasps; empty texts where none has.
+        judged_again: (N,) engines of the compared grasps; empty if not judged again.
     """
     counts = np.bincount(judged_again.index, minlength=len(judged_again.names)).tolist()
     named = zip(judged_again.names, counts, strict=True)
@@ -156,7 +155,7 @@ def add_rejudging_engines(side: Side, judged_again: TextFactor) -> Side:
 
 
 def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
-    """Real trials, for people."""
+    """The side of the comparison with real trials."""
     sources = sheet.runs.values()
     return Side(
         kind="trials",
@@ -171,7 +170,7 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
 
 
 def differing_settings(first: JudgedRuns, second: JudgedRuns) -> tuple[str, ...]:
-    """In what the runs of two folders differ, in words."""
+    """Descriptions of the differing settings of the runs in two folders."""
     sides = ("in the first", "in the second")
     return tuple(request_differences(first.found.document, second.found.document, sides))
 
@@ -191,7 +190,7 @@ def require_common_scene(first: JudgedRuns, second: JudgedRuns) -> None:
 
 
 def list_scene_names(scenes: Mapping[str, str]) -> str:
-    """Names of scenes by content, for messages; of many the first few."""
+    """Lists names of scenes for messages; of many only the first few."""
     max_names = 3
     names = [f"{name} ({content})" for content, name in scenes.items()]
     more = f" and {len(names) - max_names} more" if len(names) > max_names else ""
@@ -215,8 +214,8 @@ def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutco
     a collision on the approach that its trials leave out.
 
     Args:
-        mode: of the run.
-        approach: whether its trials approach.
+        mode: mode of the run.
+        approach: whether its trials include the approach.
     """
     if mode != "hand":
         return frozenset()
@@ -224,19 +223,19 @@ def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutco
     return frozenset(of_arm if approach else [*of_arm, RealOutcome.HAND_COLLISION_APPROACH])
 
 
-def unpredictable_for(judged: JudgedRuns) -> frozenset[RealOutcome]:
-    """Real outcomes that no verdict of some runs can predict."""
+def outcomes_unpredictable_for(judged: JudgedRuns) -> frozenset[RealOutcome]:
+    """Real outcomes that no verdict of these runs can predict."""
     document = judged.found.document
     settings = read_trial_settings(document.trial, str(judged.path))
     return unpredictable_outcomes(document.mode, approach=settings.approach)
 
 
 def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
-    """Refuses runs whose verdicts answer different questions, so that no engine is to blame where
-    they differ: other phases of a trial, other limits of what counts, another station.
+    """Refuses runs whose trials differ in phases, in limits of success or in the station, so that
+    differences are not due to the engine.
 
     Raises:
-        InvalidInputError: names all that differs, with both values.
+        InvalidInputError: names all differing settings with both values.
     """
     causes = []
     phases = differing_phases(first, second)
@@ -249,12 +248,12 @@ def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
     if causes:
         raise InvalidInputError(
             f"{first.path} and {second.path} were made {'; and '.join(causes)}; evaluate the grasps"
-            f" of one ({first.grasps_place}) again as those of the other"
+            f" of one ({first.grasp_folders_text}) again as those of the other"
         )
 
 
 def approach_note(first: JudgedRuns, second: JudgedRuns) -> str:
-    """A note if only one of the runs, of the whole arm, has approached; else empty."""
+    """A note if only one of the runs, that of the whole arm, approached; else empty."""
     approached = [_phase_settings(judged)["approach"] for judged in (first, second)]
     if approached[0] == approached[1]:
         return ""
@@ -281,13 +280,12 @@ def differing_phases(first: JudgedRuns, second: JudgedRuns) -> list[str]:
 
 
 def _phase_settings(judged: JudgedRuns) -> dict[str, Value]:
-    """All settings of a run's trials by name; those of the motion first, each as what it comes
-    to."""
+    """Resolved settings of a run's trials by name; those of the motion first."""
     from burg_drake.simulation import NO_GRIP_LIMITS
 
     settings = read_trial_settings(judged.found.document.trial, str(judged.path))
     motion = settings.motion
-    assert motion is not None  # what was not recorded is the default
+    assert motion is not None  # unrecorded settings have their defaults
     values: dict[str, Value] = {f.name: getattr(motion, f.name) for f in fields(motion)}
     values |= {f.name: getattr(settings, f.name) for f in fields(settings) if f.name != "motion"}
     values["lift_direction"] = tuple(motion.direction_W.tolist())
@@ -299,14 +297,14 @@ def _phase_settings(judged: JudgedRuns) -> dict[str, Value]:
 
 
 def _are_equal(one: Value, other: Value) -> bool:
-    """Whether values are the same, but for the rounding of a direction's length."""
+    """Whether values are equal up to rounding of normalized directions."""
     if isinstance(one, tuple) and isinstance(other, tuple):
         return all(math.isclose(a, b, abs_tol=1e-12) for a, b in zip(one, other, strict=True))
     return one == other
 
 
 def _value_text(name: str, value: Value) -> str:
-    """A value for people, to digits that tell any two apart."""
+    """Displayed value with enough digits to distinguish different values."""
     if value is None:
         return "none"
     if isinstance(value, bool):

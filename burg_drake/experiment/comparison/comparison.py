@@ -29,13 +29,13 @@ from burg_drake.experiment.trials.trial_sheet import Success
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
-    """Which grasps the figures are about.
+    """Numbers of compared and omitted grasps.
 
     Attributes:
         compared: grasps with a verdict and an outcome.
-        only_first, only_second: grasps, or trials, that the other side has not.
-        other_content: grasps that have only their id in common.
-        left_out: grasps of both sides that tell nothing, by reason.
+        only_first, only_second: grasps or trials of one side only.
+        other_content: grasps that share only their id.
+        left_out: uninformative grasps of both sides, by reason.
     """
 
     compared: int
@@ -52,10 +52,10 @@ class Comparison:
     Attributes:
         kind: `trials`, a run against the robot; `runs`, a run against another one; `simulators`,
             two runs against the same trials on the robot.
-        success: what counts as success.
+        success: criterion of success.
         first: the run whose verdicts are predictions.
         second: the other run of `simulators`.
-        reference: what happened: the trials, or the second run of `runs`.
+        reference: source of the outcomes: the trials, or the second run of `runs`.
         coverage: which grasps were compared.
         judgement: figures of the first run.
         other: figures of the second run of `simulators`.
@@ -63,8 +63,8 @@ class Comparison:
         difference_of_all: share of all grasps that the trials stand for about which the first is
             right, less that of the second; None if nothing says what they were chosen from.
         agreement: of the two `runs`, where neither is taken for the truth.
-        settings: in what two runs differ, in words.
-        notes: what people should know before they trust the figures.
+        settings: differing settings of two runs, in words.
+        notes: caveats about the figures.
         seed: of the intervals' resampling.
     """
 
@@ -89,7 +89,7 @@ def comparison_json(comparison: Comparison, more: Mapping[str, Any] | None = Non
     """A comparison as JSON; keys are the names of the dataclasses' fields.
 
     Args:
-        comparison: what is told.
+        comparison: the comparison.
         more: further keys.
     """
     return json.dumps(json_values(comparison) | dict(more or {}), indent=2, allow_nan=False) + "\n"
@@ -116,12 +116,12 @@ PERCENT_MEASURES = frozenset(
 
 
 def selection_suffix(comparison: Comparison) -> str:
-    """What titles add to say of which trials their figures are; nothing where all count alike."""
+    """Suffix of titles that names the trials behind the figures; empty if all count alike."""
     return "" if comparison.kind == "runs" else ", selected trials"
 
 
 def cell_name(comparison: Comparison, cell: str) -> str:
-    """What the grasps of a cell of the matrix have in common."""
+    """Displayed name of a cell of the confusion matrix."""
     if comparison.kind == "runs":
         return {
             "tp": "success in both runs",
@@ -138,7 +138,7 @@ def cell_name(comparison: Comparison, cell: str) -> str:
 
 
 def measure_name(comparison: Comparison, key: str) -> str:
-    """What a figure is called."""
+    """Displayed name of a measure."""
     names_of_runs = {
         "predicted": "success in the first run",
         "actual": "success in the second run",
@@ -150,12 +150,12 @@ def measure_name(comparison: Comparison, key: str) -> str:
 
 
 def success_description(comparison: Comparison) -> str:
-    """What margins are to tell of."""
+    """Description of the success that margins should predict."""
     return "success in the second run" if comparison.kind == "runs" else "actual success"
 
 
 def estimate_text(found: Estimate, *, percent: bool) -> str:
-    """The value of a figure."""
+    """Displayed value of an estimate."""
     if found.value is None:
         return MISSING_NUMBER
     return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
@@ -181,7 +181,7 @@ def brief_share_text(found: Estimate) -> str:
 
 
 def headline_sentence(comparison: Comparison) -> str:
-    """What was found, in one sentence."""
+    """The main result in one sentence."""
     c, found = comparison, headline_agreement(comparison.judgement)
     if have_identical_rows(c):
         return _identical_rows_sentence(c)
@@ -220,20 +220,22 @@ def headline_sentence(comparison: Comparison) -> str:
 
 
 def headline_agreement(judged: Judgement) -> Agreement:
-    """The figures that sentences are made of: of all grasps that the trials stand for, if known;
-    figures of the trials themselves depend on how many of which were chosen."""
+    """Figures for sentences: of all grasps that the trials represent, if known, as figures of the
+    trials themselves depend on the selection.
+    """
     return population_agreement(judged) or judged.selected
 
 
 def population_agreement(judged: Judgement) -> Agreement | None:
-    """Figures of all grasps that the trials stand for; None if that is not known, or if they stand
-    for themselves alone."""
+    """Figures of all grasps that the trials represent; None if unknown, or if each trial represents
+    itself only.
+    """
     found = judged.all_grasps
     return None if found is None or round(sum(found.cells)) <= found.trials else found
 
 
 def have_identical_rows(comparison: Comparison) -> bool:
-    """Whether two runs have the same rows, of which no figure of agreement says anything."""
+    """Whether two runs have identical rows, so that figures of agreement are meaningless."""
     found = comparison.agreement
     return found is not None and found.same_rows == comparison.coverage.compared
 
@@ -251,7 +253,9 @@ def _identical_rows_sentence(c: Comparison) -> str:
 
 
 def agreement_sentence(comparison: Comparison) -> str:
-    """How often two runs hold the same grasps, and which engine each is; nothing of others."""
+    """Sentence on how often two runs hold the same grasps, with their engines; empty for other
+    comparisons.
+    """
     c, found = comparison, comparison.agreement
     if found is None:
         return ""
@@ -265,8 +269,9 @@ def agreement_sentence(comparison: Comparison) -> str:
 
 
 def population_difference_sentence(comparison: Comparison) -> str:
-    """Which of two simulators is right about more of the grasps that the trials stand for; empty
-    where nothing says what they were chosen from."""
+    """Sentence on which of two simulators is right about more of the represented grasps; empty if
+    the strata are unknown.
+    """
     found = comparison.difference_of_all
     if found is None or found.value is None:
         return ""
@@ -278,8 +283,9 @@ def population_difference_sentence(comparison: Comparison) -> str:
 
 
 def bias_sentence(comparison: Comparison, judged: Judgement | None = None) -> str:
-    """Whether a simulator promises too much: of all grasps that the trials stand for, if that is
-    known, and then of the trials themselves as well, whose mix may turn it round."""
+    """Sentence on the bias of a simulator: on all represented grasps, if known, and on the trials,
+    whose selection may reverse it.
+    """
     judged = judged or comparison.judgement
     b = judged.bias
     if b.difference.value is None:
@@ -323,8 +329,9 @@ def _percentage_points_text(difference: float, of: str) -> str:
 
 
 def unpredictable_sentence(judged: Judgement) -> str:
-    """Failures that a run of the hand alone does not predict, and precision without them; empty if
-    there are none."""
+    """Sentence on failures that a run of the hand alone does not predict, and on precision without
+    them; empty if there are none.
+    """
     found = judged.unpredictable
     if found is None:
         return ""
@@ -341,8 +348,7 @@ def unpredictable_sentence(judged: Judgement) -> str:
 
 
 def too_few_trials_sentence(comparison: Comparison, judged: Judgement) -> str:
-    """Why nothing is said of how margins rank trials; empty where something is, or where there are
-    no margins."""
+    """Sentence on why margins are not assessed; empty if they are, or if there are none."""
     found = judged.calibration
     if not found or any(c.auroc.value is not None for c in found):
         return ""
@@ -356,12 +362,12 @@ def too_few_trials_sentence(comparison: Comparison, judged: Judgement) -> str:
 
 
 def outcome_counts_text(outcomes: Mapping[str, int]) -> str:
-    """Outcomes with how often they occur."""
+    """Text of outcomes with their counts."""
     return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
 
 
 def outlier_name(one: OutlierGroup) -> str:
-    """Name of an outlier group for people."""
+    """Displayed name of an outlier group."""
     return outcome_label(one.name) if one.kind == "verdict" else one.name
 
 
@@ -388,7 +394,7 @@ def no_outliers_sentence(judged: Judgement) -> str:
 
 
 def margin_title(name: str) -> tuple[str, str, float]:
-    """What a margin is called, its unit for people, and how many of them its column's unit is."""
+    """Displayed name of a margin, its displayed unit, and the factor from its column's unit."""
     if name == PROBABILITY_MARGIN:
         return "predicted probability", "", 1.0
     if name.endswith("_mm"):

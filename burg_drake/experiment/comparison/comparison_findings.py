@@ -71,8 +71,9 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
 
 
 def _agreement_tables(found: RunAgreement) -> Iterator[TextTable | str]:
-    """Agreement by object, disagreements by stage, and differences of margins; empty tables are
-    left out."""
+    """Tables of agreement by object, disagreements by stage, and differences of margins; without
+    empty tables.
+    """
     if len(found.objects) > 1:
         yield run_agreement_finding("object", found.objects).text_table()
     if found.apart:
@@ -88,7 +89,7 @@ def _agreement_tables(found: RunAgreement) -> Iterator[TextTable | str]:
 
 
 def _judgement_tables(c: Comparison, judged: Judgement, name: str) -> Iterator[TextTable | str]:
-    """Tables and sentences about one run, whose name titles end with."""
+    """Tables and sentences about one run, whose name is added to titles."""
     yield _matrix_table(c, judged, name)
     yield measure_finding(c, [("", judged)]).text_table(name)
     yield bias_sentence(c, judged)
@@ -126,7 +127,7 @@ def _matrix_table(comparison: Comparison, judged: Judgement, name: str) -> TextT
 
 
 def coverage_sentences(comparison: Comparison) -> str:
-    """Which grasps were compared and which were not."""
+    """Sentences about compared and omitted grasps."""
     v = comparison.coverage
     what = "grasps" if comparison.kind == "runs" else "trials"
     parts = [f"{v.compared:,} {what} compared"]
@@ -185,7 +186,7 @@ def _named_agreements(judged: Named) -> list[tuple[str, Agreement]]:
 
 
 def unpredictable_finding(judged: Judgement) -> FindingTable:
-    """Figures with and without failures that the hand alone does not predict, which there are."""
+    """Table of figures with and without failures that the hand alone does not predict."""
     measures = ("precision", "recall", "accuracy")
     assert judged.unpredictable is not None
     pairs = [("trials", judged.selected, judged.unpredictable.selected)]
@@ -269,7 +270,7 @@ def placement_finding(comparison: Comparison, judged: Judgement) -> FindingTable
 
 
 def _group_finding(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> FindingTable:
-    """Counts, and shares with their intervals, by what trials have in common."""
+    """Table of counts and shares with intervals by group of trials."""
     found = FindingTable(title=title, text=text, style="groups", max_rows=20, max_page_rows=60)
     found.names(head).numbers("trials", "TP", "FP", "FN", "TN")
     found.shares("right").shares("precision", "recall", interval=False)
@@ -384,7 +385,7 @@ def _stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
 
 
 def parted_finding(parted: Sequence[PartedGrasp]) -> FindingTable:
-    """The first grasps that only one run holds, with their outcomes in both; the JSON has all."""
+    """Table of the first grasps that only one run holds, with both outcomes; the JSON has all."""
     max_rows = 10  # Grasps in a terminal.
     more = len(parted) - max_rows
     found = FindingTable(
@@ -414,7 +415,7 @@ def parted_finding(parted: Sequence[PartedGrasp]) -> FindingTable:
 
 
 def _margin_bin_table(margins: Sequence[MarginCalibration]) -> TextTable:
-    """Share of alike grasps along the first run's margins."""
+    """Table of the share of alike grasps by bins of the first run's margins."""
     table = TextTable("Agreement on holding, along the margins of the first run").texts("margin")
     table.numbers("grasps").texts("from", "alike in each bin [%]", "to")
     for c in margins:
@@ -433,7 +434,7 @@ def _margin_bin_table(margins: Sequence[MarginCalibration]) -> TextTable:
 
 
 def margin_difference_finding(differences: Sequence[MarginDifference]) -> FindingTable:
-    """How far apart margins are where both executed."""
+    """Table of margin differences of grasps that both runs executed."""
     found = FindingTable(
         title="Margins of grasps that both runs executed: second run minus first",
         page_title="How much margins differ",

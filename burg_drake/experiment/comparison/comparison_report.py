@@ -68,9 +68,9 @@ def comparison_page(
     """The page as HTML.
 
     Args:
-        comparison: what it shows.
-        path: where the page will be, so that its links to photos hold there.
-        line: the command that makes it again; left out if empty.
+        comparison: the comparison.
+        path: path of the page, to which links to photos are relative.
+        line: command that repeats the comparison; left out if empty.
         more: further sections.
     """
     c = comparison
@@ -155,7 +155,7 @@ def _further_sentences(c: Comparison) -> list[str]:
 
 
 def _keep_percent_signs(text: str) -> str:
-    """Keeps per cent signs with their numbers."""
+    """Joins per cent signs to their numbers by no-break spaces."""
     return text.replace(" %", "\u00a0%")
 
 
@@ -203,14 +203,14 @@ def _judge_sections(c: Comparison, judged: Judgement, photos: Path | None) -> li
 
 
 def _name_simulator(part: Html | None, name: str) -> Html | None:
-    """Says in a section's title which simulator it is about."""
+    """Adds the simulator's name to a section's title."""
     if part is None or not name:
         return part
     return Html(part.replace("</h2>", f" ({name} simulator)</h2>", 1))
 
 
 def _settings_section(c: Comparison) -> Html:
-    """What was compared, what was left out, in what runs differ."""
+    """Section on compared and omitted grasps, and on differing settings of the runs."""
     facts: list[tuple[str, str]] = []
     sides = [("predictions", c.first), ("second simulation", c.second), ("truth", c.reference)]
     if c.kind == "runs":
@@ -243,7 +243,7 @@ def _describe_side(side: Side) -> str:
 
 
 def _photo_folder(c: Comparison, path: Path) -> Path | None:
-    """Folder of the trials file from that of the page."""
+    """Folder of the trials file relative to the page's."""
     if c.reference.kind != "trials":
         return None
     folder = Path(c.reference.path).absolute().parent
@@ -251,14 +251,14 @@ def _photo_folder(c: Comparison, path: Path) -> Path | None:
 
 
 def _case_section(comparison: Comparison, judged: Judgement, photos: Path | None) -> Html | None:
-    """The wrong verdicts with the way to look at them; nothing where there are none.
+    """Section of the wrong verdicts with the commands that show them; None if there are none.
 
     Args:
         comparison: the comparison.
-        judged: what it says of one judge.
-        photos: folder of the trials file from that of the page; None without trials.
+        judged: assessment of one judge.
+        photos: folder of the trials file relative to the page's; None without trials.
     """
-    max_rows = 50  # Wrong verdicts in the table.
+    max_rows = 50  # Maximum number of wrong verdicts in the table.
     if not judged.disagreements:
         return None
     tables: list[Html] = []
@@ -324,7 +324,7 @@ def _note_and_photo(case: Disagreement, photos: Path | None) -> str:
 
 
 def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
-    """Simulated outcomes by what happened."""
+    """Section of simulated by actual outcomes."""
     happened = sorted({name for row in judged.outcomes.values() for name in row})
     rows = [
         (outcome_label(simulated), [row.get(name, "·") for name in happened])
@@ -342,7 +342,7 @@ def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
 
 
 def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Html | None]:
-    """All that is known of two runs beside each other."""
+    """Sections on the agreement of two runs."""
     title, text = "Agreement on holding", agreement_sentence(comparison)
     parts: list[Html | None] = [
         run_agreement_finding("object", found.objects, title, text).section(),
@@ -360,7 +360,9 @@ def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Htm
 
 
 def _stage_section(found: RunAgreement) -> Html:
-    """All grasps by stage and stage, with those that only one run holds in brackets."""
+    """Section of all grasps by the stages of both runs, with those that only one run holds in
+    brackets.
+    """
     columns = deciding_stages(found.stages)
 
     def cell(stage: str, other: str) -> Child:
@@ -395,8 +397,8 @@ def _plots(found: Sequence[MarginCalibration], vertical: str) -> Html:
 
 
 def _margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
-    """What margins say about success, the most informative first; None where there are none."""
-    max_plots = 4  # Margins with a plot.
+    """Section on margins and success, most informative first; None without margins."""
+    max_plots = 4  # Maximum number of margins with a plot.
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_distance_from_chance, reverse=True)
     if found:
@@ -408,14 +410,14 @@ def _margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
 
 
 def _distance_from_chance(found: MarginCalibration) -> float:
-    """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
+    """Distance of the AUROC's interval from chance, which selects the margins to plot."""
     area = found.auroc_weighted or found.auroc
     low, high = area.low, area.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
 
 
 def _placement_section(comparison: Comparison, judged: Judgement) -> Html | None:
-    """Agreement by placement; None without real trials."""
+    """Section of agreement by placement; None without real trials."""
     found, p = placement_finding(comparison, judged), judged.placement
     if found is None or p is None:
         return None
@@ -424,7 +426,7 @@ def _placement_section(comparison: Comparison, judged: Judgement) -> Html | None
 
 
 def _matrix_section(comparison: Comparison, judged: Named) -> Html:
-    """Confusion matrices of the trials, and of all grasps that they stand for."""
+    """Section with confusion matrices of the trials, and of all grasps that they represent."""
     runs = comparison.kind == "runs"
     title = "Verdicts of both runs" if runs else "Verdicts and outcomes"
     blocks = []

@@ -82,9 +82,9 @@ class Measure:
     """A measure of agreement.
 
     Attributes:
-        name: in words.
-        part, whole: cells whose sums it is the ratio of; empty if it is no share.
-        of: its values from cells, arrays of one shape; NaN or infinite where undefined.
+        name: displayed name.
+        part, whole: cells whose sums are numerator and denominator; empty if it is no share.
+        of: computes values from cells, arrays of one shape; NaN or infinite if undefined.
         low, high: its range.
         reason: why it may be undefined.
     """
@@ -128,7 +128,7 @@ def _matthews(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
 
 
 def _kappa(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
-    # 1 less the share of disagreement by that of two independent judges with the same habits
+    # 1 minus the ratio of disagreement to that of independent judges with the same rates
     chance = (tp + fp) * (fp + tn) + (fn + tn) * (tp + fn)
     return 1.0 - (tp + fp + fn + tn) * (fp + fn) / chance
 
@@ -157,19 +157,19 @@ AGREEMENT_MEASURES: Final[Mapping[str, Measure]] = {
 
 RESAMPLING_DRAWS = 4000  # Resampled confusion matrices.
 CELL_PRIOR = 0.5
-"""Trials added to each cell, over all strata."""
+"""Prior number of trials in each cell, over all strata."""
 
 
 def draw_cells(
     counts: Values, population: Array, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
 ) -> Array:
-    """Confusion matrices that may stand behind the one that was seen.
+    """Draws confusion matrices from the posterior distribution given the observed one.
 
     Args:
         counts: (S, 4) trials by stratum and cell.
-        population: (S,) what each stratum stands for; strata without trials are left out.
-        rng: of the draws.
-        draws: how many.
+        population: (S,) population of each stratum; strata without trials are left out.
+        rng: random generator.
+        draws: number of draws.
 
     Returns:
         (draws, 4) cells of all strata together, in units of `population`.
@@ -185,18 +185,18 @@ def draw_cells(
 
 
 def distribute_prior(counts: Array, population: Array) -> Array:
-    """Half a trial for each cell, shared among the strata with such verdicts by what those stand
-    for, or among all where no stratum has such verdicts.
+    """Prior of half a trial for each cell, divided by population among the strata with such
+    verdicts, or among all strata if none has such verdicts.
 
     Args:
         counts: (S, 4) trials by stratum and cell, at least one in each stratum.
-        population: (S,) what each stratum stands for.
+        population: (S,) population of each stratum.
 
     Returns:
         (S, 4) the columns sum to `CELL_PRIOR`.
     """
     shares = np.empty_like(counts)
-    for cells in ((0, 1), (2, 3)):  # success predicted, and not
+    for cells in ((0, 1), (2, 3)):  # success predicted, failure predicted
         of = counts[:, cells].sum(axis=1) / counts.sum(axis=1) * population
         if not of.any():
             of = population
@@ -207,12 +207,12 @@ def distribute_prior(counts: Array, population: Array) -> Array:
 def draw_unstratified_cells(
     counts: Values, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
 ) -> Array:
-    """As `draw_cells` for many matrices that have nothing to do with each other.
+    """As `draw_cells` for many independent matrices.
 
     Args:
         counts: (G, 4) trials by matrix and cell.
-        rng: of the draws.
-        draws: how many of each.
+        rng: random generator.
+        draws: number of draws of each matrix.
 
     Returns:
         (draws, G, 4) proportions.
@@ -223,8 +223,8 @@ def draw_unstratified_cells(
 
 
 def interval_bounds(values: Array) -> tuple[Array, Array]:
-    """95 % of the values along the first axis; what is not finite, as where all outcomes of a draw
-    are alike, counts as 0.
+    """95 % interval of the values along the first axis; values that are not finite, as when all
+    outcomes of a draw are alike, count as 0.
 
     Args:
         values: (draws, ...).
@@ -241,7 +241,7 @@ def interval_bounds(values: Array) -> tuple[Array, Array]:
 
 
 def _interpolate_sorted(ordered: Array, place: float) -> Array:
-    """What sorted values (..., draws) are at a place between two of them."""
+    """Interpolates sorted values (..., draws) at a fractional index."""
     below = min(int(place), ordered.shape[-1] - 2) if ordered.shape[-1] > 1 else 0
     one, other = ordered[..., below], ordered[..., min(below + 1, ordered.shape[-1] - 1)]
     return one + (other - one) * (place - below)
@@ -264,7 +264,7 @@ class Agreement:
         matthews: correlation of predicted and actual success.
         kappa: agreement beyond chance.
         predicted, actual: shares of successes.
-        excess: the first less the second: above 0 where too much is predicted.
+        excess: predicted minus actual; above 0 if too much success is predicted.
     """
 
     trials: int
@@ -326,9 +326,8 @@ def estimate_agreement(
 
     Args:
         counts: (4,) trials by cell, or (S, 4) by the stratum that they were chosen from.
-        population: (S,) what each stratum stands for. The figures then hold for all that could
-            have been chosen; shares, too, have intervals by resampling within strata. None: for
-            the trials themselves.
+        population: (S,) population of each stratum. The figures then hold for the whole population,
+            and all intervals are by resampling within strata. None: for the trials themselves.
         seed: of the resampling.
     """
     counts = np.atleast_2d(np.asarray(counts))
@@ -357,8 +356,8 @@ def estimate_agreements(counts: Values, *, seed: int = 0) -> list[Agreement]:
         seed: of the resampling.
     """
     max_matrices = 500_000  # Matrices drawn at once, which bounds the memory.
-    min_draws = 400  # For each group, however many groups there are.
-    chunk_size = 64  # Groups measured at once; reused memory is faster.
+    min_draws = 400  # Minimum number for each group.
+    chunk_size = 64  # Groups processed at once; reused memory is faster.
     if not len(counts):
         return []
     draws = int(np.clip(max_matrices // len(counts), min_draws, RESAMPLING_DRAWS))
@@ -381,7 +380,7 @@ def estimate_agreements(counts: Values, *, seed: int = 0) -> list[Agreement]:
 
 
 def _compute_measures(cells: Values) -> Array:
-    """(..., M) from (..., 4); what is undefined is not finite."""
+    """Measures (..., M) from cells (..., 4); undefined ones are not finite."""
     parts = [cells[..., k].astype(float) for k in range(4)]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.stack([measure.of(*parts) for measure in AGREEMENT_MEASURES.values()], axis=-1)
@@ -412,8 +411,7 @@ def _make_agreement(
 
 
 def _excess_from_actual(excess: Estimate, actual: Estimate, cells: Sequence[float]) -> Estimate:
-    """The difference of predicted and actual success, which follows from actual success where all
-    verdicts are alike: nothing succeeds more often than always."""
+    """The excess estimate, which follows from the actual success rate if all verdicts are alike."""
     tp, fp, fn, tn = cells
     if excess.value is None or actual.low is None or actual.high is None or (tp + fp and fn + tn):
         return excess
@@ -423,14 +421,13 @@ def _excess_from_actual(excess: Estimate, actual: Estimate, cells: Sequence[floa
 
 @dataclass(frozen=True, kw_only=True)
 class Paired:
-    """Two answers, yes or no, about each of some trials.
+    """Two yes-or-no answers about each trial.
 
     Attributes:
         trials: number of trials.
-        both, only_first, only_second, neither: trials by who said yes.
-        difference: share of yes of the first less that of the second.
-        p_value: two-sided, exact: how often answers that are the same in truth would differ at
-            least so unevenly; None without trials.
+        both, only_first, only_second, neither: number of trials by which answers are yes.
+        difference: share of yes of the first minus the second.
+        p_value: two-sided exact p-value of equal shares; None without trials.
     """
 
     trials: int

@@ -1,4 +1,4 @@
-"""Tables of findings, each made once for a terminal and for a page, and plots of margins."""
+"""Tables of findings for both terminal and page, and plots of margins."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Figure:
     """A cell with an estimate.
 
     Attributes:
-        estimate: the number with its interval.
-        percent: whether it is shown in per cent.
+        estimate: the value with its interval.
+        percent: whether to show it in per cent.
     """
 
     estimate: Estimate
@@ -33,7 +33,7 @@ class Figure:
 
     @property
     def texts(self) -> tuple[str, str]:
-        """Number and interval."""
+        """Texts of value and interval."""
         found, percent = self.estimate, self.percent
         interval = bracketed_interval(found, percent=percent) or MISSING_NUMBER
         return estimate_text(found, percent=percent), interval
@@ -45,8 +45,9 @@ Cell = str | float | Figure | Html | tuple[str, Html]
 
 @dataclass(frozen=True)
 class _Column:
-    """A column; `kind` is the method that adds it, `interval` whether a terminal shows that of an
-    estimate."""
+    """A column; `kind` is the method that adds it, `interval` whether a terminal shows intervals of
+    estimates.
+    """
 
     head: str
     kind: Literal["name", "text", "number", "figure", "share", "element"]
@@ -55,8 +56,8 @@ class _Column:
 
 @dataclass(eq=False, kw_only=True)
 class FindingTable:
-    """A table that is filled row by row, with its titles and explanations. The first column says
-    what a row is about.
+    """A table that is filled row by row, with titles and explanations. The first column names the
+    subject of each row.
 
     Attributes:
         title: in a terminal.
@@ -95,7 +96,7 @@ class FindingTable:
         return self._add(_Column(head, "figure", interval) for head in heads)
 
     def shares(self, *heads: str, interval: bool = True) -> FindingTable:
-        """Adds columns of estimates that a page draws."""
+        """Adds columns of estimates that a page shows as charts."""
         return self._add(_Column(head, "share", interval) for head in heads)
 
     def elements(self, *heads: str) -> FindingTable:
@@ -110,7 +111,7 @@ class FindingTable:
         """The table for a terminal.
 
         Args:
-            name: what the title ends with.
+            name: suffix of the title.
         """
         found = TextTable(f"{self.title}{name}", caption=self.caption)
         for column in self._columns:
@@ -160,7 +161,7 @@ class FindingTable:
 
     def _page_cells(self, row: Sequence[Cell]) -> Iterator[Html]:
         for k, (column, cell) in enumerate(zip(self._columns, row, strict=True)):
-            label = column.head  # stands before the cell on a narrow page
+            label = column.head  # shown before the cell on a narrow page
             if isinstance(cell, Figure) and column.kind == "figure":
                 yield figure_cell(cell)
             elif isinstance(cell, (Figure, tuple)):
@@ -183,13 +184,13 @@ def named_row(name: Child, *cells: Html) -> Html:
 def cross_table(
     head: str, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[Child]]], style: str = ""
 ) -> Html:
-    """A table of a page with counts by two things; `head` is what rows are about."""
+    """A table of a page with counts by row and column; `head` is the heading of the row names."""
     lines = [named_row(name, *number_cells(cells)) for name, cells in rows]
     return table([head, *columns], lines, numbers=range(1, len(columns) + 1), style=style)
 
 
 def figure_cell(figure: Figure) -> Html:
-    """A figure and its interval, below each other where there is little room."""
+    """A figure and its interval, one below the other in little space."""
     found = figure.estimate
     if found.value is None:
         return element("td", found.reason, class_="number faint why")
@@ -199,7 +200,7 @@ def figure_cell(figure: Figure) -> Html:
 
 
 def share_with_interval(found: Estimate) -> Child:
-    """A share as a dot with its interval, and in figures."""
+    """A share as a dot with its interval, and as text."""
     if found.value is None or found.low is None or found.high is None:
         return element("span", found.reason, class_="faint")
     return join(interval_mark(found.value, found.low, found.high), f" {100 * found.value:.0f} %")
@@ -211,12 +212,12 @@ PLOT_TOP, PLOT_BOTTOM = 24, 172  # y of the shares 1 and 0
 
 
 def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
-    """Share over a number: a dot with its interval for each bin, the isotonic fit as a line, and
-    the share of all together dashed.
+    """Reliability plot: a dot with its interval for each bin, the isotonic fit as a line, and the
+    overall share dashed.
 
     Args:
-        found: bins and fit; shares of what the trials stand for, if that is known.
-        vertical: what the share is of.
+        found: bins and fit; weighted shares are drawn if known.
+        vertical: label of the share.
     """
     title, unit, size = margin_title(found.name)
     ends = [size * found.bins[0].low, size * found.bins[-1].high]
@@ -284,7 +285,7 @@ def _mean_line(share: float | None) -> Html | None:
 
 
 def _isotonic_line(found: MarginCalibration, x: Callable[[float], float]) -> Html | None:
-    """The isotonic fit, which jumps half way between its steps."""
+    """Line of the isotonic fit, which jumps half way between its steps."""
     points, steps = [], found.isotonic
     for k, step in enumerate(steps):
         start = (steps[k - 1].high + step.low) / 2 if k else step.low

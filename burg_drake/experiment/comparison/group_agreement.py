@@ -2,7 +2,7 @@
 
 Trials of a group are compared with other trials of the same prediction: predicted successes that
 failed with other predicted successes, predicted failures that succeeded with other predicted
-failures. So the number of trials chosen of either kind has no influence. `benchmarks/compare.py`
+failures. So the numbers of chosen trials of each kind have no influence. `benchmarks/compare.py`
 measures false alarms and power.
 """
 
@@ -30,11 +30,11 @@ from burg_drake.experiment.comparison.verdict_pairs import VerdictPairs
 
 @dataclass(frozen=True, kw_only=True)
 class FactorGroup:
-    """Trials that have something in common, such as their object.
+    """Trials of a group, such as those on the same object.
 
     Attributes:
-        name: what that is.
-        agreement: figures.
+        name: name of the group.
+        agreement: figures of the group.
     """
 
     name: str
@@ -43,12 +43,12 @@ class FactorGroup:
 
 @dataclass(frozen=True, kw_only=True)
 class Stopped:
-    """Grasps with the same verdict, and what became of them.
+    """Outcomes of grasps with the same verdict.
 
     Attributes:
         stage, outcome, blocker: the verdict; the blocker is the body in the way, if any.
-        trials: how many.
-        successes: share that succeeded.
+        trials: number of trials.
+        successes: share of successes.
     """
 
     stage: str
@@ -65,12 +65,13 @@ def agreement_by_factor(
     *,
     seed: int = 0,
 ) -> tuple[FactorGroup, ...]:
-    """Agreement for each text of a column that occurs.
+    """Agreement for each value of a text column.
 
     Args:
         pairs: the trials.
         factor: (N,) the column.
-        names: what its texts are called, in the order of the groups; as they are if None.
+        names: displayed names of its values, in the order of the groups; the values themselves if
+            None.
         seed: of the intervals' resampling.
     """
     counts = count_cells_by_group(pairs.predicted, pairs.actual, factor.index, len(factor.names))
@@ -87,8 +88,7 @@ def agreement_by_factor(
 
 
 def outcomes_by_verdict(pairs: VerdictPairs) -> tuple[Stopped, ...]:
-    """What became of the grasps by verdict, the most frequent ones of a stage first; success is
-    among the verdicts."""
+    """Outcomes of the grasps by verdict (including success), by stage, most frequent first."""
     stage_order = [stage.value for stage in Stage]
     stages, outcomes, blockers = pairs.stage, pairs.simulated, pairs.blocker
     width = (len(outcomes.names), len(blockers.names))
@@ -133,9 +133,9 @@ class OutlierGroup:
         kind: what the trials have in common.
         name: the object, simulated outcome, or body in the way.
         predicted: whether their success was predicted.
-        wrong, trials: how many of these trials ended otherwise, and how many there are.
-        other_wrong, other_trials: the same of all other trials with this prediction.
-        ended: the wrong ones by how they ended, the most frequent first.
+        wrong, trials: number of wrong verdicts and of trials in the group.
+        other_wrong, other_trials: the same for all other trials with this prediction.
+        ended: counts of the wrong ones by actual outcome, most frequent first.
         p_value: one-sided mid-p of Fisher's exact test.
         corrected: the same by Holm's method, for all tested groups.
     """
@@ -207,8 +207,9 @@ def _count_errors(wrong: Flags, rows: Flags, others: Flags) -> tuple[int, int, i
 
 
 def _can_be_outlier(wrong: int, trials: int, other_wrong: int, other_trials: int) -> bool:
-    """Whether a group would stand out, uncorrected, if all wrong verdicts were its own as far as it
-    has room; that depends on the totals alone, so that others need not be corrected for."""
+    """Whether a group could be significant, uncorrected, if it had as many of all wrong verdicts as
+    possible. This depends on totals alone, so groups that could not need no correction.
+    """
     total = wrong + other_wrong
     most = min(total, trials)
     return excess_p_value(most, trials, total - most, other_trials) < OUTLIER_SIGNIFICANCE_LEVEL
@@ -217,12 +218,12 @@ def _can_be_outlier(wrong: int, trials: int, other_wrong: int, other_trials: int
 def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: int) -> float:
     """One-sided p-value of Fisher's exact test that a group errs no more often than the others.
 
-    It is the mid-p (H. O. Lancaster, JASA 56, 1961): half the probability of what was seen counts,
-    as the exact one finds less than it may where counts are small.
+    It is the mid-p (H. O. Lancaster, JASA 56, 1961), which counts half the probability of the
+    observed table, as the exact test is conservative for small counts.
 
     Args:
-        errors, trials: of the group.
-        other_errors, other_trials: of all others.
+        errors, trials: counts of the group.
+        other_errors, other_trials: counts of all others.
     """
     total = errors + other_errors
     ways = [
@@ -233,9 +234,10 @@ def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: in
 
 
 def holm_correction(p_values: Sequence[float]) -> list[float]:
-    """P-values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979):
-    with those below a level taken for real, the probability of any false one is at most that level,
-    as far as it is for each p-value alone."""
+    """P-values corrected for multiple tests (S. Holm, Scandinavian Journal of Statistics 6, 1979):
+    the probability of any false positive below a level is at most that level, provided that this
+    holds for each single p-value.
+    """
     order = np.argsort(p_values, kind="stable")
     factors = np.arange(len(p_values), 0, -1)
     corrected = np.empty(len(p_values))

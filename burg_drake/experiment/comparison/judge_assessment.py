@@ -42,16 +42,16 @@ from burg_drake.experiment.trials.trial_sheet import RealTrial
 
 @dataclass(frozen=True, kw_only=True)
 class Disagreement:
-    """A grasp whose verdict was wrong.
+    """A grasp with a wrong verdict.
 
     Attributes:
         kind: `fp` if success was predicted, `fn` if failure was.
-        scene, object, grasp: which grasp on what.
+        scene, object, grasp: names of scene and object, and id of the grasp.
         simulated, stage, blocker: the verdict.
-        ended: what happened.
+        ended: actual outcome.
         replays: commands that show the trials in simulation.
         trial: number of the real trial; None if there is none.
-        note, photo: of the real trial; the photo as the sheet names it.
+        note, photo: note and photo of the real trial; the photo as the sheet names it.
         offset_mm: largest offset of any object [mm]; None where unknown.
     """
 
@@ -77,16 +77,17 @@ def list_wrong_verdicts(
     trials: Sequence[RealTrial] = (),
     offset_mm: Array | None = None,
 ) -> tuple[Disagreement, ...]:
-    """Lists what was predicted wrongly, false successes first.
+    """Lists grasps with wrong verdicts, false successes first.
 
     Args:
         pairs: N grasps.
         scenes: names of the scenes by their content.
-        folders: of the runs by content of the scene; one mapping for each run to be replayed.
-        trials: (N,) the real trials, if that is what happened.
+        folders: folders of the runs by content of the scene; one mapping for each run to be
+            replayed.
+        trials: (N,) the real trials, if the outcomes are real.
         offset_mm: (N,) largest offset of any object in them; NaN where unknown.
     """
-    max_cases = 200  # Of each kind; the confusion matrix counts all.
+    max_cases = 200  # Maximum number of each kind; the confusion matrix counts all.
     found = []
     for kind, wrong in (
         ("fp", pairs.predicted & ~pairs.actual),
@@ -122,9 +123,9 @@ def replay_commands(
     """Commands that show a grasp in each run that has its scene.
 
     Args:
-        folders: of the runs by content of the scene; one mapping for each run.
-        scene: its content.
-        grasp: its id.
+        folders: folders of the runs by content of the scene; one mapping for each run.
+        scene: content of the scene.
+        grasp: id of the grasp.
     """
     return tuple(
         shlex.join(["burg-drake", "replay", known[scene], "--grasp", grasp])
@@ -138,13 +139,13 @@ PLACEMENT_LIMIT_MM = 2.0  # Placement error up to which an object stands where i
 
 @dataclass(frozen=True, kw_only=True)
 class PlacementAgreement:
-    """Agreement by how far the objects were from their targets before a trial.
+    """Agreement by placement error of the objects before a trial.
 
     Attributes:
-        limit_mm: how far off every object may be to stand where it should [mm].
-        within: trials in which every object did.
-        beyond: trials in which one was measured farther off.
-        unmeasured: trials in which one of the scene was not measured, and none farther off.
+        limit_mm: placement error up to which an object stands where it should [mm].
+        within: trials with all errors within the limit.
+        beyond: trials with an error beyond the limit.
+        unmeasured: other trials in which an object was not measured.
         largest: share of right verdicts over the largest offset of any object [mm].
         target: the same over the offset of the target [mm].
     """
@@ -165,14 +166,14 @@ def placement_agreement(
     limit_mm: float = PLACEMENT_LIMIT_MM,
     seed: int = 0,
 ) -> PlacementAgreement:
-    """Compares trials by their placement.
+    """Compares trials by placement error.
 
     Args:
         pairs: N trials.
-        largest: (N,) largest offset of any object [mm]; NaN where one is not measured, and none is
-            known to be beyond the limit.
-        target: (N,) offset of the target [mm]; NaN where it is not measured.
-        limit_mm: how far off every object may be [mm].
+        largest: (N,) largest offset of any object [mm]; NaN if an object was not measured and no
+            other is beyond the limit.
+        target: (N,) offset of the target [mm]; NaN if it was not measured.
+        limit_mm: see `PlacementAgreement`.
         seed: of the intervals' resampling.
     """
     group = np.where(np.isnan(largest), 2, (largest > limit_mm).astype(int))
@@ -217,7 +218,9 @@ def placement_errors_mm(
 
 
 def _largest_error(trial: RealTrial, instances: Collection[str], limit_mm: float) -> float:
-    """Largest offset; NaN if an object was not measured, unless another one is beyond the limit."""
+    """Largest offset [mm]; NaN if an object was not measured, unless another one is beyond the
+    limit.
+    """
     measured = _measured_errors(trial)
     most = max(measured.values(), default=math.nan)
     return most if set(instances) <= set(measured) or most > limit_mm else math.nan
@@ -234,11 +237,11 @@ def _measured_errors(trial: RealTrial) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class Strata:
-    """What trials were chosen from.
+    """Strata from which trials were chosen.
 
     Attributes:
         index: (N,) stratum of each trial.
-        population: (S,) grasps that there were to choose from.
+        population: (S,) number of grasps in each stratum.
     """
 
     index: NDArray[np.intp]
@@ -246,24 +249,24 @@ class Strata:
 
     @property
     def weight(self) -> Array:
-        """(N,) grasps that each trial stands for."""
+        """(N,) number of grasps that each trial represents."""
         size = np.bincount(self.index, minlength=len(self.population))
         return (self.population / np.maximum(size, 1))[self.index]
 
     def select_trials(self, rows: Flags) -> Strata:
-        """The strata of some of the trials, each of which stands for as many grasps as before."""
+        """The strata of selected trials, which keep their weights."""
         every = np.bincount(self.index, minlength=len(self.population))
         kept = np.bincount(self.index[rows], minlength=len(self.population))
         return Strata(self.index[rows], self.population * kept / np.maximum(every, 1))
 
     def agreement(self, first: Flags, second: Flags, *, seed: int = 0) -> Agreement:
-        """Figures of all grasps, from two answers, (N,), about each trial."""
+        """Figures of all grasps from two answers (N,) about each trial."""
         counts = count_cells_by_group(first, second, self.index, len(self.population))
         return estimate_agreement(counts, population=self.population, seed=seed)
 
     @property
     def missing(self) -> int:
-        """Grasps that no trial stands for."""
+        """Number of grasps that no trial represents."""
         size = np.bincount(self.index, minlength=len(self.population))
         return int(self.population[size == 0].sum())
 
@@ -273,7 +276,7 @@ class Unpredictable:
     """Failures that a run of the hand alone does not predict, and figures without them.
 
     Attributes:
-        outcomes: these trials by how they ended, the most frequent first.
+        outcomes: counts of these trials by outcome, most frequent first.
         predicted_successes: number of these trials that were predicted to succeed.
         selected, all_grasps: figures of the other trials, and of the grasps that they stand for;
             see `Judgement`.
@@ -287,24 +290,24 @@ class Unpredictable:
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
-    """What a comparison says of one judge.
+    """Assessment of one judge.
 
     Attributes:
         selected: figures of the trials themselves.
-        all_grasps: figures of all grasps that they were chosen from, each trial standing for so
-            many; None if nothing says what they were chosen from.
-        not_represented: grasps that could have been chosen and that no trial stands for.
+        all_grasps: figures of all grasps that the trials were chosen from, by weighted trials; None
+            if the strata are unknown.
+        not_represented: number of grasps in strata without trials.
         unpredictable: failures that a run of the hand alone does not predict; all other figures
             count them as failures. None if there are none, and in other modes.
         bias: predicted against actual success of the trials themselves; `all_grasps.excess` says
-            whether it promises too much or too little where trials stand for others.
+            whether it is biased on all grasps.
         standing_out: objects and causes whose verdicts are wrong more often than those of others,
-            without what is unpredictable. Of real trials alone.
+            without unpredictable failures. Of real trials alone.
         tested_groups: number of groups tested for that.
-        objects, scenes, stages: figures by object, by scene, and by the stage that decided.
-        stopped: what became of the grasps by verdict and body in the way.
-        outcomes: trials by verdict and what happened.
-        calibration: what the margins tell about success.
+        objects, scenes, stages: figures by object, by scene, and by deciding stage.
+        stopped: outcomes of the grasps by verdict and blocker.
+        outcomes: counts of trials by verdict and outcome.
+        calibration: relation of the margins to success.
         placement: agreement by placement error; None without real trials.
         disagreements: the wrong verdicts.
     """
@@ -340,12 +343,12 @@ def assess_judge(
     """Calculates all figures of a judgement.
 
     Args:
-        pairs: verdicts and what happened.
+        pairs: verdicts and outcomes.
         scenes: names of the scenes by their content.
-        strata: what the trials were chosen from; None if that is not known.
-        placement, disagreements: what was found of them.
+        strata: strata of the trials; None if unknown.
+        placement, disagreements: results for the judgement.
         unpredictable: outcomes that no verdict can predict.
-        real: whether what happened are trials on the robot.
+        real: whether the outcomes are real trials.
         seed: of the intervals' resampling.
     """
     weight = None if strata is None else strata.weight
@@ -377,7 +380,7 @@ def assess_judge(
 def _estimate_agreements(
     pairs: VerdictPairs, strata: Strata | None, seed: int
 ) -> tuple[Agreement, Agreement | None]:
-    """Figures of the trials, and of all grasps that they stand for."""
+    """Figures of the trials, and of all grasps that they represent."""
     if strata is None:
         return estimate_agreement(count_cells(pairs.predicted, pairs.actual)[None], seed=seed), None
     counts = count_cells_by_group(
@@ -390,7 +393,7 @@ def _estimate_agreements(
 def _without_unpredictable(
     pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int
 ) -> Unpredictable:
-    """The trials that are `apart`, and the figures without them."""
+    """Counts of the unpredictable trials (`apart`), and the figures without them."""
     kept = None if strata is None else strata.select_trials(~apart)
     selected, represented = _estimate_agreements(pairs.take(~apart), kept, seed)
     return Unpredictable(

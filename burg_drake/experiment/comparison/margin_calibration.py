@@ -25,19 +25,21 @@ from burg_drake.experiment.comparison.confusion_matrix import (
 )
 
 MAX_ORDERED_ROWS = 20_000
-"""Neighbouring trials share rows above it; this changes the ROC area by 2 / rows at most."""
+"""Maximum number of rows; above it, neighbouring trials share rows, which changes the ROC area by
+at most 2 / rows.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class OrderedTrials:
-    """Trials by increasing number; those with equal numbers are one row.
+    """Trials sorted by value; trials with equal values share a row.
 
     Attributes:
-        value: (G,) smallest number of each row, increasing.
-        last: (G,) its largest number, which is the same unless there are too many rows.
-        count, good: (G,) trials, and those that ended well.
-        weight, good_weight: (G,) sums of what they stand for.
-        squares, good_squares: (G,) sums of the squares of that.
+        value: (G,) smallest value of each row, increasing.
+        last: (G,) its largest value, which is the same unless there were too many rows.
+        count, good: (G,) number of trials and of successes.
+        weight, good_weight: (G,) sums of the weights of both.
+        squares, good_squares: (G,) sums of the squared weights of both.
     """
 
     value: Array
@@ -54,9 +56,9 @@ class OrderedTrials:
         """Sorts trials.
 
         Args:
-            values: (N,) finite numbers.
-            good: (N,) truth values.
-            weight: (N,) what each stands for; 1 if None.
+            values: (N,) finite values.
+            good: (N,) whether each is a success.
+            weight: (N,) weight of each; 1 if None.
         """
         if weight is None:
             ordered, best = np.sort(values), np.sort(values[good])
@@ -79,7 +81,8 @@ class OrderedTrials:
 
     def parts(self, number: int) -> Rows:
         """Index of the first row of each of `number` parts with about equally many trials; fewer
-        where ties leave fewer, as equal numbers are never parted."""
+        parts with many ties, as equal values are never separated.
+        """
         if not len(self.value):
             return np.zeros(0, dtype=np.intp)
         middle = np.cumsum(self.count) - self.count / 2
@@ -88,7 +91,7 @@ class OrderedTrials:
 
 
 def _row_starts(ordered: Array) -> Rows:
-    """Where rows begin among sorted numbers."""
+    """Start indices of the rows among sorted values."""
     first = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(ordered)])
     if len(first) <= MAX_ORDERED_ROWS:
         return first
@@ -103,16 +106,16 @@ MIN_TRIALS_PER_OUTCOME = 5
 
 
 def estimate_auroc(trials: OrderedTrials, *, weighted: bool = False) -> Estimate:
-    """Probability that a trial which ended well has a larger number than one that did not; ties
-    count half (the statistic of Mann and Whitney).
+    """Probability that a success has a larger value than a failure; ties count half (Mann-Whitney
+    statistic).
 
-    The interval is DeLong's on the scale of log odds. Where the two kinds are told apart without
-    error there is no spread to measure; it is then Wilson's for as many trials as there are of the
-    rarer kind. Undefined with fewer than `MIN_TRIALS_PER_OUTCOME` of either kind.
+    The interval is DeLong's on the log-odds scale. With perfect separation the variance is zero,
+    and it is Wilson's for the number of trials of the rarer kind. Undefined with fewer than
+    `MIN_TRIALS_PER_OUTCOME` of either kind.
 
     Args:
-        trials: sorted by the number.
-        weighted: for what the trials stand for, not for the trials.
+        trials: sorted trials.
+        weighted: use the weights of the trials.
     """
     # Reason of an undefined estimate.
     too_few = f"fewer than {MIN_TRIALS_PER_OUTCOME} successes or failures"
@@ -128,7 +131,7 @@ def estimate_auroc(trials: OrderedTrials, *, weighted: bool = False) -> Estimate
         up2, down2 = trials.good_squares, trials.squares - trials.good_squares
     else:
         up, down, up2, down2 = good, bad, good, bad
-    below = (np.cumsum(down) - down / 2) / down.sum()  # share of the bad that a good one beats
+    below = (np.cumsum(down) - down / 2) / down.sum()  # share of failures below a success
     above = 1.0 - (np.cumsum(up) - up / 2) / up.sum()
     area = float(up @ below / up.sum())
     variance = _placement_variance(up, up2, below, good) + _placement_variance(
@@ -144,8 +147,8 @@ def estimate_auroc(trials: OrderedTrials, *, weighted: bool = False) -> Estimate
 
 
 def _placement_variance(weight: Array, squares: Array, placed: Array, count: Array) -> float:
-    """Variance of the mean of the placements of one kind of trials."""
-    # Of the placements of trials by an uninformative number; two are added.
+    """Variance of the mean placement of one kind of trials."""
+    # Variance of the placements by an uninformative value; two such trials are added.
     uninformative_variance = 1 / 12
     number, total = count.sum(), weight.sum()
     mean = weight @ placed / total
@@ -166,19 +169,19 @@ PREDICTOR_COLUMNS: Final = (
     *("clearance", "slip", "tilt", "pad_force", "patch_area", "lift", "others_moved"),
     *("arm_clearance", "tracking_distance", "pushed", "score"),
 )
-"""Margins and score: columns that may predict success."""
+"""Columns that may predict success: margins and score."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bin:
-    """Trials with similar numbers.
+    """Trials with similar values.
 
     Attributes:
-        low, high, mean: of the number, in the units of its column.
+        low, high, mean: bounds and mean of the values, in the units of their column.
         trials, successes: counts.
-        share: of successes.
-        weighted: the same for what the trials stand for, its interval by the effective number of
-            trials; None without weights.
+        share: share of successes.
+        weighted: weighted share, with its interval by the effective number of trials; None without
+            weights.
     """
 
     low: float
@@ -201,19 +204,20 @@ class IsotonicStep:
 
 @dataclass(frozen=True, kw_only=True)
 class MarginCalibration:
-    """What a number tells about success.
+    """Relation of a margin to success.
 
     Attributes:
-        name: of the margin; `probability`.
-        smaller_is_better: whether success should come with small numbers.
-        trials, successes: with a number.
-        share: of successes among them.
-        weighted: the same for what the trials stand for; None without weights.
-        without: trials that have none, as where the simulation stopped before it is measured.
-        bins: by increasing number, about equally many trials in each.
-        auroc: probability that a success has the better number of a success and a failure.
-        auroc_weighted: the same for what the trials stand for; None without weights.
-        isotonic: the best monotone fit of the share of successes, weighted if there are weights.
+        name: name of the margin; `probability`.
+        smaller_is_better: whether small values should mean success.
+        trials, successes: counts of trials with a value.
+        share: their share of successes.
+        weighted: weighted share; None without weights.
+        without: number of trials without a value, such as when the simulation ended before the
+            measurement.
+        bins: bins by increasing value, with about equally many trials.
+        auroc: probability that a success has a better value than a failure.
+        auroc_weighted: weighted AUROC; None without weights.
+        isotonic: best monotone fit of the share of successes, weighted if there are weights.
     """
 
     name: str
@@ -235,11 +239,11 @@ def calibrate_margins(
     """Calibration of each margin that differs between trials.
 
     Args:
-        margins: (N,) values by name; NaN where there is none.
+        margins: (N,) values by name; NaN if unknown.
         success: (N,) truth values.
-        weight: (N,) what each trial stands for.
+        weight: (N,) weight of each trial.
     """
-    with ThreadPoolExecutor() as pool:  # sorting takes most of the time, and leaves Python alone
+    with ThreadPoolExecutor() as pool:  # sorting takes most of the time and releases the GIL
         found = list(
             pool.map(lambda name: calibrate_margin(name, margins[name], success, weight), margins)
         )
@@ -254,14 +258,14 @@ def calibrate_margin(
     *,
     smaller_is_better: bool | None = None,
 ) -> MarginCalibration:
-    """What a number tells about success.
+    """Relation of a margin to success.
 
     Args:
-        name: of the number.
-        values: (N,) NaN where there is none; infinite ones are left out, too.
+        name: name of the margin.
+        values: (N,) values; trials with NaN or infinity are left out.
         success: (N,) truth values.
-        weight: (N,) what each trial stands for.
-        smaller_is_better: as is known of margins if None.
+        weight: (N,) weight of each trial.
+        smaller_is_better: direction; that of the known margin if None.
     """
     falling = (
         name in MarginNames.smaller_is_better if smaller_is_better is None else smaller_is_better
@@ -287,8 +291,8 @@ def calibrate_margin(
 
 
 def _make_bins(trials: OrderedTrials, sign: float, weighted: bool) -> list[Bin]:
-    max_bins = 10  # Bins of a calibration.
-    trials_per_bin = 10  # At least, where there are enough trials.
+    max_bins = 10  # Maximum number of bins.
+    trials_per_bin = 10  # Minimum per bin, if there are enough trials.
     total = trials.count.sum()
     first = trials.parts(int(np.clip(total // trials_per_bin, 1, max_bins)))
     bins = []
@@ -311,8 +315,9 @@ def _make_bins(trials: OrderedTrials, sign: float, weighted: bool) -> list[Bin]:
 
 
 def _population_share(trials: OrderedTrials, part: slice) -> Estimate:
-    """Share of successes of what trials stand for; Wilson's interval for the effective number of
-    trials (L. Kish, Survey Sampling, 1965)."""
+    """Weighted share of successes, with Wilson's interval for the effective number of trials (L.
+    Kish, Survey Sampling, 1965).
+    """
     weight, squares = trials.weight[part].sum(), trials.squares[part].sum()
     if not weight:
         return Estimate.undefined("no trials")
@@ -321,7 +326,7 @@ def _population_share(trials: OrderedTrials, part: slice) -> Estimate:
 
 
 def _fit_isotonic(trials: OrderedTrials, sign: float) -> list[IsotonicStep]:
-    max_rows = 2000  # Rows of the isotonic fit; neighbours are combined to get there.
+    max_rows = 2000  # Maximum number of rows of the isotonic fit; neighbours are combined.
     from scipy.optimize import isotonic_regression
 
     if not len(trials.value):
@@ -341,5 +346,5 @@ def _fit_isotonic(trials: OrderedTrials, sign: float) -> list[IsotonicStep]:
 
 
 def _sort_rising(rows: list[T], falling: bool) -> tuple[T, ...]:
-    """Rows by increasing number."""
+    """Sorts rows by increasing value."""
     return tuple(reversed(rows)) if falling else tuple(rows)

@@ -1,4 +1,4 @@
-"""Tables of results with texts as integer codes, and the grasps that two tables have in common."""
+"""Tables of results with texts as integer codes, and matching of grasps between two tables."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ _BYTE_MASKS = np.array([(1 << 8 * k) - 1 for k in range(9)], dtype=np.uint64)
 
 
 def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
-    """A number for each text that is the same for the same text, whatever the column's width, and
-    in all likelihood another one for another text."""
+    """A hash of each text, independent of the column's width."""
     texts = np.ascontiguousarray(texts, dtype=np.str_)
     keys = np.zeros(len(texts), dtype=np.uint64)
     if not texts.dtype.itemsize or not len(texts):
@@ -37,13 +36,15 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
 
 
 def stored_keys(column: Any) -> NDArray[np.uint64]:
-    """As `text_keys`, of an Arrow column of texts without nulls; none of them becomes an object."""
+    """As `text_keys`, for an Arrow column of texts without nulls, without conversion to Python
+    objects.
+    """
     found = [np.zeros(0, dtype=np.uint64), *(_chunk_keys(chunk) for chunk in column.chunks)]
     return np.concatenate(found)
 
 
 def _chunk_keys(chunk: Any) -> NDArray[np.uint64]:
-    """Sums of words of eight bytes, each times a number of its own."""
+    """Sums of the texts' eight-byte words, each multiplied by its own factor."""
     _, places, data = chunk.buffers()
     keys = np.zeros(len(chunk), dtype=np.uint64)
     if not len(chunk) or data is None:
@@ -65,11 +66,11 @@ def _chunk_keys(chunk: Any) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, eq=False)
 class IdColumn:
-    """A column of N texts that all differ; they become objects when they are asked for.
+    """A column of N different texts, which become Python objects on access only.
 
     Attributes:
-        column: array of texts, or an Arrow column of them.
-        rows: (N,) places in it; None for all of it.
+        column: array or Arrow column of texts.
+        rows: (N,) indices into the column; None for all of it.
     """
 
     column: Any
@@ -90,8 +91,9 @@ class IdColumn:
         return keys if self.rows is None else keys[self.rows]
 
     def same(self, other: IdColumn) -> bool:
-        """Whether both columns have the same texts in the same order; they may be found to differ
-        only because they are not kept alike."""
+        """Whether both columns are known to have the same texts in the same order; False also if
+        they are stored differently.
+        """
         if self.rows is not None or other.rows is not None:
             return False
         arrays = [isinstance(column, np.ndarray) for column in (self.column, other.column)]
@@ -100,18 +102,18 @@ class IdColumn:
         return not any(arrays) and bool(self.column.equals(other.column))
 
     def take(self, rows: Values) -> IdColumn:
-        """The column of some rows, as indices or truth values."""
+        """The column with the selected rows, given as indices or a mask."""
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         return IdColumn(self.column, rows if self.rows is None else self.rows[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class TextFactor:
-    """A column of N texts that has few different ones.
+    """A column of N texts with few different values.
 
     Attributes:
         names: the different texts, in alphabetical order.
-        index: (N,) which of them each row has.
+        index: (N,) index into the names for each row.
     """
 
     names: tuple[str, ...]
@@ -133,7 +135,7 @@ class TextFactor:
 
     @classmethod
     def of_codes(cls, codes: Rows, names: Sequence[str]) -> TextFactor:
-        """From (N,) numbers and the texts that they stand for; -1 stands for an empty one."""
+        """Builds a column from (N,) codes and the names of the codes; -1 is the empty text."""
         empty = codes < 0
         if not empty.any():
             return cls._sorted(np.array(names, dtype=np.str_), codes)
@@ -148,7 +150,7 @@ class TextFactor:
         return cls(tuple(names[order].tolist()), rank[index] if len(index) else index)
 
     def take(self, rows: Values) -> TextFactor:
-        """The column of some rows."""
+        """The column with the selected rows."""
         return TextFactor(self.names, self.index[rows])
 
     def same(self, other: TextFactor) -> bool:
@@ -164,12 +166,12 @@ class TextFactor:
         return dict(Counter(self.names[k] for k in self.index[rows].tolist()).most_common())
 
     def where(self, wanted: list[bool]) -> Flags:
-        """(N,) truth values from one for each name."""
+        """(N,) mask from a truth value for each name."""
         return np.array(wanted, dtype=bool)[self.index]
 
 
 class StoredNumbers(dict[str, Values]):
-    """Columns of numbers in the columnar store, each read when it is first asked for."""
+    """Columns of numbers in the columnar store, each read on first access."""
 
     def __init__(self, rows: StoredRows) -> None:
         super().__init__()
@@ -180,7 +182,7 @@ class StoredNumbers(dict[str, Values]):
         return self[name]
 
     def same(self, other: StoredNumbers, name: str) -> bool:
-        """Whether a column of both is the same, without reading it."""
+        """Whether a column is known to be the same in both, without reading it."""
         return bool(self._rows.table.column(name).equals(other._rows.table.column(name)))
 
 
@@ -189,7 +191,7 @@ class ResultTable:
     """N rows of results.
 
     Attributes:
-        id: (N,) of the grasps.
+        id: (N,) ids of the grasps.
         texts: other columns of texts by name.
         numbers: (N,) columns of numbers by name.
     """
@@ -213,7 +215,7 @@ class ResultTable:
 
     @classmethod
     def of_rows(cls, rows: StoredRows, names: Sequence[str]) -> ResultTable:
-        """From the columnar store, which has texts as numbers already."""
+        """Builds a table from the columnar store, which has texts as codes already."""
         others = [name for name in names if name != "id"]
         return cls(
             IdColumn(rows.table.column("id")),
@@ -231,8 +233,9 @@ class ResultTable:
         )
 
     def take(self, rows: Rows, numbers: Sequence[str]) -> ResultTable:
-        """Some rows with some columns of numbers; the table itself if they are all of it, in
-        order."""
+        """The selected rows and columns of numbers; the table itself if these are all rows in
+        order.
+        """
         if len(rows) == len(self) and np.array_equal(rows, np.arange(len(self))):
             return self
         return ResultTable(
@@ -244,17 +247,17 @@ class ResultTable:
 
 GRASP_KEY_COLUMNS: tuple[str, ...] = ("scene_content", "id")  # Columns that identify a grasp.
 GRASP_CONTENT_COLUMNS: tuple[str, ...] = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
-"""Columns of pose and width; with its instance they define a grasp."""
+"""Columns of pose and width, which define a grasp together with its instance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Rows of two tables that are about the same grasp.
+    """Rows of the same grasps in two tables.
 
     Attributes:
         first, second: (N,) rows.
-        other_content: grasps that only have their id in common.
-        only_first, only_second: grasps of one table alone.
+        other_content: number of grasps that share only their id.
+        only_first, only_second: number of grasps in one table alone.
     """
 
     first: Rows
@@ -265,7 +268,7 @@ class Match:
 
 
 def match_rows(first: ResultTable, second: ResultTable) -> Match:
-    """Finds the grasps that two tables have in common; of equal rows the first one counts."""
+    """Finds the grasps that two tables have in common; of duplicate rows the first one counts."""
     tolerance = 1e-9  # Metres, or 1 for quaternions: tables may have been stored as text.
     scenes, other_scenes = first.texts["scene_content"], second.texts["scene_content"]
     if first.id.same(second.id) and scenes.same(other_scenes):
@@ -286,6 +289,6 @@ def match_rows(first: ResultTable, second: ResultTable) -> Match:
 
 
 def _row_keys(table: ResultTable) -> Values:
-    scene_factor = np.uint64(0x9E3779B97F4A7C15)  # Separates the keys of scenes.
+    scene_factor = np.uint64(0x9E3779B97F4A7C15)  # Makes keys of different scenes differ.
     scenes = table.texts["scene_content"]
     return table.id.keys + (text_keys(np.array(scenes.names)) * scene_factor)[scenes.index]

@@ -20,10 +20,10 @@ from burg_drake.experiment.comparison.compared_runs import (
     add_rejudging_engines,
     approach_note,
     differing_settings,
+    outcomes_unpredictable_for,
     require_common_scene,
     require_same_phases,
     side_of_trials,
-    unpredictable_for,
 )
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.confusion_matrix import Flags, compare_paired
@@ -59,7 +59,7 @@ from burg_drake.experiment.trials.trial_sheet import (
 )
 
 SUCCESS_CRITERIA: tuple[Success, ...] = ("lifted", "held")
-"""Criteria by which a trial counts as a success."""
+"""Criteria of success."""
 
 
 def compare(
@@ -81,16 +81,16 @@ def compare(
 
     Args:
         first: run whose verdicts are taken as predictions, or its folder.
-        second: a trials file, or a run of the same grasps, which then counts as what happened.
+        second: a trials file, or a run of the same grasps, which then serves as reference.
         trials: a trials file; both runs are then compared with it, and with each other.
-        success: what counts as success; if None what the trials were planned with, or `lifted`.
-        placement_limit_mm: how far off every object may be in trials with good placement [mm].
+        success: criterion of success; if None that of the trials' plan, or `lifted`.
+        placement_limit_mm: maximum offset of every object in trials with good placement [mm].
         robustness: table of robustness whose shares of success are a predicted probability;
             `robustness.csv` in the folder of the first run if None and it is there.
         seed: of the intervals' resampling.
 
     Raises:
-        InvalidInputError: they have nothing in common that can be compared.
+        InvalidInputError: there are no common grasps to compare.
         DocumentError: the trials file does not fit its schema.
     """
     if success is not None and success not in SUCCESS_CRITERIA:
@@ -115,7 +115,7 @@ def compare(
 
 
 def is_trials_file(path: Run | Campaign | str | Path) -> bool:
-    """Whether it is a trials file rather than a run, going by its name."""
+    """Whether a path is a trials file rather than a run, by its name."""
     return isinstance(path, (str, Path)) and Path(path).suffix in (".yaml", ".yml")
 
 
@@ -184,7 +184,9 @@ def compare_trials(
 
 
 def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
-    """Trials that a run has no verdict on, by reason; those that both have none on count once."""
+    """Counts of trials without a verdict of a run, by reason; trials without a verdict of either
+    run count once.
+    """
     left_out: Counter[str] = Counter()
     for k in sorted(set[int]().union(*by_side)):
         reasons = [missing.get(k) for missing in by_side]
@@ -199,7 +201,7 @@ def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
 def _select_informative(
     sheet: TrialSheet, tables: Sequence[Columns], indices: Sequence[int]
 ) -> tuple[list[int], Counter[str]]:
-    """Trials that tell something of their grasp, and why the others do not."""
+    """Selects informative trials; also returns the reasons against the others."""
     left_out: Counter[str] = Counter()
     silent: dict[int, str] = {}
     for columns in tables:
@@ -247,7 +249,7 @@ def _assess_run(
         scenes=side.scenes,
         strata=selection_strata(sheet, trials),
         placement=placement,
-        unpredictable=unpredictable_for(side),
+        unpredictable=outcomes_unpredictable_for(side),
         real=True,
         disagreements=list_wrong_verdicts(
             pairs, side.scenes, [side.folders], trials, offsets_mm[0]
@@ -257,7 +259,7 @@ def _assess_run(
 
 
 def selection_strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
-    """What the trials were chosen from; None if one of them was not chosen from anything."""
+    """Strata of the trials; None if a trial has no stratum."""
     keys = {key: k for k, key in enumerate(sheet.strata)}
     if not keys or any(trial.stratum not in keys for trial in trials):
         return None
@@ -272,7 +274,7 @@ def _comparison_notes(
     tables: Sequence[Columns],
     judged: Judgement,
 ) -> tuple[str, ...]:
-    """What people should know before they trust the figures."""
+    """Caveats about the figures."""
     notes = []
     hashes = {source.hash for source in sheet.runs.values()}
     for side, columns in zip(sides, tables, strict=True):
@@ -319,13 +321,13 @@ def compare_runs(
 ) -> Comparison:
     """Compares the verdicts of two runs; see `compare`.
 
-    Of runs in different modes only grasps count that both executed: what else they say answers
+    Of runs in different modes only grasps count that both executed, as their other verdicts answer
     different questions.
     """
     sides = JudgedRuns.load(first), JudgedRuns.load(second)
     require_common_scene(*sides)
     require_same_phases(*sides)
-    with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
+    with ThreadPoolExecutor() as pool:  # reading and unpacking release the GIL
         one, other = pool.map(JudgedRuns.table, sides, (PREDICTION_COLUMNS, REFERENCE_COLUMNS))
     tables = one, other
     found = match_rows(one, other)
@@ -373,8 +375,9 @@ def pair_runs(
     success: Success,
     same_mode: bool = True,
 ) -> tuple[VerdictPairs, ResultTable, dict[str, int]]:
-    """Pairs of verdicts of the grasps in common, their rows of the second run, and what is left out
-    by reason: of different modes all that not both executed."""
+    """Pairs of verdicts of the common grasps, their rows of the second run, and counts of omitted
+    grasps by reason. In different modes, grasps that not both executed are omitted.
+    """
     numbers = (*MEASURED_MARGINS, "confidence")
     second = tables[1].take(found.second, numbers)
     ended = second.texts["outcome"]
@@ -404,7 +407,7 @@ def pair_runs(
 
 
 def _no_common_grasps_message(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:
-    paths, place = f"{sides[0].path} and {sides[1].path}", sides[0].grasps_place
+    paths, place = f"{sides[0].path} and {sides[1].path}", sides[0].grasp_folders_text
     if found.other_content:
         return (
             f"{paths} have {found.other_content} grasps with the same ids, but none with the same"

@@ -1,4 +1,4 @@
-"""Pairs of a verdict and an outcome for each grasp, the input of all figures of a comparison."""
+"""Pairs of a verdict and an outcome for each grasp, the input of all comparison figures."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from burg_drake.experiment.trials.source_runs import grasp_contents
 from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet, is_success
 
 PREDICTION_NUMBERS = (*PREDICTOR_COLUMNS, "confidence")
-"""Columns of numbers of the run that predicts."""
+"""Numeric columns of the predicting run."""
 PREDICTION_COLUMNS = (
     *(*GRASP_KEY_COLUMNS, *GRASP_CONTENT_COLUMNS, "object", "outcome", "stage", "blocker"),
     *("run", "judged_again", *PREDICTION_NUMBERS),
 )
-"""Columns of the run that predicts."""
+"""Columns of the predicting run."""
 MEASURED_MARGINS = tuple(name for name in PREDICTOR_COLUMNS if name != "score")
-"""Margins that trials measure; a score belongs to the grasp."""
+"""Margins measured in trials, without the score, which belongs to the grasp."""
 REFERENCE_COLUMNS = (
     *(*GRASP_KEY_COLUMNS, *GRASP_CONTENT_COLUMNS, "outcome", "stage", "judged_again"),
     *("confidence", *MEASURED_MARGINS),
 )
-"""Columns of the run whose verdicts count as the truth."""
+"""Columns of the reference run, whose verdicts count as the truth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +53,15 @@ class VerdictPairs:
     """N grasps with a verdict and an outcome each.
 
     Attributes:
-        id: (N,) of the grasps.
+        id: (N,) ids of the grasps.
         run: (N,) hashes of the runs of the verdicts.
-        scene, object: of each grasp.
+        scene, object: scene and object of each grasp.
         simulated, stage, blocker: the verdict.
-        judged_again: engine that gave the verdict; empty where it is the run's own.
-        confidence: (N,) of the verdicts; NaN where there is none.
-        ended: what happened: outcome of a trial, or verdict of the other run.
-        predicted, actual: (N,) whether that is success.
-        margins: (N,) numbers of the verdicts by name.
+        judged_again: engine of the verdict; empty for the run's own engine.
+        confidence: (N,) confidences of the verdicts; NaN if there is none.
+        ended: actual outcome: of a trial, or of the other run.
+        predicted, actual: (N,) whether verdict and outcome are success.
+        margins: (N,) margins of the verdicts by name.
     """
 
     id: IdColumn
@@ -82,11 +82,11 @@ class VerdictPairs:
         return len(self.predicted)
 
     def with_margin(self, name: str, values: Array) -> VerdictPairs:
-        """With one more number of each verdict, (N,)."""
+        """A copy with another margin, (N,)."""
         return replace(self, margins={**self.margins, name: values})
 
     def take(self, rows: Values) -> VerdictPairs:
-        """Some rows, as indices or truth values."""
+        """The selected rows, given as indices or a mask."""
         margins = {name: values[rows] for name, values in self.margins.items()}
         columns = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "margins"}
         for name, column in columns.items():
@@ -102,9 +102,9 @@ def make_pairs(
 
     Args:
         verdicts: columns `PREDICTION_COLUMNS`, N rows.
-        ended: what happened in each row.
-        actual: (N,) whether that is success.
-        success: what counts as success.
+        ended: actual outcome of each row.
+        actual: (N,) whether the outcome is success.
+        success: criterion of success.
     """
     texts = verdicts.texts
     return VerdictPairs(
@@ -125,12 +125,12 @@ def make_pairs(
 
 
 def is_success_verdict(simulated: TextFactor, success: Success) -> Flags:
-    """(N,) whether verdicts are success."""
+    """(N,) whether verdicts count as success."""
     return simulated.where([is_success(Outcome(name), success) for name in simulated.names])
 
 
 def rows_without_prediction(simulated: TextFactor) -> dict[str, Flags]:
-    """Which rows have a verdict that predicts nothing, by the verdict."""
+    """Rows whose verdicts predict nothing, by verdict."""
     return {
         outcome.value: simulated.where([name == outcome.value for name in simulated.names])
         for outcome in (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
@@ -141,18 +141,18 @@ def rows_without_prediction(simulated: TextFactor) -> dict[str, Flags]:
 def predicted_probability(
     judged: JudgedRuns, pairs: VerdictPairs, table: str | Path | None = None
 ) -> Array | None:
-    """Share of the perturbed repeats that were lifted.
+    """Share of lifted perturbed repeats.
 
     Args:
         judged: the run of the grasps.
-        pairs: N verdicts of it.
-        table: of robustness; those in the folders of its runs if None.
+        pairs: N verdicts of the run.
+        table: table of robustness; those in the folders of its runs if None.
 
     Returns:
-        (N,) NaN where a grasp was not tested; None without a table.
+        (N,) probabilities, NaN for untested grasps; None without a table.
 
     Raises:
-        InvalidInputError: a table cannot be read, or is of another run.
+        InvalidInputError: a table cannot be read, or belongs to another run.
     """
     found = judged.found
     known: dict[tuple[str, str], float] = {}
@@ -172,7 +172,7 @@ def predicted_probability(
 
 
 def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
-    """Tables, with the runs that they may be of."""
+    """Tables, with the runs that they may belong to."""
     folders = {found.document.hash: found.path}
     if isinstance(found, Campaign):
         folders = {state.run: found.folder(n) for n, state in found.states.items() if state.run}
@@ -184,19 +184,19 @@ def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[st
 
 @dataclass(frozen=True, eq=False)
 class _TriedTable:
-    """A run with the content of the grasps that were tried, by id."""
+    """A run with the content of its tried grasps by id."""
 
     run: Run
     contents: dict[str, str]
 
     @cached_property
     def rows(self) -> dict[str, int]:
-        """Rows of its results by grasp."""
+        """Indices of its result rows by grasp."""
         return {id: row for row, id in enumerate(self.run.results["id"].tolist())}
 
 
 def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns, dict[int, str]]:
-    """Rows of the results about the grasps that were tried.
+    """Result rows of the tried grasps.
 
     Args:
         sheet: contents of the trials file.
@@ -205,10 +205,10 @@ def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns
 
     Returns:
         Columns `PREDICTION_COLUMNS` for the trials that have a row, with their index in the sheet
-        as `trial`; and why others have none, by their index.
+        as `trial`; and reasons why other trials have none, by index.
 
     Raises:
-        InvalidInputError: none has one, or a grasp is not the one that was planned with.
+        InvalidInputError: no trial has a row, or a grasp differs from the planned one.
     """
     tables: dict[str, list[_TriedTable]] = {}
     tried = {trial.grasp for trial in sheet.trials}
@@ -236,7 +236,7 @@ def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns
 
 
 def _reject_changed_grasp(trial: RealTrial, own: Sequence[_TriedTable], path: Path) -> None:
-    """Refuses a trial whose own run has another grasp by its id, or none."""
+    """Refuses a trial whose own run has a different grasp with its id, or none."""
     for table in own:
         content = table.contents.get(trial.grasp)
         if content and content != trial.content:

@@ -1,11 +1,11 @@
 """Scenes with objects away from their planned poses, by random errors or as measured.
 
-The robot moves to the planned grasp, so X_WG stays. An object that stands elsewhere is grasped at
-X_O'G = inv(X_WO') X_WO X_OG.
+The robot moves to the planned grasp, so X_WG stays. A displaced object is grasped at X_O'G =
+inv(X_WO') X_WO X_OG.
 
-Random errors of placement follow from the seed, the object's name and the number of the scene.
-Errors that make objects overlap or leave the board are drawn again. Measured poses are corrected
-where measuring errors make objects float, sink or overlap a little.
+Random placement errors follow from the seed, the object's name and the number of the scene. Errors
+that make objects overlap or leave the board are redrawn. Measured poses are corrected where
+measuring errors make objects float, sink or overlap a little.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from burg_drake.scene import TOUCH_TOLERANCE, Scene, SceneIssue, save_scene
 
 
 def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
-    """The scene with some of its free objects elsewhere.
+    """A scene with some free objects displaced.
 
     Args:
         scene: as planned.
-        X_SO: (4, 4) poses in the scene frame by name of an instance. One that is the planned pose,
-            bit for bit, changes nothing, so that a scene in which all are has the same content.
+        X_SO: (4, 4) poses in the scene frame by name of an instance. A pose that equals the planned
+            one bit for bit changes nothing, so the scene keeps its content if all do.
     """
     instances = tuple(
         replace(instance, X_SO=Pose.from_matrix(X_SO[name], quaternion=True))
@@ -56,7 +56,7 @@ def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
 
 
 def save_displaced_scene(scene: Scene, path: Path) -> None:
-    """Writes a scene as a file of its own, with its library as seen from there.
+    """Writes a scene to its own file, with the path of its library relative to the file.
 
     Raises:
         InvalidInputError: it cannot be written.
@@ -67,14 +67,14 @@ def save_displaced_scene(scene: Scene, path: Path) -> None:
 
 
 def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) -> Array:
-    """(N, 4, 4) or (4, 4) grasps in the frame of their object where it stands now, for hands that
-    go where they were told to when it stood as planned.
+    """(N, 4, 4) or (4, 4) grasps in the frame of the displaced object, for a hand that moves to the
+    planned poses.
 
     Args:
-        planned, now: the same scene, with objects in two places.
+        planned, now: the scene as planned and as displaced.
         instance: the target.
-        X_OG: (N, 4, 4) or (4, 4) grasps as planned; of an object that stands there, they are
-            returned as they are, to the last bit.
+        X_OG: (N, 4, 4) or (4, 4) grasps as planned; returned unchanged if the object is not
+            displaced.
     """
     there, here = planned.X_SO(instance), now.X_SO(instance)
     if np.array_equal(there, here):
@@ -86,7 +86,7 @@ def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) 
 
 
 def candidates_as_commanded(planned: Scene, now: Scene, candidates: Candidates) -> Candidates:
-    """All grasps of a run as `grasps_as_commanded`; they keep their ids."""
+    """Applies `grasps_as_commanded` to all grasps of a run; ids stay the same."""
     X_OG = candidates.grasps.X_OG.copy()
     for name in np.unique(candidates.instance).tolist():
         of = candidates.instance == name
@@ -95,12 +95,12 @@ def candidates_as_commanded(planned: Scene, now: Scene, candidates: Candidates) 
 
 
 MAX_PLACEMENT_DRAWS = 200
-"""Draws of one object; then it stays where it was planned."""
+"""Maximum number of draws for one object; then it stays as planned."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlacementNoise:
-    """How far objects are from where they should be.
+    """Random errors of object placement.
 
     Attributes:
         place: standard deviation along x and along y of the scene frame [m].
@@ -134,12 +134,12 @@ class PlacementNoise:
 
 @dataclass(frozen=True, eq=False)
 class NoisyScene:
-    """One scene of displaced objects.
+    """A scene with randomly displaced objects.
 
     Attributes:
         scene: the scene.
-        draws: how often each object was drawn again.
-        kept: objects that stay as planned, because all `MAX_PLACEMENT_DRAWS` draws were refused.
+        draws: number of redraws of each object.
+        kept: objects that stay as planned, because all `MAX_PLACEMENT_DRAWS` draws were rejected.
     """
 
     scene: Scene
@@ -148,7 +148,7 @@ class NoisyScene:
 
     @property
     def redrawn(self) -> int:
-        """Number of draws that were refused."""
+        """Number of rejected draws."""
         return sum(self.draws.values())
 
 
@@ -162,14 +162,13 @@ def noisy_scene(
 
     Args:
         scene: as planned; sound.
-        noise: how far.
-        number: of the scene among those with this noise.
-        issues: what is wrong with a scene, such as `SceneCheck.issues`. What is wrong with the
-            scene as planned already is nobody's fault here.
+        noise: placement errors.
+        number: number of the scene among those with this noise.
+        issues: finds the issues of a scene, such as `SceneCheck.issues`. Issues of the planned
+            scene are ignored.
 
     Returns:
-        A scene without errors; objects that had a part in one were drawn again, until there was
-        none.
+        A scene without errors; objects involved in one are redrawn until there is none.
     """
     if noise.place == noise.turn == 0.0:
         return NoisyScene(scene, dict.fromkeys(scene.instances, 0))
@@ -192,8 +191,9 @@ def noisy_scene(
 def draw_displaced_pose(
     scene: Scene, name: str, noise: PlacementNoise, number: int, draw: int
 ) -> Array:
-    """(4, 4) pose of an object in the scene frame with an error of place, and of turn about the
-    vertical through its middle."""
+    """(4, 4) pose of an object in the scene frame with random errors of position and of turn about
+    the vertical through its middle.
+    """
     rng = rng_from("placement noise", noise.seed, name, number, draw)
     x, y, turn = rng.standard_normal(3)
     return move_on_board(scene, name, noise.place * np.array([x, y, 0.0]), noise.turn * float(turn))
@@ -213,12 +213,12 @@ def move_on_board(scene: Scene, name: str, p_S: Array, angle: float) -> Array:
 
 
 def _objects_to_redraw(issues: Iterable[SceneIssue], movable: Iterable[str]) -> set[str]:
-    """Objects that had a part in errors and can be drawn again: both of two that overlap."""
+    """Movable objects involved in errors; both of two that overlap."""
     pairs = ((issue.instance, issue.other) for issue in issues if issue.is_error)
     return {name for pair in pairs for name in pair}.intersection(movable)
 
 
-MAX_HEIGHT_ERROR = 0.005  # metres from the planned height that are a measuring error
+MAX_HEIGHT_ERROR = 0.005  # metres; larger differences in height are no measuring errors
 MAX_TILT_ERROR = math.radians(5.0)  # an object with a larger tilt has fallen over
 
 
@@ -227,11 +227,11 @@ Issues = Callable[[Scene], Iterable[SceneIssue]]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredScene:
-    """What was made of the measurements.
+    """A scene built from measured poses.
 
     Attributes:
-        scene: the scene; None if it cannot be, and then `reason` says why.
-        notes: what was not taken as measured, one clause each.
+        scene: the scene; None if it is impossible, with the `reason`.
+        notes: deviations from the measurements, one clause each.
         reason: one line; empty if there is a scene.
     """
 
@@ -243,13 +243,13 @@ class MeasuredScene:
 def measured_scene(
     scene: Scene, placement: Mapping[str, ObjectPlace], issues: Issues
 ) -> MeasuredScene:
-    """The scene with its free objects where they were measured.
+    """Builds the scene with its free objects at their measured poses.
 
     Args:
         scene: as planned.
-        placement: where they stood, by instance. What is uncertain or was not seen stays as it was
-            planned, and so does what is not named.
-        issues: what is wrong with a scene, such as `SceneCheck.issues`.
+        placement: measured placement by instance. Objects that are uncertain, not seen or not
+            listed stay as planned.
+        issues: finds the issues of a scene, such as `SceneCheck.issues`.
     """
     unknown = [name for name in placement if name not in (*scene.instances, *scene.background)]
     if unknown:
@@ -271,18 +271,17 @@ def measured_scene(
 
 
 def correct_height_and_tilt(target: Array, measured: Array) -> tuple[Array, str]:
-    """A measured pose with height and tilt of the planned one, where they differ by no more than
-    measuring errors.
+    """Replaces height and tilt of a measured pose by the planned ones, if they differ by measuring
+    errors only.
 
-    An object stands in one of its stable poses: what a measurement can tell is its place and its
+    As an object stands in one of its stable poses, a measurement only tells its position and its
     turn about the vertical.
 
     Args:
         target, measured: (4, 4) poses in the scene frame.
 
     Returns:
-        The pose, and what was left out of the measured one; nothing if less than 0.1 mm and 0.1
-        degrees.
+        The pose, and a description of the correction; empty below 0.1 mm and 0.1 degrees.
     """
     if np.array_equal(target, measured):
         return target, ""
@@ -302,7 +301,7 @@ def correct_height_and_tilt(target: Array, measured: Array) -> tuple[Array, str]
 
 
 def _rotation_about_z(R: Array) -> Array:
-    """(3, 3) the rotation about z that is nearest to R."""
+    """(3, 3) rotation about z nearest to R."""
     angle = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -311,7 +310,7 @@ def _rotation_about_z(R: Array) -> Array:
 def _separate_objects(
     scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str]
 ) -> MeasuredScene:
-    """The scene with overlapping objects moved apart, if they are within each other by little."""
+    """Moves slightly overlapping objects of a scene apart."""
     max_iterations = 20
     max_shift = 0.005  # metres
     start = displaced_scene(scene, X_SO)
@@ -340,15 +339,16 @@ def _separate_objects(
 
 
 def _is_significant(issue: SceneIssue) -> bool:
-    """Whether a trial would be another one than that of the measured scene. The board is paper;
-    what hovers falls, and only much of it is another scene."""
+    """Whether an issue makes the trial differ from that of the measured scene. The board is paper,
+    and a hovering object falls, which matters only if it falls far.
+    """
     if issue.kind == "out_of_bounds":
         return issue.amount > 0.05  # metres
     return issue.is_error or issue.amount > MAX_HEIGHT_ERROR
 
 
 def _half_overlap(scene: Scene, issue: SceneIssue) -> Array:
-    """(3,) half of the way that brings an object out of another one, along the board [m]."""
+    """(3,) half the displacement along the board that separates two overlapping objects [m]."""
     one, other = (_object_center(scene, name) for name in (issue.instance, issue.other))
     direction = (one - other) * (1.0, 1.0, 0.0)
     length = float(np.linalg.norm(direction))

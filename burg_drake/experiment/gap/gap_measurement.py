@@ -12,8 +12,8 @@ gap.yaml               the settings
 gap.html, gap.json     the results
 
 A run in mode `reach` has the same trials of the hand as a run in mode `hand`. So its verdicts are
-taken from there, only the screens are repeated, and a trial is executed again only where the arm
-has less room to lift than the hand has.
+taken from there. Only the screens are repeated, and a trial is executed again only if the arm can
+lift less far than the hand.
 """
 
 from __future__ import annotations
@@ -105,23 +105,25 @@ def measure_gap(
     executor: Executor | None = None,
     progress: bool | Listener = True,
 ) -> GapSteps:
-    """Judges the same grasps step by step; the same call goes on where an earlier one stopped.
+    """Judges the same grasps step by step; a repeated call continues where an earlier one stopped.
 
     Args:
-        source: a run whose grasps are judged, with its scene, station, engine and motion; it is the
-            step of its mode itself. Or a scene.
-        out: folder; made if need be.
-        station: of a scene.
-        grasps: for `evaluate`, with a scene; sampled if None.
-        evaluation: likewise: engine, motion, and how to sample grasps. The mode is that of a step.
-        settings: which steps; all that the station can have, and five displaced scenes, if None.
+        source: a scene; or a run, whose grasps are judged with its scene, station, engine and
+            motion, and which itself is the step of its mode.
+        out: folder; created if necessary.
+        station: station for a scene.
+        grasps: grasps for `evaluate`, with a scene; sampled if None.
+        evaluation: settings for `evaluate`, with a scene: engine, motion and sampling. The step
+            sets the mode.
+        settings: steps; if None all that the station allows, and five displaced scenes.
         tried: ids of grasps of real trials, which are judged in displaced scenes even if they fail
             in the last mode.
-        executor: who judges; as many processes as there are processors if None.
+        executor: executor; if None as many processes as there are processors.
         progress: as for `evaluate`.
 
     Raises:
-        InvalidInputError: as `evaluate`; or the folder has other steps, or the run is incomplete.
+        InvalidInputError: as for `evaluate`; or the folder has other steps, or the run is
+            incomplete.
     """
     from burg_drake.station import SceneCheck
 
@@ -173,7 +175,7 @@ def measure_gap(
 def _make_document(
     run: Run | None, scene: Scene, station: Station, last: Mode, settings: GapSettings
 ) -> GapDocument:
-    """What a call asks for, with the versions that are installed."""
+    """Settings of a call, with the installed versions."""
     noise = settings.noise
     return GapDocument(
         source="" if run is None else run.document.hash,
@@ -189,20 +191,21 @@ def _make_document(
 
 
 def _start_folder(path: Path, document: GapDocument) -> None:
-    """Makes the folder and says first of all what is asked there, which refuses others from then
-    on, however this call ends."""
+    """Creates the folder and writes the settings first, so that later calls with other settings are
+    refused.
+    """
     file = path / GAP_DOCUMENT_FILE
     if not file.exists():
         ensure_writable_folder(path)
     with WriterLock(path / ".gap.lock"):
-        if file.exists() and any(path.glob(f"*/{JOURNAL_FILE}")):  # else nothing came of it
+        if file.exists() and any(path.glob(f"*/{JOURNAL_FILE}")):  # otherwise no run was begun
             _require_same_settings(path, load_document(file, GapDocument), document)
         else:
             save_document(document, file, GAP_DOCUMENT_HEADER)
 
 
 def _require_same_settings(path: Path, there: GapDocument, document: GapDocument) -> None:
-    """Refuses a folder with other steps; more scenes of the same kind are welcome."""
+    """Refuses a folder with other steps; only the number of displaced scenes may grow."""
     for name in ("source", "scene", "station", "place_mm", "turn_deg", "seed"):
         old, new = getattr(there, name), getattr(document, name)
         if old != new:
@@ -244,7 +247,7 @@ def _judge_in_mode(
 
 
 def _recorded_arguments(run: Run) -> dict[str, Any]:
-    """What makes `evaluate` judge the grasps of a run as it did."""
+    """Arguments with which `evaluate` repeats a run."""
     settings = EvaluationSettings(
         mode=run.document.mode,
         engine=run.document.engine,
@@ -257,7 +260,7 @@ def _recorded_arguments(run: Run) -> dict[str, Any]:
 
 
 def _arguments_in_mode(asked: dict[str, Any], mode: Mode) -> dict[str, Any]:
-    """The same arguments of `evaluate` in another mode; the whole arm approaches anyway."""
+    """The arguments of `evaluate` in another mode; the whole arm approaches anyway."""
     settings = asked["settings"]
     approach = settings.approach and mode != "arm"
     return {**asked, "settings": replace(settings, mode=mode, approach=approach)}
@@ -272,7 +275,7 @@ def group_candidates_by_instance(candidates: Candidates) -> dict[str, GraspSet]:
 def _start_reach_run(
     hand: Run, scene: Scene, station: Station, folder: Path, options: dict[str, Any]
 ) -> None:
-    """Writes the run of mode `reach` as far as the hand's trials tell, which is all of it."""
+    """Writes the run of mode `reach` from the trials of the hand."""
     grasps = Grasps(
         origin="given",
         correction=hand.document.grasps.correction,
@@ -315,7 +318,7 @@ class _DisplacedJudging:
     options: dict[str, Any]
 
     def judge(self, ids: Sequence[str], folder: str) -> tuple[Run, ...]:
-        """A run in each scene; none if there are no grasps."""
+        """Judges grasps in each displaced scene; returns no runs without grasps."""
         if not ids:
             return ()
         of, chosen = self.run.candidates, set(ids)
@@ -337,11 +340,11 @@ class _DisplacedJudging:
 
 @dataclass(frozen=True)
 class ReachOfHandFactory:
-    """Builds a judge of mode `reach` that knows the hand's trials.
+    """Builds a judge of mode `reach` that reuses the hand's trials.
 
     Attributes:
         build: builds the station's judge.
-        trials: executed ones by grasp id.
+        trials: executed trials by grasp id.
     """
 
     build: Callable[[], StationJudge]
@@ -368,16 +371,17 @@ def reach_verdicts(
     executor: Executor | None = None,
     progress: bool | Listener = True,
 ) -> Iterator[tuple[str, Verdict]]:
-    """What a run in mode `reach` says of the grasps of a run of the hand, bit for bit.
+    """Verdicts of mode `reach` on the grasps of a run of the hand, as `evaluate` gives them bit for
+    bit.
 
     Args:
         hand: a complete run in mode `hand`.
-        known: verdicts that are there already.
-        executor: who judges.
+        known: existing verdicts.
+        executor: executor of the judgements.
         progress: see `evaluate`.
 
     Yields:
-        Ids and verdicts of the others.
+        Ids and verdicts of the other grasps.
     """
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     origin = origin_of(hand.document)
@@ -405,7 +409,7 @@ def _was_executed(verdict: Verdict) -> bool:
 
 
 def _add_trial_time(verdict: Verdict, trial: Verdict | None) -> Verdict:
-    """The verdict with the time that its trial took when it was executed."""
+    """A copy of the verdict with the time of the original trial."""
     if trial is None or verdict.stage is not Stage.EXECUTED or Stage.EXECUTED not in trial.cpu:
         return verdict
     return replace(verdict, cpu={**verdict.cpu, Stage.EXECUTED: trial.cpu[Stage.EXECUTED]})

@@ -1,4 +1,4 @@
-"""The page about the steps in which grasps are lost: one self-contained HTML file."""
+"""Page about the steps at which grasps are lost: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ def write_gap_report(
 
     Args:
         steps: all steps.
-        success: what counts.
-        agreement: with real trials, if there are any.
-        command_line: that makes it again.
+        success: criterion of success.
+        agreement: agreement with real trials, if there are any.
+        command_line: command that repeats the measurement.
 
     Raises:
         InvalidInputError: it cannot be written.
@@ -144,11 +144,11 @@ GAP_STEP_DESCRIPTIONS = {
     " counts as a collision if the open hand overlaps a displaced object. The arm knows"
     " where things stand and plans its path again. Each grasp counts once a scene.",
 }
-"""What each step judges."""
+"""Description of each step."""
 
 
 def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
-    """The picture of all steps."""
+    """Section with the chart of all steps."""
     if not found:
         return None
     columns = []
@@ -168,7 +168,7 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
 
 
 def objects_section(steps: GapSteps, success: Success) -> Html:
-    """Successes of each object in each step."""
+    """Section with the successes of each object in each step."""
     by_step = [successes_by_object(step, success) for step in steps.steps]
     whole = by_step[0]
     head = ["grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
@@ -188,7 +188,7 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
 
 
 def change_section(change: Change) -> Html:
-    """What one step changes: outcomes, objects, bodies in the way, and the grasps."""
+    """Section on the changes by one step: outcomes, objects, blockers and grasps."""
     lost, whole = len(change.lost), change.successes
     parts: list[Child] = []
     if whole:
@@ -205,7 +205,7 @@ def change_section(change: Change) -> Html:
 
 
 def _flow_table(change: Change) -> Html:
-    """Outcomes before and after, where they differ."""
+    """Table of outcomes that differ before and after."""
     moved = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
     found = FindingTable().texts("before", "after").numbers("grasps").texts("in the way")
     for (before, after), count in sorted(moved.items(), key=lambda item: -item[1]):
@@ -218,7 +218,7 @@ def _flow_table(change: Change) -> Html:
 
 
 def _objects_table(change: Change) -> Html | None:
-    """Which objects suffer."""
+    """Table of the changes by object."""
     lost = Counter(move.object for move in change.lost)
     if not lost:
         return None
@@ -232,8 +232,8 @@ def _objects_table(change: Change) -> Html | None:
 
 
 def _change_list(change: Change) -> Html:
-    """The grasps that change, and how to watch them."""
-    max_rows = 40  # Grasps in the table of a step.
+    """List of the changed grasps with the commands that show them."""
+    max_rows = 40  # Maximum number of grasps in the table of a step.
     moves = [*change.lost, *change.won]
     found = FindingTable(max_page_rows=max_rows)
     found.names("grasp").texts("before", "after", "in the way", "command")
@@ -253,7 +253,7 @@ def _change_list(change: Change) -> Html:
 
 
 def push_section(steps: GapSteps) -> Html | None:
-    """By how much the hand pushes objects before it closes."""
+    """Section on the push of objects by the hand before it closes."""
     arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
     columns = {} if arm is None else arm.results
     sentence = count_pushes(columns)
@@ -295,9 +295,9 @@ def push_section(steps: GapSteps) -> Html | None:
 
 
 FLOW_CHART_SIZE = 1000, 430  # width and height in SVG units
-FLOW_CHART_TOP = 34  # room for the heads of columns
+FLOW_CHART_TOP = 34  # space for the column headings
 NODE_WIDTH = 14
-NODE_GAP = 19  # room for a name between two nodes
+NODE_GAP = 19  # space for a name between two nodes
 FLOW_CHART_STYLE = """
 .flow { width: 100%; min-width: 680px; height: auto; }
 .flow text { font-size: 13px; fill: var(--ink); paint-order: stroke; stroke: var(--paper);
@@ -315,8 +315,8 @@ class FlowColumn:
     """A step.
 
     Attributes:
-        title: its name.
-        counts: grasps by outcome.
+        title: name of the step.
+        counts: number of grasps by outcome.
     """
 
     title: str
@@ -326,19 +326,18 @@ class FlowColumn:
 def flow_chart(
     columns: Sequence[FlowColumn], flows: Sequence[Flow], scale: Sequence[float]
 ) -> Html:
-    """The chart.
+    """Flow chart of the outcomes of all steps.
 
     Args:
-        columns: one a step.
-        flows: between a column and the next; what is in no flow ends there.
-        scale: grasps that one of each column's counts stands for, such as 1/5 where each grasp was
-            judged in five scenes.
+        columns: one per step.
+        flows: counts between a column and the next; grasps in no flow end there.
+        scale: grasps per count of each column, such as 1/5 if each grasp was judged in five scenes.
     """
     whole = max((c.counts.total() * s for c, s in zip(columns, scale, strict=True)), default=1.0)
     rows = max(len(_count_by_group(column)) for column in columns)
     width, height = FLOW_CHART_SIZE
     unit = (height - FLOW_CHART_TOP - NODE_GAP * rows) / max(whole, 1e-9)
-    names_width = 190  # of the last column
+    names_width = 190  # width of the names of the last column
     step = (width - names_width - NODE_WIDTH) / max(len(columns) - 1, 1)
     places = [_node_tops(c, s * unit) for c, s in zip(columns, scale, strict=True)]
     bands: list[Html] = []

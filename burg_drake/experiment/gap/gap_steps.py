@@ -14,7 +14,7 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError, Mode, Outcome, setting, wilson_interval
 from burg_drake.evaluation import Run
-from burg_drake.experiment.comparison.compared_runs import JudgedRuns, unpredictable_for
+from burg_drake.experiment.comparison.compared_runs import JudgedRuns, outcomes_unpredictable_for
 from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
     count_cells,
@@ -28,12 +28,12 @@ from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSh
 
 @dataclass(frozen=True, kw_only=True)
 class GapSettings:
-    """Which steps there are.
+    """Steps of a gap measurement.
 
     Attributes:
-        last: the last mode; `arm` where there is an arm, else `hand`, if None.
-        noise: of the objects' places. The hand goes where it was planned to go.
-        samples: number of displaced scenes; 0 leaves the step out.
+        last: the last mode; if None, `arm` with an arm, else `hand`.
+        noise: placement errors of the objects. The hand moves to the planned poses.
+        samples: number of displaced scenes; 0 omits the step.
     """
 
     last: Mode | None = None
@@ -87,8 +87,8 @@ class GapStep:
     """One step.
 
     Attributes:
-        name: which.
-        runs: one, or one for each displaced scene.
+        name: name of the step.
+        runs: one run, or one for each displaced scene.
     """
 
     name: StepName
@@ -101,10 +101,10 @@ class GapSteps:
 
     Attributes:
         path: folder.
-        document: what was asked.
-        steps: in order.
-        tried: further grasps in the displaced scenes of the last step, those of real trials that
-            fail in the last mode.
+        document: settings of the measurement.
+        steps: the steps in order.
+        tried: runs of the last step on further grasps, those of real trials that fail in the last
+            mode.
     """
 
     path: Path
@@ -114,7 +114,7 @@ class GapSteps:
 
     @property
     def first(self) -> Run:
-        """The run of the hand alone."""
+        """Run of the hand alone."""
         return self.steps[0].runs[0]
 
 
@@ -123,11 +123,11 @@ class OutcomeChange:
     """A grasp before and after a step.
 
     Attributes:
-        grasp, instance, object: which grasp on what.
+        grasp, instance, object: id of the grasp, names of instance and object.
         before, after: its outcomes.
-        blocker: of the verdict after.
-        run: folder of the verdict after, in which it can be replayed.
-        won, lost: whether the step made it a success, or was the end of one.
+        blocker: blocker after the step.
+        run: folder of the run after the step, for a replay.
+        won, lost: whether the step turned a failure into a success, or a success into a failure.
     """
 
     grasp: str
@@ -143,14 +143,14 @@ class OutcomeChange:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What a step changes.
+    """Changes of outcomes by a step.
 
     Attributes:
-        step: its name.
-        moves: all grasps, changed or not; in displaced scenes each once a scene.
-        success: what counts.
-        failed: number of grasps left out, whose simulation failed before or after the step, for
-            example because the memory ran out: that tells nothing of the gap.
+        step: name of the step.
+        moves: all grasps, changed or not; with displaced scenes, once per scene.
+        success: criterion of success.
+        failed: number of omitted grasps whose simulation failed before or after the step, for
+            example because the memory ran out.
     """
 
     step: StepName
@@ -165,12 +165,12 @@ class Change:
 
     @cached_property
     def lost(self) -> tuple[OutcomeChange, ...]:
-        """Successes that are none any more."""
+        """Successes that turn into failures."""
         return tuple(move for move in self.moves if move.lost)
 
     @cached_property
     def won(self) -> tuple[OutcomeChange, ...]:
-        """Failures that succeed now."""
+        """Failures that turn into successes."""
         return tuple(move for move in self.moves if move.won)
 
     @cached_property
@@ -180,21 +180,21 @@ class Change:
 
     @property
     def share_lost(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of the share of successes that are lost."""
+        """Share of lost successes, with Wilson's 95 % interval."""
         return wilson_interval(len(self.lost), self.successes)
 
     @property
     def blockers(self) -> Counter[str]:
-        """Bodies that are in the way of grasps that are lost."""
+        """Blockers of lost grasps."""
         return Counter(move.blocker for move in self.lost if move.blocker)
 
 
 def gap_changes(steps: GapSteps, success: Success) -> tuple[Change, ...]:
-    """What each step but the first changes.
+    """Changes by each step after the first.
 
     Args:
         steps: all steps.
-        success: what counts.
+        success: criterion of success.
     """
     changes = []
     for before, step in pairwise(steps.steps):
@@ -226,8 +226,9 @@ def _outcome_changes(
 
 
 def successes_by_object(step: GapStep, success: Success) -> dict[str, tuple[int, int]]:
-    """Successes and grasps of each object, without those whose simulation failed; in displaced
-    scenes counted once a scene."""
+    """Counts of successes and grasps of each object, without failed simulations; with displaced
+    scenes, once per scene.
+    """
     found: dict[str, tuple[int, int]] = {}
     for run in step.runs:
         columns = run.results
@@ -241,13 +242,13 @@ def successes_by_object(step: GapStep, success: Success) -> dict[str, tuple[int,
 
 @dataclass(frozen=True)
 class StepAgreement:
-    """Real trials beside the verdicts of a step.
+    """Agreement of a step's verdicts with real trials.
 
     Attributes:
-        step: its name.
+        step: name of the step.
         found: confusion matrix and figures of the trials, each counted once.
-        all_grasps: the same of all grasps that they were chosen from; None if that is not known.
-        unpredictable: trials, among them, with a failure that the step's mode does not predict.
+        all_grasps: the same for all grasps that they were chosen from; None if unknown.
+        unpredictable: number of trials with a failure that the step's mode does not predict.
     """
 
     step: StepName
@@ -257,7 +258,7 @@ class StepAgreement:
 
     @property
     def estimated(self) -> Agreement:
-        """The figures that hold for the grasps of the run, as far as that is known."""
+        """Figures of all grasps of the run if known, else of the trials."""
         return self.all_grasps or self.found
 
 
@@ -267,10 +268,11 @@ def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTria
     Args:
         sheet: contents of the trials file.
         path: the trials file, for messages.
-        run: theirs, or another one of the same scene; grasps are the same by id and content.
+        run: run of the sheet, or another one of the same scene; grasps are matched by id and
+            content.
 
     Raises:
-        InvalidInputError: it is theirs, and a grasp is not the one that was planned with.
+        InvalidInputError: the run is the sheet's, but a grasp differs from the planned one.
     """
     scene, found = run.document.scene.content, []
     contents = grasp_contents(run, (trial.grasp for trial in sheet.trials))
@@ -290,15 +292,15 @@ def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTria
 def agreement_by_step(
     steps: GapSteps, sheet: TrialSheet, trials: Sequence[RealTrial], success: Success
 ) -> tuple[StepAgreement, ...]:
-    """Compares each step with the trials that tell anything of its grasp.
+    """Compares each step with the informative trials.
 
-    A grasp in displaced scenes is predicted to succeed if it does in more than half of them.
+    With displaced scenes, success is predicted if the grasp succeeds in more than half of them.
 
     Args:
         steps: all steps.
-        sheet: the trials file, which says what they were chosen from.
+        sheet: the trials file, with the strata of the trials.
         trials: see `tried_grasps`.
-        success: what counts.
+        success: criterion of success.
     """
     real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
     found = []
@@ -317,7 +319,7 @@ def agreement_by_step(
         answers = np.array(predicted, dtype=bool), np.array(actual, dtype=bool)
         strata = selection_strata(sheet, told)
         every = None if strata is None else strata.agreement(*answers)
-        beyond = unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
+        beyond = outcomes_unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
         apart = sum(trial.outcome in beyond for trial in told)
         found.append(
             StepAgreement(step.name, estimate_agreement(count_cells(*answers)), every, apart)

@@ -1,4 +1,4 @@
-"""The steps of the gap in sentences, as tables for a terminal, and as JSON."""
+"""Steps of the gap as sentences, tables for a terminal, and JSON."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ GAP_STEP_TITLES: dict[StepName, str] = {
 
 
 def step_sentences(steps: GapSteps, changes: Sequence[Change], success: Success) -> list[str]:
-    """One sentence or two a step."""
+    """One or two sentences per step."""
     verbs = {"lifted": "lifts", "held": "holds"}  # Verb by the criterion of success.
     hand = steps.first
     outcomes = [verdict.outcome for verdict in hand.verdicts.values()]
@@ -44,7 +44,7 @@ def step_sentences(steps: GapSteps, changes: Sequence[Change], success: Success)
 
 
 def left_out_sentence(change: Change) -> str:
-    """What is said of grasps that a step leaves out; empty if there are none."""
+    """Sentence about grasps omitted by a step; empty if there are none."""
     if not change.failed:
         return ""
     counts = "counts" if change.failed == 1 else "count"
@@ -85,7 +85,7 @@ def _is_or_are(count: int) -> str:
 
 
 def _failure_outcomes(change: Change) -> str:
-    """The outcomes that successes turn into, most frequent first."""
+    """Outcomes into which successes turn, most frequent first."""
     into = Counter(move.after for move in change.lost)
     parts = [f"{count} {outcome_label(outcome)}" for outcome, count in into.most_common(4)]
     rest = into.total() - sum(count for _, count in into.most_common(4))
@@ -93,7 +93,7 @@ def _failure_outcomes(change: Change) -> str:
 
 
 def reality_sentence(agreement: Sequence[StepAgreement]) -> str:
-    """What the counts and the shares beside the robot are of."""
+    """Sentence about the grasps or trials behind the agreement with the robot."""
     if any(one.all_grasps is None for one in agreement):
         return "counts and shares are of the tried grasps, each counted once"
     grasps = round(max(sum(one.estimated.cells) for one in agreement))
@@ -104,12 +104,12 @@ def reality_sentence(agreement: Sequence[StepAgreement]) -> str:
 
 
 def replay_arguments(run: str, grasp: str) -> list[str]:
-    """Words of the command that shows a grasp."""
+    """Arguments of the command that shows a grasp."""
     return ["burg-drake", "replay", run, "--grasp", grasp]
 
 
 def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
-    """What each step keeps and loses."""
+    """Table of grasps that each step keeps and loses."""
     table = TextTable("Where grasps are lost", caption=_caption(steps))
     table.names("step").numbers(
         "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
@@ -141,7 +141,7 @@ def _caption(steps: GapSteps) -> str:
 
 
 def reality_table(agreement: Sequence[StepAgreement]) -> FindingTable:
-    """What each step does to the agreement with the robot."""
+    """Table of each step's agreement with the robot."""
     measures = ("precision", "recall", "accuracy")
     sentence = reality_sentence(agreement)
     found = FindingTable(
@@ -178,7 +178,7 @@ def gap_json(
     agreement: Sequence[StepAgreement],
     success: Success,
 ) -> dict[str, Any]:
-    """All figures, and the grasps that change."""
+    """All figures and changed grasps as JSON values."""
     arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
     pushed = None if arm is None else count_pushes(arm.results)
     return {

@@ -1,9 +1,9 @@
-"""Judges real trials again in scenes whose objects stand where they were measured.
+"""Judges real trials again in scenes with objects at their measured poses.
 
-The robot moves to the planned grasp, but the object may stand elsewhere. A verdict that is wrong
-as planned and right as measured was wrong because of the placement; the remaining disagreement is
-physics. Verdicts are appended to a journal under names that follow from all of their inputs. A
-repeated call continues where the first one stopped, and judges again only what has changed.
+The robot moves to the planned grasp, but the object may stand elsewhere. A verdict that is wrong as
+planned and right as measured was wrong because of the placement; the remaining disagreement is
+physics. Verdicts are appended to a journal under hashes of all their inputs. A repeated call
+continues where the first one stopped, and judges only changed trials again.
 
 rejudged.csv      one row for each trial: planned, as measured, real; rows can be replayed
 rejudged.json     the figures
@@ -76,10 +76,9 @@ from burg_drake.station import Station
 
 @dataclass(frozen=True, eq=False)
 class _RejudgeTask:
-    """A trial that is to be judged again; without a judge if its scene cannot be built.
+    """A trial to be judged again; without a judge if its scene cannot be built.
 
-    `judge_content` is a hash of all that decides about the verdicts of the judge, but for the
-    versions of the software.
+    `judge_content` is a hash of all inputs of the judge except the versions of the software.
     """
 
     trial: Rejudged
@@ -101,24 +100,24 @@ def rejudge(
     """Judges every real trial with a measured placement again.
 
     Each is judged as its run was: mode, engine (or the one that judged the grasp again there),
-    motion and settings. The hand goes to the place in
-    the world to which the robot was sent. Objects that were not measured stay where they were
-    planned. A scene that cannot be makes a trial that is not judged, with the reason.
+    motion and settings. The hand moves to the pose commanded to the robot. Objects that were not
+    measured stay as planned. A trial with an impossible scene is not judged, and the reason is
+    recorded.
 
     Args:
         sheet: the trials.
-        path: their file, from whose folder the sheet's paths start.
-        out: folder for the answers; made if need be.
-        runs: by the sheet's keys, in place of its own; trials of keys that are missing, or whose
-            grasp is not in the run, or another one there, are skipped.
-        success: what counts; as the sheet says if None.
-        executor: who judges; as many processes as there are processors if None.
-        retry_failed: ask again what an earlier call could not simulate.
+        path: the trials file, to whose folder the sheet's paths are relative.
+        out: folder for the results; created if necessary.
+        runs: runs by the sheet's keys, in place of its own; trials with a missing key, or whose
+            grasp is missing or different in the run, are skipped.
+        success: criterion of success; the sheet's if None.
+        executor: executor; if None as many processes as there are processors.
+        retry_failed: repeat simulations that failed in an earlier call.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Raises:
-        InvalidInputError: a run is gone, or is another one; its library or station has changed; or
-            the folder cannot be written.
+        InvalidInputError: a run is missing or different; its library or station has changed; or the
+            folder cannot be written.
         MissingDependencyError: an engine is not installed.
     """
     runs = load_sources(sheet, path) if runs is None else runs
@@ -146,7 +145,7 @@ def rejudge(
 
 
 def _skip_reasons(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
-    """Why trials cannot be judged again, by number."""
+    """Reasons why trials cannot be judged again, by number."""
     tried = [trial.grasp for trial in sheet.trials]
     contents = {key: grasp_contents(run, tried) for key, run in runs.items()}
     found = {}
@@ -228,11 +227,11 @@ def _judge_tasks(
     reporter: Reporter,
     failed: dict[str, str],
 ) -> Iterator[tuple[str, Verdict]]:
-    """Asks what is not known yet, trials of one scene together.
+    """Judges tasks without a known verdict, grouped by scene.
 
     Args:
-        tasks, known, executor, reporter: what is asked, and what need not be.
-        failed: gets the reason, by id, for trials of scenes that cannot be built.
+        tasks, known, executor, reporter: all tasks, existing verdicts, and who judges and reports.
+        failed: receives the reasons by id for trials whose scenes cannot be built.
 
     Yields:
         Ids and verdicts.
@@ -282,17 +281,17 @@ class Rejudged:
     """A real trial, judged again.
 
     Attributes:
-        number: of the trial.
+        number: number of the trial.
         run: key of its run in the sheet.
-        grasp, instance, object: which grasp on what.
-        real: how it ended on the robot.
-        planned: what the run found.
-        origin: how the run judged.
-        candidate: the grasp in the frame of the object as it stood; None if there is no scene.
-        scene: as measured; None if it cannot be.
-        notes: what was not taken as measured.
-        reason: why there is no scene; empty if there is.
-        verdict: of judging again.
+        grasp, instance, object: id of the grasp, names of instance and object.
+        real: outcome on the robot.
+        planned: outcome in the run.
+        origin: settings of the run's judge.
+        candidate: the grasp in the frame of the displaced object; None if there is no scene.
+        scene: scene as measured; None if it is impossible.
+        notes: deviations from the measurements.
+        reason: reason why there is no scene; empty if there is one.
+        verdict: the new verdict.
     """
 
     number: int
@@ -311,20 +310,20 @@ class Rejudged:
 
     @property
     def outcome(self) -> Outcome | None:
-        """Of judging again; None if it could not be judged."""
+        """Outcome of the new verdict; None if the trial could not be judged."""
         failed = self.verdict is None or self.verdict.outcome is Outcome.SIMULATION_FAILED
         return None if failed or self.verdict is None else self.verdict.outcome
 
     @property
     def failure_reason(self) -> str:
-        """Why it could not be judged; empty if it was."""
+        """Reason why the trial could not be judged; empty if it was."""
         if self.outcome is not None:
             return ""
         return self.reason or (self.verdict.reason if self.verdict else "")
 
     @cached_property
     def unpredictable(self) -> bool:
-        """Whether no verdict of the run's mode could predict how it ended on the robot."""
+        """Whether no verdict of the run's mode could predict the real outcome."""
         approach = self.origin.settings().approach
         return self.real in unpredictable_outcomes(self.origin.mode, approach=approach)
 
@@ -336,8 +335,7 @@ class Rejudged:
         )
 
     def cause(self, success: Success) -> TrialCause | None:
-        """What the two verdicts say of the real one; None if it could not be judged again, or not
-        as planned."""
+        """Meaning of the two verdicts and the real outcome; None if either verdict is missing."""
         if self.outcome is None or self.planned is Outcome.SIMULATION_FAILED:
             return None
         if self.unpredictable:
@@ -353,10 +351,10 @@ class Rejudging:
     """All trials of a sheet.
 
     Attributes:
-        path: folder with the answers.
-        success: what counts as success.
-        trials: those with an outcome and a placement.
-        skipped: why the others were not judged again, by number.
+        path: folder with the results.
+        success: criterion of success.
+        trials: trials with an outcome and a placement.
+        skipped: reasons why the other trials were not judged again, by number.
     """
 
     path: Path
@@ -366,12 +364,12 @@ class Rejudging:
 
     @cached_property
     def judged(self) -> tuple[Rejudged, ...]:
-        """Trials that have a planned verdict and one as measured."""
+        """Trials with verdicts as planned and as measured."""
         return tuple(t for t in self.trials if t.cause(self.success) is not None)
 
     @cached_property
     def causes(self) -> Counter[TrialCause]:
-        """Number of trials by what they say."""
+        """Number of trials by cause."""
         found: Counter[TrialCause] = Counter(dict.fromkeys(DISAGREEMENT_CAUSES, 0))
         found.update(c for t in self.judged if (c := t.cause(self.success)) is not None)
         return found
@@ -390,7 +388,7 @@ class Rejudging:
 
     @cached_property
     def predictable(self) -> tuple[Rejudged, ...]:
-        """Those of them whose outcome a verdict can predict."""
+        """Judged trials whose outcome a verdict can predict."""
         return tuple(t for t in self.judged if not t.unpredictable)
 
     def agreement(self, *, measured: bool, every: bool = False) -> tuple[int, float, float]:
@@ -398,16 +396,17 @@ class Rejudging:
         interval of their share.
 
         Args:
-            measured: the verdicts with the objects where they stood, not those as planned.
-            every: of all trials, and not only of the predictable ones.
+            measured: use the verdicts as measured instead of as planned.
+            every: count all trials instead of the predictable ones.
         """
         trials = self.judged if every else self.predictable
         count = sum(trial.is_right(self.success, measured=measured) for trial in trials)
         return count, *wilson_interval(count, len(trials))
 
     def precision(self, *, measured: bool, every: bool = False) -> tuple[int, int]:
-        """Successes among the predicted successes, and how many those are; arguments as those of
-        `agreement`."""
+        """Number of true among predicted successes, and number of predicted successes; arguments as
+        for `agreement`.
+        """
         promised = [
             trial
             for trial in (self.judged if every else self.predictable)
@@ -417,17 +416,19 @@ class Rejudging:
         return sum(is_success(trial.real, self.success) for trial in promised), len(promised)
 
     @property
-    def explained(self) -> tuple[int, int, float, float]:
-        """Of the trials that disagree as planned: how many agree as measured, how many there are,
-        and Wilson's 95 % interval of the share."""
+    def explained_disagreements(self) -> tuple[int, int, float, float]:
+        """Number of trials that disagree as planned and agree as measured, number that disagree as
+        planned, and Wilson's 95 % interval of the share.
+        """
         count = self.causes["placement"]
         whole = count + self.causes["physics"]
         return count, whole, *wilson_interval(count, whole)
 
     @cached_property
-    def paired(self) -> Paired:
-        """McNemar's exact test of which verdicts agree with reality more often: those as measured,
-        which come first, or those as planned."""
+    def mcnemar_test(self) -> Paired:
+        """McNemar's exact test of agreement with reality: verdicts as measured (first) against
+        verdicts as planned.
+        """
         of = self.causes
         return compare_paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
 
@@ -437,8 +438,8 @@ def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
 
     Args:
         trial: the trial.
-        run: stands for the trial's.
-        content: of the grasp that it has by this id; None if it has none.
+        run: run in place of the trial's.
+        content: content hash of the run's grasp with this id; None if there is none.
     """
     if trial.outcome is None:
         return "not carried out yet"
@@ -454,12 +455,12 @@ def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
 
 
 def match_runs_to_sources(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
-    """The run that stands for each run of a sheet: itself, or else the run of the same scene that
-    has most of the grasps.
+    """Replacement for each run of a sheet: the run itself, or else the run of the same scene with
+    most of the grasps.
 
     Args:
         sheet: the trials.
-        runs: what a folder holds.
+        runs: the runs in a folder.
     """
     found = {}
     for key, source in sheet.runs.items():
@@ -478,7 +479,7 @@ REJUDGED_TABLE_FILE = "rejudged.csv"  # Table of the trials that were judged aga
 
 
 def rejudged_scene_file(trial: Rejudged, folder: Path) -> Path:
-    """Where the scene of a trial is written."""
+    """Path of the scene file of a trial."""
     return folder / "scenes" / f"{trial.number:03d}.yaml"
 
 
@@ -498,7 +499,7 @@ def write_rejudging(found: Rejudging) -> None:
 
 
 def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
-    """The table of one trial; nothing of one that no judge has seen."""
+    """Table row of one trial; empty for a trial without a judge."""
     if trial.scene is None or trial.candidate is None or trial.verdict is None:
         return None
     origin = replace(
@@ -528,7 +529,7 @@ def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
 
 
 def concatenate_tables(tables: list[Columns]) -> Columns:
-    """Tables one below the other; what one of them lacks is NaN or empty there."""
+    """Concatenates tables; missing columns are filled with NaN or empty texts."""
     names = dict.fromkeys(name for table in tables for name in table)
     kinds = {n: next(t[n].dtype.kind for t in tables if n in t) for n in names}
 
@@ -561,8 +562,10 @@ def rejudging_json(found: Rejudging) -> dict[str, Any]:
             for name, measured in (("planned", False), ("measured", True))
         },
         "causes": {cause: found.causes[cause] for cause in DISAGREEMENT_CAUSES},
-        "explained": dict(zip(("count", "of", "low", "high"), found.explained, strict=True)),
-        "mcnemar_p": found.paired.p_value,
+        "explained": dict(
+            zip(("count", "of", "low", "high"), found.explained_disagreements, strict=True)
+        ),
+        "mcnemar_p": found.mcnemar_test.p_value,
         "table": [
             {"planned": p, "measured": m, "real": r, "count": n}
             for (p, m, r), n in sorted(found.table.items())

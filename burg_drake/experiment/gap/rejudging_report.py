@@ -20,12 +20,12 @@ from burg_drake.visualization import Html, element, join
 
 
 def rejudged_sentences(found: Rejudging) -> list[str]:
-    """What came of it, in sentences."""
+    """Sentences about the results."""
     if not found.judged:
         return ["None of the trials could be judged again.", *_skipped_sentence(found)]
     of, whole = found.causes, len(found.predictable)
     planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
-    count, wrong, low, high = found.explained
+    count, wrong, low, high = found.explained_disagreements
     sentences = _unpredictable_sentence(found)
     if whole:
         sentences.append(
@@ -33,7 +33,7 @@ def rejudged_sentences(found: Rejudging) -> list[str]:
             f" stands for, {planned} agree with the robot as planned"
             f" ({format_percent(planned / whole)}), and {measured} with the objects where they"
             f" stood ({format_percent(measured / whole)}); McNemar's exact test:"
-            f" p = {found.paired.p_value:.2g}."
+            f" p = {found.mcnemar_test.p_value:.2g}."
         )
     if wrong:
         sentences.append(
@@ -59,7 +59,7 @@ def rejudged_sentences(found: Rejudging) -> list[str]:
 
 
 def _unpredictable_sentence(found: Rejudging) -> list[str]:
-    """What is counted apart, and precision with and without it."""
+    """Sentence about unpredictable failures, and precision with and without them."""
     apart = [trial for trial in found.judged if trial.unpredictable]
     if not apart:
         return []
@@ -90,7 +90,7 @@ def _skipped_sentence(found: Rejudging) -> list[str]:
 
 
 def rejudged_view(found: Rejudging) -> TextTable:
-    """Counts of what the verdicts say, for a terminal."""
+    """Table of causes for a terminal."""
     whole = len(found.judged)
     table = TextTable(
         "Judged again where objects stood", caption=" ".join(rejudged_sentences(found))
@@ -103,7 +103,7 @@ def rejudged_view(found: Rejudging) -> TextTable:
 
 
 def rejudged_section(found: Rejudging) -> Html:
-    """Counts, the table of both verdicts and reality, and the trials that changed."""
+    """Section with counts by cause, tables of both verdicts and reality, and the changed trials."""
     tables = _agreement_table(found), _verdict_table(found), _trial_list(found)
     return section(
         "Judged again where objects stood",
@@ -115,7 +115,7 @@ def rejudged_section(found: Rejudging) -> Html:
 
 
 def _agreement_table(found: Rejudging) -> Html:
-    """How many verdicts agree with the robot."""
+    """Table of the verdicts' agreement with the robot."""
     shown = FindingTable().names("verdict").numbers("right").shares("share with 95 % interval")
     cases = [("as planned", False, False), ("as measured", True, False)]
     if len(found.predictable) < len(found.judged):
@@ -132,7 +132,7 @@ def _agreement_table(found: Rejudging) -> Html:
 
 
 def _verdict_table(found: Rejudging) -> Html:
-    """Both verdicts and reality."""
+    """Table of both verdicts and reality."""
     shown = FindingTable().texts("as planned", "as measured")
     shown.numbers("robot: success", "robot: failure")
     words = {True: "success", False: "failure"}
@@ -143,7 +143,7 @@ def _verdict_table(found: Rejudging) -> Html:
 
 
 def _trial_list(found: Rejudging) -> Html | None:
-    """Trials by what they say, those that changed first, and those that were not judged."""
+    """Trials by cause, changed ones first, and trials that were not judged."""
     # Heading of each group of trials, changed verdicts first.
     headings = {
         "placement": "Explained by placement",
@@ -166,7 +166,7 @@ def _trial_list(found: Rejudging) -> Html | None:
 
 
 def _add_trials(shown: FindingTable, trials: Sequence[Rejudged], head: str) -> None:
-    max_rows = 40  # Trials in a group.
+    max_rows = 40  # Maximum number of trials in a group.
     more = f" (first {max_rows} of {len(trials)})" if len(trials) > max_rows else ""
     for k, trial in enumerate(trials[:max_rows]):
         shown.row(
@@ -181,6 +181,6 @@ def _add_trials(shown: FindingTable, trials: Sequence[Rejudged], head: str) -> N
 
 
 def replay_line(found: Rejudging, row: int) -> str:
-    """The command that shows a row of the table, the first one is 1."""
+    """Command that shows a row of the table, counted from 1."""
     table_file = str(found.path / REJUDGED_TABLE_FILE)
     return shlex.join(["burg-drake", "replay", table_file, "--row", str(row)])

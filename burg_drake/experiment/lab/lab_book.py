@@ -1,8 +1,8 @@
-"""The trials file as the lab page reads and writes it, with entries from several browsers.
+"""Access of the lab page to the trials file, with entries from several browsers.
 
 An entry names the state of the trial that it replaces. It is written if the trial is still in that
-state. If the file or its journal already has the entry, it counts as written, so that a browser may
-send it repeatedly. Otherwise another browser was faster, and this one gets an error.
+state. An entry that is already in the file or its journal counts as written, so a browser may send
+it repeatedly. Otherwise another browser was faster, and this one gets an error.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from burg_drake.experiment.trials.trial_book import TrialBook, TrialChanged, ent
 from burg_drake.experiment.trials.trial_sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
 
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
-"""What people enter; photo and placement come from the camera."""
+"""Fields entered by people; photo and placement come from the camera."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LabEntry:
-    """What somebody has entered on the page.
+    """An entry made on the page.
 
     Attributes:
-        number: of the trial.
-        replaces: state of the trial that was seen when it was entered, see `trial_state_hash`.
-        outcome: how it ended; None takes an entry back.
-        time: of the click, ISO 8601 with time zone.
-        operator, note: who, and what was noticed.
-        width_mm: between the pads at the end [mm].
+        number: number of the trial.
+        replaces: state of the trial when the entry was made, see `trial_state_hash`.
+        outcome: outcome; None removes an entry.
+        time: time of the click, ISO 8601 with time zone.
+        operator, note: the operator and remarks.
+        width_mm: final distance between the pads [mm].
     """
 
     number: int
@@ -53,8 +53,8 @@ class LabBook:
     """Reads and writes a trials file; every method may be called from any thread.
 
     Args:
-        runs: of the file.
-        show_simulated: whether the page may tell what was simulated.
+        runs: runs of the file.
+        show_simulated: whether the page may show simulated outcomes.
     """
 
     def __init__(self, runs: TriedRuns, *, show_simulated: bool = False) -> None:
@@ -65,23 +65,23 @@ class LabBook:
         self._cached: tuple[object, TrialSheet, str] | None = None
 
     def sheet(self) -> TrialSheet:
-        """What the file holds now.
+        """Present contents of the file.
 
         Raises:
-            DocumentError: it cannot be read, which may pass: somebody may be editing it.
-            InvalidInputError: it is another plan by now.
+            DocumentError: the file cannot be read, perhaps only now while somebody edits it.
+            InvalidInputError: the file has another plan by now.
         """
         return self.sheet_and_version()[0]
 
     def enter(self, entry: LabEntry) -> RealTrial:
-        """Writes an entry; it is on the disk when this returns.
+        """Writes an entry to the disk.
 
         Returns:
-            The trial as it stands then.
+            The trial with the entry.
 
         Raises:
-            TrialChanged: the trial is neither as `entry.replaces` says nor as the entry says, and
-                the entry was never written before.
+            TrialChanged: the trial is neither in the state `entry.replaces` nor as the entry says,
+                and the entry was never written before.
             BurgError: there is no such trial, or the file cannot be read or written.
         """
         with self._lock:
@@ -100,9 +100,9 @@ class LabBook:
                 except TrialChanged as changed:  # by another program, since it was read
                     trial = changed.trial
 
-    def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
-        """Enters what was seen before a trial, be it carried out meanwhile or not; what people
-        entered stays.
+    def record_photo(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
+        """Enters photo and placement from before a trial, even if it was carried out meanwhile;
+        keeps other entries.
 
         Raises:
             BurgError: as for `enter`.
@@ -111,10 +111,10 @@ class LabBook:
             return self.book.record(number, correct=True, photo=photo, placement=placement)
 
     def require_open(self, number: int) -> RealTrial:
-        """The trial; refuses a photo of what was before one that is over.
+        """Returns a trial without an outcome, which may still get a photo.
 
         Raises:
-            InvalidInputError: the trial has an outcome; or there is none of that number.
+            InvalidInputError: the trial has an outcome or does not exist.
         """
         trial = self.sheet().trial(number)
         if trial.outcome is not None:
@@ -124,7 +124,7 @@ class LabBook:
         return trial
 
     def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
-        """Whether the entry is in the file, or was until something else was entered."""
+        """Whether the entry is in the file, or was there before a later entry."""
         if all(getattr(trial, name) == value for name, value in values.items()):
             return True
         if trial_state_hash(trial) == entry.replaces or entry.outcome is None:
@@ -137,7 +137,7 @@ class LabBook:
         )
 
     def sheet_and_version(self) -> tuple[TrialSheet, str]:
-        """What the file holds now, and a text that changes with it; raises as `sheet` does."""
+        """Contents of the file, and a version text that changes with it; raises as `sheet` does."""
         path = Path(self.runs.path)
         try:
             status = path.stat()
@@ -162,7 +162,7 @@ def _conflict(trial: RealTrial) -> TrialChanged:
 
 
 def _entered_values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
-    """Fields of the trial that an entry sets."""
+    """Fields of a trial set by an entry."""
     effort = None if trial.robot is None else trial.robot.effort_n
     known = entry.width_mm is not None or effort is not None
     robot = RobotReport(width_mm=entry.width_mm, effort_n=effort) if known else None
@@ -178,19 +178,19 @@ def _entered_values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
 
 
 def plan_hash(sheet: TrialSheet) -> str:
-    """Short hash of what is to be tried, whatever was entered."""
+    """Short hash of the plan, without entries."""
     trials = [f"{t.number} {t.run} {t.grasp} {t.content}" for t in sheet.trials]
     return content_hash(sheet.created, [run.hash for run in sheet.runs.values()], trials)[:12]
 
 
 def trial_state_hash(trial: RealTrial) -> str:
-    """Short hash of what people have entered for a trial."""
+    """Short hash of the values entered by people for a trial."""
     values = entered_values(trial)
     return content_hash({k: str(values.get(k)) for k in OPERATOR_FIELDS})[:12]
 
 
 def plan_data(lab: LabBook) -> dict[str, Any]:
-    """What does not change, for the page."""
+    """The unchanging data of the plan for the page."""
     sheet, runs = lab.runs.sheet, lab.runs
     return {
         "plan": lab.plan,
@@ -226,7 +226,7 @@ def plan_data(lab: LabBook) -> dict[str, Any]:
 
 
 def entry_data(trial: RealTrial) -> dict[str, Any]:
-    """What was entered for a trial, for the page."""
+    """Entered values of a trial for the page."""
     return {
         "number": trial.number,
         "state": trial_state_hash(trial),
@@ -249,7 +249,7 @@ def _placement_data(place: ObjectPlace) -> dict[str, Any]:
 
 
 def entry_states(lab: LabBook) -> dict[str, Any]:
-    """What has been entered so far, for the page; says so if the file cannot be read just now."""
+    """Entries of all trials for the page, or a message if the file cannot be read just now."""
     try:
         sheet, version = lab.sheet_and_version()
     except BurgError as error:

@@ -37,7 +37,7 @@ OpenSource = Callable[[Scene], FrameSource]
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The live view of one scene; pictures of different views have different epochs."""
+    """Live view of one scene; every view has its own epoch."""
 
     epoch: int
     scene: Scene
@@ -50,8 +50,8 @@ class LabCamera:
     Args:
         lab: the trials.
         open_source: opens the camera over a scene.
-        intrinsics: of the camera.
-        print_scale: size of the printed boards against the documents', along x and y.
+        intrinsics: intrinsics of the camera.
+        print_scale: printed size of the boards relative to the documents', along x and y.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class LabCamera:
         self._shown = self._drawn = 0
 
     def watch(self, number: int) -> None:
-        """Looks at the scene of a trial from now on; offsets of another trial are no longer drawn.
+        """Switches the view to the scene of a trial, and hides offsets of other trials.
 
         Raises:
             BurgError: there is no such trial, or the camera cannot be opened.
@@ -106,10 +106,10 @@ class LabCamera:
             view, self._view = self._view, None
             if view is not None:
                 view.live.close()
-            self.wait_for_check()  # OpenCV must not be at work when Python ends
+            self.wait_for_check()  # OpenCV must not be running when Python ends
 
     def next_picture(self, epoch: int, after: int, seconds: float) -> tuple[int, Picture] | None:
-        """The newest picture, as soon as it is another one than that of this epoch and number."""
+        """Waits for a picture newer than the one of this epoch and number."""
         view = self._view
         if view is None:
             time.sleep(min(seconds, 0.2))
@@ -119,20 +119,20 @@ class LabCamera:
 
     @property
     def is_checking(self) -> bool:
-        """A placement check is at work."""
+        """Whether a placement check is running."""
         return self._check is not None and self._check.is_alive()
 
     def check(self, number: int, *, keep: bool) -> None:
-        """Measures in a thread of its own how the objects of the newest picture stand.
+        """Starts a thread that measures the object poses in the newest picture.
 
         Args:
-            number: of the trial that it is for.
-            keep: enter photo and placement for the trial when the check ends, also if it has an
-                outcome by then: the photo is from before. One that has an outcome already keeps
-                what it has.
+            number: number of the trial.
+            keep: whether to save photo and placement for the trial after the check, even if it gets
+                an outcome meanwhile, as the photo is older. A trial with an outcome stays
+                unchanged.
 
         Raises:
-            BurgError: there is no picture with a pose, or a check is at work.
+            BurgError: there is no picture with a pose, or a check is running.
         """
         self.watch(number)
         with self._lock:
@@ -159,12 +159,12 @@ class LabCamera:
             self._check.start()
 
     def wait_for_check(self, seconds: float | None = None) -> None:
-        """Until the placement check that is at work, if any, is done."""
+        """Waits for the running placement check, if any."""
         if self._check is not None:
             self._check.join(seconds)
 
     def status(self) -> dict[str, Any]:
-        """What the page shows beside the picture."""
+        """Status for the page, shown beside the picture."""
         view = self._view
         if view is None:
             return {"scene": "", "line": "", "checking": False, "check": None, "drawn": 0}
@@ -183,14 +183,14 @@ class LabCamera:
         }
 
     def _running_check(self) -> dict[str, Any] | None:
-        """Which trial a check is at work for, and whether it is kept."""
+        """Trial of the running check, and whether its result is kept."""
         measuring = self._measuring
         if measuring is None or not self.is_checking:
             return None
         return {"number": measuring[0], "keep": measuring[1]}
 
     def _why_not_kept(self, number: int) -> str:
-        """Why a photo that is taken now is not kept; empty if it is."""
+        """Reason why a photo taken now is not kept; empty if it is kept."""
         try:
             self._lab.require_open(number)
         except BurgError as error:
@@ -198,7 +198,7 @@ class LabCamera:
         return ""
 
     def _show_offsets(self, view: _View, number: int, check: PlacementCheck) -> None:
-        """Draws offsets of a trial, if it is the one that is shown."""
+        """Draws offsets of a trial if it is shown."""
         with self._drawing:
             if self._shown == number:
                 view.live.placement, self._drawn = check, number
@@ -232,11 +232,11 @@ class LabCamera:
             photo = Path(folder) / "photo.png"
             write_image(photo, located.frame.image)
             name = save_photo_and_placement(path, number, photo=photo, check=check)
-        self._lab.photographed(number, name, summarize_placements(check))
+        self._lab.record_photo(number, name, summarize_placements(check))
 
 
 def _offset_row(placed: Placement) -> dict[str, Any]:
-    """How far an object is off, for the page; within the overlay's tolerance or not."""
+    """Offset of an object for the page, and whether it is within the overlay's tolerance."""
     style = OverlayStyle()
     off = None if placed.displacement is None else math.hypot(*placed.displacement)
     turn = placed.angle

@@ -64,12 +64,12 @@ HAND_BODY = "hand"  # Name of the hand in pictures.
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A shape that may be in pictures, several times in one.
+    """A shape for pictures, which may contain it several times.
 
     Attributes:
-        key: tells it from all other bodies.
-        shape: what it looks like.
-        color: None for the shape's own.
+        key: unique key of the body.
+        shape: visual shape.
+        color: colour; None for the shape's own.
     """
 
     key: str
@@ -79,12 +79,12 @@ class DrawnBody:
 
 @dataclass(frozen=True, eq=False)
 class PlacedBody:
-    """A body where it is.
+    """A body with a pose.
 
     Attributes:
-        name: of the instance that it is of, `hand`, or `ground`.
-        body: what it looks like.
-        X_SB: (4, 4) where it is.
+        name: name of its instance, `hand`, or `ground`.
+        body: the body.
+        X_SB: (4, 4) its pose in the scene frame.
     """
 
     name: str
@@ -93,15 +93,15 @@ class PlacedBody:
 
 
 class SceneBodies:
-    """The bodies of a scene on a station, the hand among them.
+    """Bodies of a scene on a station, including the hand.
 
     Args:
-        scene: what stands on the board.
-        station: what is around it.
+        scene: the scene.
+        station: the station.
 
     Attributes:
         scene, station: as given.
-        standing: all that stays where it is.
+        standing: all bodies except the hand.
 
     Raises:
         UnknownNameError: a mesh file of the library is missing.
@@ -119,7 +119,7 @@ class SceneBodies:
 
         Args:
             X_SG: (4, 4) the grasp.
-            width: distance between the pads [m]; the hand is open if it is NaN.
+            width: distance between the pads [m]; NaN for the open hand.
         """
         hand = self.station.hand
         low, high = hand.opening
@@ -178,7 +178,7 @@ def _hand_body(station: Station, number: int, visual: HandVisual) -> DrawnBody:
 
 
 def count_bodies(pictures: Sequence[Sequence[PlacedBody]]) -> dict[str, tuple[DrawnBody, int]]:
-    """Each body in some pictures, and how often it is in a single picture at most."""
+    """Bodies of some pictures, with the maximum number of each in a single picture."""
     found: dict[str, tuple[DrawnBody, int]] = {}
     for picture in pictures:
         counts: dict[str, int] = {}
@@ -196,7 +196,7 @@ PICTURE_BACKGROUND = (0.953, 0.961, 0.969)  # RGB from 0 to 1.
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """From where a picture is seen.
+    """Camera of a picture.
 
     Attributes:
         X_SC: (4, 4) camera's optical frame in the scene frame.
@@ -207,7 +207,7 @@ class Viewpoint:
     intrinsics: Intrinsics
 
     def project(self, p_SQ: Array) -> Array:
-        """(..., 2) pixels of points (..., 3) before the camera, in S [m]."""
+        """(..., 2) pixels of points (..., 3) in S [m] in front of the camera."""
         return self.intrinsics.project(transform_points(inverse(self.X_SC), p_SQ))
 
 
@@ -217,14 +217,14 @@ class Painting:
 
     Attributes:
         color: (H, W, 3) RGB.
-        owner: (H, W) index of the placed body that each pixel shows, `NO_BODY` where there is none.
+        owner: (H, W) index of the placed body at each pixel, `NO_BODY` if there is none.
     """
 
     color: NDArray[np.uint8]
     owner: NDArray[np.int32]
 
     def visible_pixels(self, placed: Sequence[PlacedBody], name: str) -> NDArray[np.bool_]:
-        """(H, W) whether each pixel shows a body of this name."""
+        """(H, W) mask of the pixels that show a body of this name."""
         mine = [i for i, one in enumerate(placed) if one.name == name]
         return np.isin(self.owner, mine)
 
@@ -233,12 +233,14 @@ class Painter(Protocol):
     """Paints pictures of bodies."""
 
     def paint(self, placed: Sequence[PlacedBody], view: Viewpoint) -> Painting:
-        """A picture of bodies from a viewpoint."""
+        """Renders bodies from a viewpoint."""
         ...
 
 
 def supersampled_intrinsics(intrinsics: Intrinsics, times: int) -> Intrinsics:
-    """The same camera with `times` times as many pixels each way; pixel centres at integers."""
+    """The same camera with `times` times as many pixels in each direction; pixel centres are at
+    integers.
+    """
     (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
     return Intrinsics(
         width=times * intrinsics.width,
@@ -249,7 +251,7 @@ def supersampled_intrinsics(intrinsics: Intrinsics, times: int) -> Intrinsics:
 
 
 class RayPainter:
-    """Paints any bodies."""
+    """Paints any bodies by ray casting."""
 
     def __init__(self) -> None:
         self._triangles: dict[str, Triangles] = {}
@@ -309,10 +311,10 @@ def _body_colors(placed: Sequence[PlacedBody]) -> list[tuple[float, float, float
 
 
 class VtkPainter:
-    """Paints any of the bodies that it was made for.
+    """Paints bodies of a fixed stock by VTK.
 
     Args:
-        stock: by key, each body and how often it may be in one picture.
+        stock: by key, each body and its maximum number in one picture.
 
     Raises:
         MissingDependencyError: a system library of the renderer is missing (it would crash).
@@ -380,8 +382,8 @@ class VtkPainter:
             ) from error
 
     def _put(self, placed: Sequence[PlacedBody]) -> list[tuple[str, int]]:
-        """Poses everything; which frame each placed body has."""
-        # Of bodies that the picture does not show, beyond the camera's range.
+        """Poses all bodies; returns the frame of each placed body."""
+        # Pose of hidden bodies, beyond the camera's range.
         hidden_pose = RigidTransform([0.0, 0.0, -1e4])
         poses, used, counts = FramePoseVector(), [], dict[str, int]()
         for one in placed:

@@ -37,10 +37,10 @@ def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated
     """The card of a trial.
 
     Args:
-        trial: as it stands in the file.
-        runs: of the file.
+        trial: the trial.
+        runs: runs of the trials file.
         picture: JPEG of its grasp.
-        show_simulated: whether it tells what was simulated.
+        show_simulated: whether to show the simulated outcome.
     """
     alt = f"the hand at the grasp of trial {trial.number}, on {trial.instance}"
     name = trial.instance
@@ -76,7 +76,7 @@ def _grasp_description(trial: RealTrial, runs: TriedRuns, show_simulated: bool) 
 
 
 def _outcome_boxes(outcome: RealOutcome | None) -> Html:
-    """A box for each outcome of the short list, and a line for others."""
+    """Check boxes for the listed outcomes, and a line for others."""
     ticked, empty = element("i", "✕"), element("i", "")
     items = [
         element("li", ticked, label, class_="chosen")
@@ -111,11 +111,11 @@ def _entry_lines(trial: RealTrial) -> Html:
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """What is on the page beside the trials.
+    """Options of the protocol page.
 
     Attributes:
-        show_simulated: what was simulated.
-        printouts: by block, address of the printed board.
+        show_simulated: whether to show simulated outcomes.
+        printouts: address of the printed board by block.
     """
 
     show_simulated: bool = False
@@ -128,9 +128,9 @@ def sheet_page(
     """The page.
 
     Args:
-        runs: of the trials file.
-        pictures: of its trials.
-        options: the usual ones if None.
+        runs: runs of the trials file.
+        pictures: pictures of its trials.
+        options: options; the defaults if None.
     """
     options = options or SheetOptions()
     blocks = trials_by_block(runs.sheet)
@@ -226,7 +226,7 @@ def _image(data: bytes, alt: str, size: tuple[int, int]) -> Html:
 
 
 def _placement_table(scene: Scene) -> Html:
-    """Where each object stands."""
+    """Table of the objects' poses on the board."""
     rows = []
     for name in (*scene.background, *scene.instances):
         X_SO, thing = scene.X_SO(name), scene.instance(name).object

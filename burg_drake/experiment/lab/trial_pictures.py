@@ -1,8 +1,8 @@
 """Pictures of trials: each grasp on its scene, and the set-up of each block.
 
 One painter makes all pictures; it belongs to the thread that created it. Pictures depend on the
-grasps alone, so that they can be reproduced. The near edge of the board is y = 0, as the operator
-sees it; a camera looks from the side where the view from the front is blocked.
+grasps alone, so they are reproducible. The edge of the board nearest to the operator is y = 0; a
+camera looks from the side if the view from the front is blocked.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PICTURE_HALF_VIEW = 0.24  # Tangent of half the vertical angle of view.
 
 @dataclass(frozen=True, eq=False)
 class ViewedGrasp:
-    """A grasp to be looked at, in S [m].
+    """A grasp to be shown, in S [m].
 
     Attributes:
         X_SG: (4, 4) the grasp.
@@ -57,7 +57,7 @@ class ViewedGrasp:
 
 
 def pinhole(size: tuple[int, int], half_view: float = PICTURE_HALF_VIEW) -> Intrinsics:
-    """A camera by its image size and the tangent of half its vertical angle of view."""
+    """Pinhole intrinsics from image size and the tangent of half the vertical angle of view."""
     width, height = size
     focal = height / 2.0 / half_view
     center = ((width - 1) / 2.0, (height - 1) / 2.0)
@@ -65,7 +65,7 @@ def pinhole(size: tuple[int, int], half_view: float = PICTURE_HALF_VIEW) -> Intr
 
 
 def camera_direction(azimuth: float, elevation: float) -> Array:
-    """(3,) where a camera looks, in S."""
+    """(3,) viewing direction of a camera in S."""
     level = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     return np.cos(elevation) * level - np.array([0.0, 0.0, np.sin(elevation)])
 
@@ -73,30 +73,30 @@ def camera_direction(azimuth: float, elevation: float) -> Array:
 def grasp_viewpoint(
     subject: ViewedGrasp, scene: RayCaster, hand: RayCaster, X_HS: Array, size: tuple[int, int]
 ) -> Viewpoint:
-    """The viewpoint from which a grasp shows most.
+    """The viewpoint that shows most of a grasp.
 
     Args:
         subject: the grasp.
-        scene: all that stands on the board, in S.
-        hand: the hand, in a frame of its own.
-        X_HS: (4, 4) S in that frame.
+        scene: ray caster of the objects, in S.
+        hand: ray caster of the hand, in its own frame H.
+        X_HS: (4, 4) S in H.
         size: width and height of the picture [pixel].
     """
     # Radians from the front of the board, positive to the right.
     azimuths = np.deg2rad(np.array([0.0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180]))
-    elevations = np.deg2rad(np.array([28.0, 48.0]))  # Radians by which cameras look down.
+    elevations = np.deg2rad(np.array([28.0, 48.0]))  # Downward angles of the cameras [rad].
     candidates = [(a, e) for e in elevations for a in azimuths]
     chosen = max(candidates, key=lambda c: _viewpoint_score(subject, scene, hand, X_HS, *c))
     return fit_viewpoint(np.vstack([subject.target, subject.hand]), camera_direction(*chosen), size)
 
 
 def fit_viewpoint(points: Array, forward: Array, size: tuple[int, int]) -> Viewpoint:
-    """The nearest viewpoint in a direction that has all points (N, 3) in view."""
+    """The nearest viewpoint that looks in a direction and has all points (N, 3) in view."""
     return _nearest_viewpoint(points, camera_rotation_along(forward), size, PICTURE_HALF_VIEW)
 
 
 def viewpoint_from_above(points: Array, size: tuple[int, int]) -> Viewpoint:
-    """From straight above; the board's far edge is at the top of the picture."""
+    """Viewpoint from straight above; the board's far edge is at the top of the picture."""
     half_view = 0.06  # Tangent of half the vertical angle: hardly any perspective.
     return _nearest_viewpoint(points, np.diag([1.0, -1.0, -1.0]), size, half_view)
 
@@ -120,7 +120,7 @@ def _viewpoint_score(
     finger_weight = 0.7  # Weight of visible fingers, relative to the visible target.
     side_by_side_weight = 0.5  # Weight of a view across the closing direction.
     front_weight = 0.25  # Weight of a view from the front of the board.
-    samples = 80  # Points of the target that are tested.
+    samples = 80  # Number of tested points of the target.
     forward = camera_direction(azimuth, elevation)
     step = max(1, len(subject.target) // samples)
     target, fingers = subject.target[::step], _finger_points(subject)
@@ -145,7 +145,9 @@ def _finger_points(subject: ViewedGrasp) -> Array:
 
 
 def _are_unobstructed(rays: RayCaster, points: Array, direction: Array) -> np.ndarray:
-    """(N,) whether nothing is in the way from points in a direction; little starts off them."""
+    """(N,) whether rays from points in a direction are unobstructed; they start slightly off the
+    surface.
+    """
     face, _ = rays.first_hits(points + 1e-3 * direction, np.tile(direction, (len(points), 1)))
     return np.asarray(face < 0)
 
@@ -155,7 +157,7 @@ TARGET_RIM_COLOR = (230, 60, 0)
 
 
 def mark_target(painting: Painting, placed: Sequence[PlacedBody], target: str) -> Bytes:
-    """(H, W, 3) the picture with a rim around what is seen of the target, and others paler."""
+    """(H, W, 3) the picture with an outline around the visible target, and other bodies paler."""
     rim_width_share = 1 / 150  # Of the picture's height.
     fading = 0.45  # Blend towards white of bodies other than the target and the hand.
     mine, hand = painting.visible_pixels(placed, target), painting.visible_pixels(placed, HAND_BODY)
@@ -175,9 +177,9 @@ def write_names(
     """(H, W, 3) the picture with the names of the objects.
 
     Args:
-        painting: of them.
-        placed: what it shows.
-        marked: names that stand out.
+        painting: picture of the objects.
+        placed: bodies of the picture.
+        marked: highlighted names.
     """
     min_pixels = 30  # Objects with fewer visible pixels get no name.
     letter_height_share = 0.042  # Of the picture's height.
@@ -201,7 +203,7 @@ def write_names(
 def add_shadows(
     painting: Painting, placed: Sequence[PlacedBody], view: Viewpoint, hulls: Sequence[Array]
 ) -> Painting:
-    """The picture with soft shadows of convex pieces (N, 3) in S on the ground."""
+    """Adds soft shadows of convex pieces (N, 3) in S on the ground to a picture."""
     size = np.array([view.intrinsics.width, view.intrinsics.height])
     ahead = [hull for hull in hulls if _is_before_camera(hull, view)]
     light = painted_shadow(ahead, view.X_SC, view.intrinsics.focal[0], size)
@@ -211,14 +213,14 @@ def add_shadows(
 
 
 def _is_before_camera(hull: Array, view: Viewpoint) -> bool:
-    """Whether a piece and its shadow are before the camera."""
+    """Whether a piece and its shadow are in front of the camera."""
     ground = np.vstack([hull, hull * [1.0, 1.0, 0.0]])
     X_CS = inverse(view.X_SC)
     return bool((ground @ X_CS[2, :3] + X_CS[2, 3] > 0.01).all())
 
 
 def encode_picture(image: Bytes) -> bytes:
-    """A picture (H, W, 3) as a file."""
+    """Encodes a picture (H, W, 3) as a file."""
     quality = 82  # Per cent.
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
     _, data = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), options)
@@ -235,21 +237,21 @@ class TrialPictures:
     """Makes the pictures of a trials file.
 
     Args:
-        runs: of the file.
-        rays: paint by rays, even where Drake's renderer has its libraries.
+        runs: runs of the file.
+        rays: use ray casting even if Drake's renderer is available.
 
     Raises:
-        InvalidInputError: a run or grasp is gone, or Drake cannot load a mesh.
+        InvalidInputError: a run or grasp is missing, or Drake cannot load a mesh.
     """
 
     def __init__(self, runs: TriedRuns, *, rays: bool = False) -> None:
         self.runs = runs
-        self._scenes: dict[str, _Scenery] = {}
+        self._scenes: dict[str, _SceneGeometry] = {}
         shown = []
         for trial in runs.sheet.trials:
             if trial.run not in self._scenes:
                 tried = runs.of(trial)
-                self._scenes[trial.run] = _Scenery(SceneBodies(tried.scene, tried.station))
+                self._scenes[trial.run] = _SceneGeometry(SceneBodies(tried.scene, tried.station))
                 shown.append(self._scenes[trial.run].with_hand(np.eye(4), np.nan))
         self._painter: Painter
         if rays or missing_render_libraries():
@@ -260,8 +262,9 @@ class TrialPictures:
     def paint_grasp(
         self, trial: RealTrial, size: tuple[int, int] = GRASP_PICTURE_SIZE
     ) -> tuple[Painting, tuple[PlacedBody, ...], Viewpoint]:
-        """The hand at a trial's grasp among the objects, what of it each pixel shows, and from
-        where."""
+        """Picture of the hand at a trial's grasp among the objects, its placed bodies, and the
+        viewpoint.
+        """
         scenery, X_SG = self._scenes[trial.run], self.runs.X_SG(trial)
         width = self.runs.width(trial)
         view = scenery.viewpoint(trial.instance, X_SG, width, size)
@@ -271,7 +274,7 @@ class TrialPictures:
         return add_shadows(painting, placed, view, hulls), placed, view
 
     def grasp(self, trial: RealTrial, size: tuple[int, int] = GRASP_PICTURE_SIZE) -> bytes:
-        """JPEG of the hand at a trial's grasp among the objects; the target has a rim."""
+        """JPEG of the hand at a trial's grasp among the objects; the target is outlined."""
         painting, placed, _ = self.paint_grasp(trial, size)
         return encode_picture(mark_target(painting, placed, trial.instance))
 
@@ -279,7 +282,7 @@ class TrialPictures:
         self, trial: RealTrial, size: tuple[int, int] = SETUP_PICTURE_SIZE
     ) -> tuple[bytes, bytes]:
         """JPEGs of the scene of a trial without a hand, from above and from the front."""
-        front_elevation = np.deg2rad(33.0)  # Radians by which the camera in front looks down.
+        front_elevation = np.deg2rad(33.0)  # Downward angle of the front camera [rad].
         scenery = self._scenes[trial.run]
         standing = scenery.bodies.standing
         front = fit_viewpoint(scenery.corners, camera_direction(0.0, front_elevation), size)
@@ -292,8 +295,8 @@ class TrialPictures:
         return pictures[0], pictures[1]
 
 
-class _Scenery:
-    """A scene's bodies, with what is computed of them once."""
+class _SceneGeometry:
+    """Bodies of a scene, with cached geometry."""
 
     def __init__(self, bodies: SceneBodies) -> None:
         self.bodies = bodies
@@ -325,7 +328,7 @@ class _Scenery:
 
     @cached_property
     def corners(self) -> Array:
-        """(N, 3) corners of the sheet and of all that stands on it, in S [m]."""
+        """(N, 3) corners of the board and of the objects on it, in S [m]."""
         x, y = self.bodies.scene.board.size
         sheet = np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0], [x, y, 0.0]])
         return np.vstack([sheet, *self.hulls])
@@ -338,7 +341,7 @@ class _Scenery:
 
     @cached_property
     def _hand_rays(self) -> RayCaster:
-        """The open hand, in the frame of the grasp."""
+        """Ray caster of the open hand, in the grasp frame."""
         vertices, faces, _ = RayPainter().joined(self.bodies.hand(np.eye(4), np.nan))
         return RayCaster(vertices, faces)
 
@@ -349,7 +352,7 @@ class PictureCache:
     Pictures are called `grasp/NUMBER`, of a trial, and `above/BLOCK` and `front/BLOCK`.
 
     Args:
-        runs: of the trials file.
+        runs: runs of the trials file.
     """
 
     def __init__(self, runs: TriedRuns) -> None:
@@ -364,7 +367,7 @@ class PictureCache:
 
     @property
     def names(self) -> list[str]:
-        """Of all pictures, in the order in which they are needed."""
+        """Names of all pictures, in the order in which they are needed."""
         found, setup = [], set[int]()
         for number in sorted(self._trials):
             block = self._trials[number].block
@@ -383,7 +386,7 @@ class PictureCache:
             self._thread.join()
 
     def get(self, name: str, seconds: float) -> bytes | None:
-        """A picture as JPEG; None if there is none of that name, or it takes longer.
+        """A picture as JPEG; None if the name does not exist, or after a timeout in seconds.
 
         Raises:
             InvalidInputError: pictures cannot be made.
@@ -405,7 +408,7 @@ class PictureCache:
 
     @property
     def fault(self) -> str:
-        """Why there are no pictures; empty if there are."""
+        """Error that prevents pictures; empty if there is none."""
         return self._fault
 
     @property
@@ -419,14 +422,14 @@ class PictureCache:
             while (name := self._next_name(ahead)) is not None:
                 if name not in self._made:
                     self._store(self._make(pictures, name))
-            del pictures  # the renderer ends in the thread that it began in
+            del pictures  # the renderer must end in the thread that created it
         except BurgError as error:
             with self._changed:
                 self._fault = str(error)
                 self._changed.notify_all()
 
     def _next_name(self, ahead: deque[str]) -> str | None:
-        """The picture to be made next; waits until one is wanted. None at the end."""
+        """Name of the next picture to make; waits until one is wanted. None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._wanted or ahead)
             if self._closed:

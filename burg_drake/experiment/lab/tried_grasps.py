@@ -34,11 +34,11 @@ MAIN_OUTCOMES: dict[RealOutcome, tuple[str, str]] = {
 }
 """Label and meaning of the outcomes with the keys 1 to 9 and 0."""
 VERTICAL_TOLERANCE = math.radians(8.0)
-"""Radians from vertical within which an approach comes from no side."""
+"""Angle from vertical within which an approach counts as from above [rad]."""
 
 
 def approach_text(X_SG: Array) -> str:
-    """From where the hand of a grasp (4, 4) in S comes, in words."""
+    """Description of the approach direction of a grasp (4, 4) in S."""
     sides = (  # in steps of 45 degrees from +x
         *("right", "far right", "far side", "far left"),
         *("left", "near left", "near side", "near right"),
@@ -57,7 +57,7 @@ def approach_text(X_SG: Array) -> str:
 
 
 def closing_text(X_SG: Array) -> str:
-    """Along which line the fingers close, as an angle from x on the board, seen from above."""
+    """Closing direction of the fingers as an angle from x on the board, seen from above."""
     x, y, z = X_SG[:3, 0]
     if math.hypot(x, y) < math.sin(VERTICAL_TOLERANCE):
         return "upright"
@@ -67,23 +67,23 @@ def closing_text(X_SG: Array) -> str:
 
 
 def point_text(X_SG: Array) -> str:
-    """Where a grasp is on the board [mm]."""
+    """Position of a grasp on the board [mm], as text."""
     x, y, z = (round(1e3 * float(v)) for v in X_SG[:3, 3])
     return f"x {x}, y {y}, z {z} mm"
 
 
 def format_time(text: str) -> str:
-    """A moment (ISO 8601) as people write it; empty if there is none."""
+    """Displayed form of a time (ISO 8601); empty if there is none."""
     return text.replace("T", " ")[:16]
 
 
 @dataclass(frozen=True, eq=False)
 class TriedScene:
-    """What the trials of a run are carried out on.
+    """Run, scene and station of some trials.
 
     Attributes:
-        run: on the disk.
-        scene, station: as they were judged.
+        run: the run on disk.
+        scene, station: scene and station of the run.
     """
 
     run: Run
@@ -97,10 +97,10 @@ class TriedScene:
 
 
 class TriedRuns:
-    """The runs of a trials file.
+    """Runs of a trials file.
 
     Args:
-        path: of the trials file.
+        path: the trials file.
         moved: folders of runs in place of those in the file, by key.
 
     Attributes:
@@ -108,8 +108,8 @@ class TriedRuns:
         sheet: the file's contents when it was opened.
 
     Raises:
-        BurgError: the file does not fit the schema or has no trials; a run or a grasp is gone, or
-            not the one that was planned with.
+        BurgError: the file does not fit the schema or has no trials; a run or a grasp is missing or
+            differs from the plan.
     """
 
     def __init__(self, path: str | Path, moved: Mapping[str, str | Path] | None = None) -> None:
@@ -126,7 +126,7 @@ class TriedRuns:
         }
 
     def of(self, trial: RealTrial) -> TriedScene:
-        """What a trial is carried out on."""
+        """Run, scene and station of a trial."""
         return self._tried[trial.run]
 
     def candidate(self, trial: RealTrial) -> Candidate:
@@ -134,12 +134,12 @@ class TriedRuns:
         return self.of(trial).candidates[trial.grasp]
 
     def X_SG(self, trial: RealTrial) -> Array:
-        """(4, 4) the grasp of a trial on the board."""
+        """(4, 4) the grasp of a trial in the scene frame."""
         candidate = self.candidate(trial)
         return self.of(trial).scene.X_SO(candidate.instance) @ candidate.X_OG
 
     def width(self, trial: RealTrial) -> float:
-        """Distance between the pads at the grasp [m]; that of the open hand if it is unknown."""
+        """Distance between the pads at the grasp [m]; of the open hand if unknown."""
         width = self.candidate(trial).width
         return float(self.of(trial).station.hand.opening[1]) if math.isnan(width) else width
 

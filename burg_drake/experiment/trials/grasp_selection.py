@@ -46,9 +46,9 @@ class EligibleGrasps:
     """Grasps of one run to choose from.
 
     Attributes:
-        key: of the run.
+        key: key of the run.
         run: the run.
-        rows: (N,) their rows in its results.
+        rows: (N,) rows of the grasps in its results.
     """
 
     key: str
@@ -61,7 +61,7 @@ class EligibleGrasps:
         return self.run.document.scene.content
 
     def cells(self, name: str) -> NDArray[Any]:
-        """(N,) cells of a column of the results."""
+        """(N,) values of a column of the results."""
         return np.asarray(self.run.results[name][self.rows])
 
 
@@ -72,7 +72,7 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
         given: runs, of one scene or of many, or their folders.
 
     Raises:
-        InvalidInputError: there is no run, nothing is judged yet, or a run is given in two copies.
+        InvalidInputError: there is no run, a run has no verdicts yet, or is given in two copies.
     """
     runs: dict[str, Run] = {}
     places = []
@@ -104,13 +104,13 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
 def list_eligible_grasps(
     runs: dict[str, Run], among: Among
 ) -> tuple[list[EligibleGrasps], list[str]]:
-    """What there is to choose from in each run, and what people should know about it.
+    """Eligible grasps of each run, and notes about them.
 
     A grasp that several runs have judged on the same scene and station is one; it belongs to the
-    run that asked most of it: mode `arm` before `reach` before `hand`.
+    run that checks most: mode `arm` before `reach` before `hand`.
 
     Raises:
-        InvalidInputError: reachable grasps are wanted of a run that asked no arm.
+        InvalidInputError: reachable grasps are wanted of a run without an arm.
     """
     notes: list[str] = []
     pools = []
@@ -159,7 +159,7 @@ def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGr
 
 
 def _shared_worlds(runs: dict[str, Run]) -> set[tuple[str, str]]:
-    """Scenes and stations that several runs are about."""
+    """Scenes and stations shared by several runs."""
     worlds = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
     return {world for world in worlds if worlds.count(world) > 1}
 
@@ -181,15 +181,15 @@ def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
 def stratum_labels(
     pool: EligibleGrasps, selection: Selection, probability: Callable[[Run], Mapping[str, float]]
 ) -> NDArray[np.str_]:
-    """(N,) the stratum of each grasp within its object; empty where it has none.
+    """(N,) stratum of each grasp within its object; empty if it has none.
 
     Args:
         pool: the grasps.
-        selection: what they are balanced by.
-        probability: gives the predicted probability of success by grasp id.
+        selection: settings with the balance.
+        probability: returns the predicted probability of success by grasp id.
 
     Raises:
-        InvalidInputError: the run has no such margin.
+        InvalidInputError: the run lacks the margin.
     """
     if selection.balance == "none":
         return np.full(len(pool.rows), "all")
@@ -219,10 +219,10 @@ def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]
 
     Args:
         run: the run.
-        table: what `robustness` has written; the one in the run's folder if None.
+        table: table written by `robustness`; the one in the run's folder if None.
 
     Raises:
-        InvalidInputError: there is no such table, it has no such shares, or it is of another run.
+        InvalidInputError: the table is missing, lacks these shares, or belongs to another run.
     """
     found = find_robustness_table(run.path) if table is None else table
     if found is None:
@@ -237,12 +237,13 @@ def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]
 def allocate_to_strata(
     populations: Mapping[str, int], wanted: int, first: Sequence[str]
 ) -> dict[str, int]:
-    """How many of each stratum: as evenly as there are enough, together `wanted` if there are.
+    """Number of grasps for each stratum, as even as the populations allow, with the sum `wanted` if
+    there are enough.
 
     Args:
-        populations: by stratum.
-        wanted: in all.
-        first: the strata, those first that get one more where it does not come out even.
+        populations: number of grasps by stratum.
+        wanted: total number.
+        first: the strata in the order in which they get a remainder.
     """
     chosen = dict.fromkeys(populations, 0)
     left = min(wanted, sum(populations.values()))
@@ -264,7 +265,7 @@ def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
 
 
 def _quantile_labels(values: NDArray[np.float64], name: str, bins: int) -> NDArray[np.str_]:
-    """Labels of bins of as equal numbers as equal values, which stay together, allow."""
+    """Labels of bins with about equally many grasps; equal values share a bin."""
     known = np.isfinite(values)
     labels = np.full(len(values), "", dtype=object)
     if known.any():
@@ -279,19 +280,19 @@ def _quantile_labels(values: NDArray[np.float64], name: str, bins: int) -> NDArr
 
 
 MAX_SHORTFALL_ITEMS = 20
-"""Lines, and objects in a line; the rest is counted."""
+"""Maximum number of lines, and of objects in a line; the rest is counted."""
 
 
 @dataclass(frozen=True)
 class Shortfall:
-    """What an object of a run lacks.
+    """Missing grasps of an object of a run.
 
     Attributes:
         run, object: key of the run, and name in the library.
-        kind: what is lacking; objects with the same share a line.
-        counts: how much there is of it, such as `3 of 5`.
-        description: kind and counts together, where all objects of a line have the same; the
-            kind if empty.
+        kind: kind of shortfall; objects with the same kind share a line.
+        counts: available and wanted number, such as `3 of 5`.
+        description: text of kind and counts if all objects of a line have the same; the kind if
+            empty.
     """
 
     run: str
@@ -302,11 +303,12 @@ class Shortfall:
 
 
 def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
-    """What one object lacks that has too few grasps of a stratum, or in all; none if nothing.
+    """Shortfall of one object with too few grasps in a stratum or overall; empty if there are
+    enough.
 
     Args:
-        strata: of the object.
-        wanted: grasps in all.
+        strata: strata of the object.
+        wanted: total number of grasps.
     """
     missing = [s for s in strata if s.selected < s.wanted]
     if not missing:
@@ -325,7 +327,7 @@ def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
 
 
 def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
-    """A line for each kind, with the objects; figures by object where they differ."""
+    """A line for each kind with its objects, and counts by object if they differ."""
     kinds: defaultdict[str, list[Shortfall]] = defaultdict(list)
     for one in found:
         kinds[one.kind].append(one)
@@ -348,11 +350,11 @@ def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
 
 
 Chosen = list[tuple[EligibleGrasps, int, str]]
-"""Grasps with the key of their stratum; a number is a place in the pool."""
+"""Grasps with the key of their stratum; the number is an index into the pool."""
 
 
 def draw_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[EligibleGrasps]:
-    """The pools of as many scenes as are wanted."""
+    """Draws the wanted number of scenes; returns their pools."""
     found = sorted({p.scene for p in pools}, key=lambda s: content_hash(selection.seed, "scene", s))
     if selection.scenes > len(found):
         raise InvalidInputError(
@@ -364,7 +366,7 @@ def draw_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[Eligi
 def select_grasps(
     pools: Sequence[EligibleGrasps], selection: Selection, table: Path | None
 ) -> tuple[dict[str, Stratum], Chosen, list[str]]:
-    """Strata, the grasps chosen, and notes about what is missing."""
+    """Selects grasps; returns strata, chosen grasps, and notes about shortfalls."""
     strata: dict[str, Stratum] = {}
     chosen: Chosen = []
     short: list[Shortfall] = []
@@ -378,7 +380,7 @@ def select_grasps(
             for k in np.flatnonzero((objects == held) & (labels != "")).tolist():
                 members[str(labels[k])].append(k)
             if selection.balance == "outcome":
-                members["success"], members["failure"]  # also without any
+                members["success"], members["failure"]  # create both, even if empty
             if not members:
                 short.append(Shortfall(pool.key, held, "no grasp to choose from"))
                 continue
@@ -416,7 +418,7 @@ def _rare_class_note(chosen: Chosen, selection: Selection) -> list[str]:
 def _make_strata(
     pool: EligibleGrasps, held: str, members: Mapping[str, Sequence[int]], selection: Selection
 ) -> dict[str, Stratum]:
-    """Strata of one object, with how many of each are chosen."""
+    """Strata of one object, with the number of chosen grasps."""
     seed = selection.seed
     first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
     share, more = divmod(selection.per_object, len(first))
@@ -436,6 +438,6 @@ def _make_strata(
 
 
 def _random_order(pool: EligibleGrasps, members: Sequence[int], seed: int) -> list[int]:
-    """Places in a random order that follows from the grasps themselves."""
+    """Shuffles indices in a random order that follows from the grasps themselves."""
     ids = pool.cells("id")
     return sorted(members, key=lambda k: content_hash(seed, "grasp", pool.scene, str(ids[k])))

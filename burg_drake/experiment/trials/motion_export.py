@@ -48,15 +48,15 @@ MOTION_INDEX_FILE = "index.csv"  # Table of the exported motions.
 
 @dataclass(frozen=True)
 class ExportedMotion:
-    """What became of the motion of a trial.
+    """Result of the motion planning for a trial.
 
     Attributes:
         number, block, run, grasp, instance, object: as in `RealTrial`.
         answer: `reachable`, or what hinders the arm.
-        blocker: what is in the way.
-        reason: why there is no answer, or no file of what is reachable.
+        blocker: body in the way.
+        reason: reason for a missing answer, or for a missing file of a reachable grasp.
         file: name of the file; empty if there is none.
-        duration: of the motion, to a millisecond [s]; None without one.
+        duration: duration of the motion, rounded to a millisecond [s]; None without one.
     """
 
     number: int
@@ -74,17 +74,17 @@ class ExportedMotion:
 
 @dataclass(frozen=True)
 class TrialPlans(PlanFolder):
-    """A folder for plans that have other names, and lie elsewhere than their journal.
+    """Folder of plans named by trial, apart from their journal.
 
     Attributes:
         out: folder of the plans.
-        stems: their names without suffix, by grasp id.
+        stems: file names without suffix, by grasp id.
     """
 
     out: Path
     stems: Mapping[str, str]
 
-    def plan(self, id: str) -> Path:
+    def plan_path(self, id: str) -> Path:
         """The file for the plan of a grasp."""
         return self.out / f"{self.stems[id]}.{self.document.format}"
 
@@ -102,24 +102,23 @@ def export_trials(
 ) -> list[ExportedMotion]:
     """Plans the motion of every trial and writes it to a file, as `reach` does.
 
-    The hand moves as in the run that the grasp is from. What an earlier call with the same sheet
-    has finished is kept.
+    The hand moves as in the grasp's run. Results of an earlier call with the same sheet are kept.
 
     Args:
         path: the trials file.
         out: folder for the plans.
-        format: of these.
+        format: file format of the plans.
         station: with the arm; each run's own if None.
-        moved: folders of runs in place of those that the sheet names, by key.
-        retry_failed: try all trials again that an earlier call could not judge.
+        moved: folders of runs in place of the sheet's, by key.
+        retry_failed: repeat all trials that an earlier call could not judge.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
 
     Returns:
-        A row a trial, in the order of the sheet; also in index.csv.
+        One row per trial, in the order of the sheet; also in index.csv.
 
     Raises:
-        InvalidInputError: a run or grasp is gone or has changed, a station has no arm, or the
+        InvalidInputError: a run or grasp is missing or has changed, a station has no arm, or the
             folder cannot be written, or holds something else.
         SimulationError: the worker processes die.
     """
@@ -157,7 +156,7 @@ def _make_judge_factory(
     format: PlanFormat,
     station: StationLike | None,
 ) -> tuple[ReachJudgeFactory, Candidates]:
-    """What judges the grasps of one run, and these."""
+    """Factory of the judge for the tried grasps of one run, and these grasps."""
     from burg_drake.motion import require_usable_arm
 
     scene = run.scene()
@@ -187,11 +186,11 @@ def _make_judge_factory(
 
 
 def _make_row(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> ExportedMotion:
-    plan = plans.plan(trial.grasp)
+    plan = plans.plan_path(trial.grasp)
     failed = verdict.outcome is Outcome.SIMULATION_FAILED
     there = verdict.outcome is Outcome.REACHABLE and plan.is_file()
     own = plan.with_name(f"{_file_stem(trial)}{plan.suffix}")
-    if there and own != plan and not own.exists():  # the same grasp is tried twice
+    if there and own != plan and not own.exists():  # two trials have the same grasp
         atomic_write(own, plan.read_bytes())
     duration = verdict.margins.get("duration") if there else None
     return ExportedMotion(

@@ -1,4 +1,4 @@
-"""Edits of a trials file as text: one trial changes, and everything else stays as people wrote it.
+"""Edits a trials file as text: one trial changes, and all else stays as people wrote it.
 
 Only the keys of the trial whose values change are edited, so that comments within it stay, too.
 """
@@ -32,28 +32,28 @@ _YAML_SPACE = " \t\n\r\x85\u2028\u2029"
 """Space around a value in YAML; a no-break space is part of the value."""
 _ITEM_START = re.compile("( *)- +")
 """Start of a trial, on the line where it begins."""
-_YAML_DIRECTIVE = re.compile("^%", re.MULTILINE)  # A directive of YAML.
+_YAML_DIRECTIVE = re.compile("^%", re.MULTILINE)  # YAML directive.
 _ANCHOR_OR_TAG = re.compile(r"(^|[\s\[{,:-])[&!]", re.MULTILINE)
-"""Possible anchor or tag; other lines can change its meaning."""
+"""Possible anchor or tag, whose meaning depends on other lines."""
 
 Edit = tuple[int, int, str]
-"""Text from one offset to another, and what it becomes."""
+"""Start and end offset of a text, and its replacement."""
 
 
 @dataclass(frozen=True, eq=False)
 class SheetText:
-    """The text of a trials file, and what it holds.
+    """The text of a trials file, and its contents.
 
-    Where each trial has lines of its own, as in files that this project writes, one that has
-    changed is read by itself, and reading and writing it takes the same time in a file of any size.
+    If each trial has its own lines, as in files written by this project, a changed trial is read
+    alone, in a time that does not depend on the size of the file.
 
     Attributes:
-        name: of the file, for messages.
-        text: of the file.
-        sheet: what the text holds.
-        starts: where the lines of each trial begin, in order, and where those of the last one end;
-            empty where trials are written in another way.
-        column: of the hyphens before trials.
+        name: name of the file, for messages.
+        text: text of the file.
+        sheet: parsed contents.
+        starts: offsets of the first line of each trial in order, and of the end of the last trial;
+            empty if trials are written in another way.
+        column: column of the hyphens before trials.
     """
 
     name: str
@@ -74,7 +74,7 @@ class SheetText:
         return cls(name, text, sheet, *_locate_trials(root, text))
 
     def read_changed(self, text: str) -> SheetText:
-        """Reads a later text of the file; where one trial has changed, only its lines.
+        """Reads a later text of the file; if a single trial has changed, only its lines.
 
         Raises:
             DocumentError: it does not fit the schema.
@@ -86,11 +86,10 @@ class SheetText:
         return found or SheetText.read(text, self.name)
 
     def with_trial(self, new: RealTrial) -> SheetText:
-        """The text with another trial in the place of that of the same number.
+        """The text with a new trial in place of the one with the same number.
 
         Raises:
-            DocumentError: the trial is written in a way that cannot be changed in its place, such
-                as by an alias.
+            DocumentError: the trial cannot be edited in place, such as with an alias.
         """
         place = self.sheet.index(new.number)
         old, trials = self.sheet.trials[place], list(self.sheet.trials)
@@ -120,7 +119,7 @@ class SheetText:
         )
 
     def _replace_trial_lines(self, place: int, text: str) -> SheetText | None:
-        """Another text that differs in the lines of one trial; None if all of it has to be read."""
+        """Reads a text that differs in the lines of one trial; None if all of it has to be read."""
         if not self.starts:
             return None
         longer = len(text) - len(self.text)
@@ -131,18 +130,19 @@ class SheetText:
         trials = (*self.sheet.trials[:place], trial, *self.sheet.trials[place + 1 :])
         try:
             sheet = dataclasses.replace(self.sheet, trials=trials)
-        except InvalidInputError:  # such as a number that another trial has
+        except InvalidInputError:  # such as the number of another trial
             return None
         return SheetText(self.name, text, sheet, starts, self.column)
 
     def _find_changed_trial(self, text: str) -> int | None:
-        """The place of the one trial within whose lines another text differs; None if it may differ
-        elsewhere."""
+        """Index of the only trial in whose lines another text differs; None if it may differ
+        elsewhere.
+        """
         if not self.starts:
             return None
         longest = min(len(text), len(self.text))
-        tail = _largest_that_holds(longest, lambda n: text[-n:] == self.text[-n:])
-        same = _largest_that_holds(longest - tail, lambda n: text[:n] == self.text[:n])
+        tail = _bisect_largest(longest, lambda n: text[-n:] == self.text[-n:])
+        same = _bisect_largest(longest - tail, lambda n: text[:n] == self.text[:n])
         place = bisect.bisect_right(self.starts, same) - 1
         if not 0 <= place < len(self.sheet.trials):
             return None
@@ -150,13 +150,13 @@ class SheetText:
         return place if last <= self.starts[place + 1] else None
 
 
-def _largest_that_holds(most: int, holds: Callable[[int], bool]) -> int:
-    """The largest number from 0 to `most` that something holds of, if it does of all below."""
+def _bisect_largest(most: int, holds: Callable[[int], bool]) -> int:
+    """The largest number from 0 to `most` for which a monotone condition holds."""
     return bisect.bisect_left(range(1, most + 1), True, key=lambda n: not holds(n))
 
 
 def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
-    """Where trials are whose lines can be read by themselves, see `SheetText`, and their column."""
+    """Offsets and column of trials whose lines can be read alone, see `SheetText`."""
     nothing: tuple[tuple[int, ...], int] = ((), 0)
     at = next((k for k, (key, _) in enumerate(root.value) if key.value == "trials"), None)
     if _YAML_DIRECTIVE.search(text) or at is None or _has_alias(root):
@@ -181,7 +181,7 @@ def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
 
 
 def _has_alias(node: yaml.Node) -> bool:
-    """Whether a node is in a tree twice, which is what an alias makes."""
+    """Whether a tree contains a node twice, as by an alias."""
     seen: set[int] = set()
     left = [node]
     while left:
@@ -197,8 +197,9 @@ def _has_alias(node: yaml.Node) -> bool:
 
 
 def _parse_trial(lines: str, name: str, column: int) -> RealTrial | None:
-    """The trial that these lines of a file hold, if they mean by themselves what they mean there:
-    a single entry of a list with its hyphen in this column, whole lines, no anchor."""
+    """Parses the lines of a trial, if their meaning does not depend on other lines: a single list
+    entry with its hyphen in this column, whole lines, no anchor.
+    """
     if not lines.endswith("\n") or _ANCHOR_OR_TAG.search(lines):
         return None
     try:
@@ -222,12 +223,13 @@ class _LineIndex:
         self.newline = "\r\n" if "\r\n" in text else "\n"
 
     def offset(self, mark: Any) -> int:
-        """Of a place that a parser names."""
+        """Offset of a mark of the parser."""
         return self.starts[int(mark.line)] + int(mark.column)
 
     def end(self, node: yaml.Node) -> int:
-        """Where the text of a value ends; marks of the parser come after blank lines and comments
-        that follow."""
+        """End offset of a value's text; marks of the parser come after blank lines and comments
+        that follow.
+        """
         if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
             return self.end(last[-1] if isinstance(last, tuple) else last)
@@ -235,11 +237,11 @@ class _LineIndex:
         return start + len(self.text[start:end].rstrip(_YAML_SPACE))
 
     def line_start(self, offset: int) -> int:
-        """Where the line of an offset begins."""
+        """Start of the line that contains an offset."""
         return max(start for start in self.starts if start <= offset)
 
     def line_end(self, offset: int) -> int:
-        """Where the line of an offset ends, before its break."""
+        """End of the line that contains an offset, before the line break."""
         found = _LINE_BREAK.search(self.text, offset)
         return found.start() if found else len(self.text)
 
@@ -271,8 +273,9 @@ def _list_edits(text: _LineIndex, node: yaml.Node, old: RealTrial, new: RealTria
 def _replace_value(
     text: _LineIndex, trial: yaml.Node, key: yaml.Node, value: yaml.Node, lines: str, default: bool
 ) -> Edit:
-    """A key with another value; what is at its default goes away with its lines, unless there is
-    something else on them."""
+    """Edits that give a key another value; a value at its default is removed with its lines, unless
+    they contain something else.
+    """
     start, end = text.offset(key.start_mark), text.end(value)
     first, last = text.line_start(start), text.line_end(end)
     alone = not (text.text[first:start] + text.text[end:last]).strip(_YAML_SPACE)
@@ -282,13 +285,13 @@ def _replace_value(
 
 
 def _format_entry(entry: Mapping[str, Any], column: int, newline: str) -> str:
-    """A key and its value as they stand in a mapping at a column."""
+    """Formats a key and its value as an entry of a mapping at a column."""
     lines = dump_document(entry).rstrip("\n").split("\n")
     return newline.join([lines[0], *(" " * column + line if line else "" for line in lines[1:])])
 
 
 def _require_in_order(text: _LineIndex, node: yaml.Node) -> None:
-    """Refuses values that are written elsewhere."""
+    """Refuses values that are not written in order, such as aliases."""
     at = text.offset(node.start_mark)
     for key, value in node.value:
         for part in (key, value):

@@ -24,14 +24,15 @@ Moved = Mapping[str, "str | Path"]
 
 
 def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
-    """Short hash of a grasp: of its pose in the frame of its object and its width, both to the
-    last bit, and of the instance that it is on."""
+    """Short hash of a grasp: of the exact bits of its pose in the object frame and its width, and
+    of its instance.
+    """
     pose = check_pose(X_OG, "X_OG")
     return content_hash(instance, pose, float(width))[:HASH_DIGITS]
 
 
 def grasp_contents(run: Run, ids: Iterable[str] | None = None) -> dict[str, str]:
-    """`grasp_content` of the grasps of a run by id; of those in `ids` if it is given."""
+    """`grasp_content` of a run's grasps by id; only of those in `ids` if given."""
     grasps, instances = run.candidates.grasps, run.candidates.instance
     wanted = None if ids is None else {*ids}
     return {
@@ -52,14 +53,14 @@ def load_sources(
 
     Args:
         sheet: contents of the trials file.
-        path: the trials file; folders of runs are found from its own.
-        moved: folders in place of those that the sheet names, by key.
-        only: keys of the runs that are needed; all if None.
+        path: the trials file, to whose folder paths of runs are relative.
+        moved: folders in place of the sheet's, by key.
+        only: keys of the needed runs; all if None.
 
     Raises:
         UnknownNameError: `moved` names a run that the sheet does not have.
-        InvalidInputError: a folder is gone or holds another run, or a grasp is gone, not judged, or
-            not the same any more; the message names the trials file and what to do.
+        InvalidInputError: a folder is missing or holds another run, or a grasp is missing, not
+            judged, or changed; the message names the trials file and what to do.
     """
     moved = moved or {}
     for key in moved:
@@ -77,20 +78,20 @@ def load_sources(
 def load_source_run(
     sheet: TrialSheet, path: str | Path, key: str, *, moved: Moved | None = None
 ) -> Run:
-    """One run of a sheet, without a look at its grasps; see `load_sources`."""
+    """One run of a sheet, without checks of its grasps; see `load_sources`."""
     return _load_source(key, sheet.runs[key], Path(path), moved or {})
 
 
 def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
-    """The row of the results of each trial's grasp, in the order of `sheet.trials`.
+    """Result rows of the trials' grasps, in the order of `sheet.trials`.
 
     Args:
         sheet: contents of the trials file.
         runs: what `load_sources` returned.
 
     Returns:
-        Columns as in `evaluation.results_table`; what a run does not have is NaN, or an empty text.
-        `run` is the hash of the run, as in the table.
+        Columns as in `evaluation.results_table`; missing values are NaN or empty texts. `run` is
+        the hash of the run, as in the table.
     """
     names = list(dict.fromkeys(name for run in runs.values() for name in run.results))
     rows = {
@@ -130,7 +131,7 @@ def _load_source(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
 
 
 def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:
-    """Refuses trials whose grasp is not the one that was planned with."""
+    """Refuses trials whose grasp differs from the planned one."""
     number = {id: i for i, id in enumerate(run.candidates.id)}
     grasps, instances = run.candidates.grasps, run.candidates.instance
     for trial in trials:
@@ -167,7 +168,7 @@ def make_source_run(run: Run, folder: Path | None = None) -> SourceRun:
 
     Args:
         run: the run.
-        folder: of the sheet; the path is absolute if None.
+        folder: folder of the sheet; if None the path is absolute.
 
     Raises:
         InvalidInputError: the run was begun, but has no hash yet.

@@ -19,11 +19,11 @@ from burg_drake.experiment.trials.trial_sheet import Stratum, TrialSheet, is_suc
 
 @dataclass(frozen=True)
 class ExpectedEstimate:
-    """A share that will be estimated.
+    """A share to be estimated.
 
     Attributes:
-        name: of what.
-        trials: how many it will be estimated from; not whole where weights make some count less.
+        name: name of the share.
+        trials: effective number of trials, not whole if trials have different weights.
     """
 
     name: str
@@ -35,7 +35,7 @@ def half_width(share: float, trials: int) -> float:
 
     Args:
         share: true share of successes.
-        trials: how many there will be.
+        trials: number of trials.
     """
     from scipy.stats import binom
 
@@ -50,9 +50,9 @@ def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05)
     """Chance that McNemar's exact test tells two methods apart on the same trials.
 
     Args:
-        trials: how many.
-        better: share of them where the better method alone is right.
-        worse: share where the other one alone is.
+        trials: number of trials.
+        better: share of trials where only the better method is right.
+        worse: share of trials where only the other method is right.
         alpha: significance level, two-sided.
     """
     from scipy.stats import binom
@@ -73,30 +73,31 @@ def smallest_difference(
     """Smallest difference between two methods that McNemar's exact test finds with some chance.
 
     Args:
-        trials: how many both are compared on.
-        worse: share of them where the worse method alone is right.
+        trials: number of trials of both methods.
+        worse: share of trials where only the worse method is right.
         power: the chance.
         alpha: significance level, two-sided.
 
     Returns:
-        Difference of the shares of trials where each is right; NaN if not even the largest possible
-        one is found.
+        Difference of the shares of right answers; NaN if even the largest possible one is not
+        found.
     """
     from scipy.optimize import brentq
 
-    largest = 1.0 - 2.0 * worse  # all the others: the better method alone is right
+    largest = 1.0 - 2.0 * worse  # in all other trials only the better method is right
 
-    def lack(difference: float) -> float:
+    def missing_power(difference: float) -> float:
         return mcnemar_power(trials, worse + difference, worse, alpha) - power
 
-    if largest <= 0.0 or lack(largest) < 0.0:
+    if largest <= 0.0 or missing_power(largest) < 0.0:
         return math.nan
-    return float(brentq(lack, 0.0, largest, xtol=1e-4))
+    return float(brentq(missing_power, 0.0, largest, xtol=1e-4))
 
 
 def expected_estimates(sheet: TrialSheet) -> list[ExpectedEstimate]:
-    """Shares that the trials of a sheet will give: success by object and in all, weighted to all
-    grasps, and precision and recall of the simulation."""
+    """Shares that the trials of a sheet will estimate: success by object and overall, weighted to
+    all grasps, and precision and recall of the simulation.
+    """
     objects = Counter(trial.object for trial in sheet.trials)
     positive = sum(is_success(t.simulated, sheet.selection.success) for t in sheet.trials)
     figures = [ExpectedEstimate(name, count) for name, count in sorted(objects.items())]
@@ -108,8 +109,9 @@ def expected_estimates(sheet: TrialSheet) -> list[ExpectedEstimate]:
 
 
 def effective_trials(strata: Mapping[str, Stratum]) -> float:
-    """Number of trials of equal weight that tell as much as those of strata, each of which stands
-    for `population / selected` grasps (L. Kish, Survey Sampling, 1965)."""
+    """Effective number of trials of strata, where each trial represents `population / selected`
+    grasps (L. Kish, Survey Sampling, 1965).
+    """
     chosen = [s for s in strata.values() if s.selected]
     total = sum(s.population for s in chosen)
     squares = sum(s.population**2 / s.selected for s in chosen)
@@ -117,7 +119,7 @@ def effective_trials(strata: Mapping[str, Stratum]) -> float:
 
 
 def power_table(sheet: TrialSheet) -> TextTable:
-    """How wide 95 % intervals will be, a row a figure."""
+    """Table of expected widths of 95 % intervals, one row per figure."""
     shares = (0.5, 0.8, 0.95)  # intervals are widest at 0.5
     table = TextTable("Half-width of the 95 % interval if the share turns out to be").names("share")
     table.numbers("trials", *(f"{100 * share:.0f} %" for share in shares))
@@ -134,7 +136,7 @@ def power_table(sheet: TrialSheet) -> TextTable:
 
 
 def detectable_difference_sentence(trials: int) -> str:
-    """Which difference between two methods will show, in a sentence."""
+    """Sentence on the detectable difference between two methods."""
     # By the share of trials in which only the method that is worse overall is right.
     found = {worse: smallest_difference(trials, worse) for worse in (0.0, 0.05, 0.1)}
     if all(math.isnan(size) for size in found.values()):
@@ -160,6 +162,6 @@ def _rejection_limit(m: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
     rejects; -1 where it never does."""
     from scipy.stats import binom
 
-    most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)  # the first with a tail of that at least
+    most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)  # smallest with this tail at least
     critical: NDArray[np.int64] = np.where(2.0 * binom.cdf(most, m, 0.5) <= alpha, most, most - 1)
     return critical

@@ -1,10 +1,10 @@
-"""A trials file that several programs, and people with an editor, write to, and its journal.
+"""A trials file, written by several programs and by people with an editor, and its journal.
 
 Programs take turns by a lock on a file beside it. When `TrialBook.record` returns, the entry is on
 the disk, in the trials file and in its journal.
 
-The journal `trials.entries.jsonl` lies beside `trials.yaml`, and its lines never change: an editor
-that saves an old version of the trials file loses nothing. Each line is on the disk before the
+The journal `trials.entries.jsonl` lies beside `trials.yaml`, and its lines never change, so nothing
+is lost if an editor saves an old version of the trials file. Each line is on the disk before the
 trials file changes.
 """
 
@@ -44,10 +44,10 @@ from burg_drake.experiment.trials.trial_sheet import RealTrial, RobotReport, Tri
 
 
 class TrialChanged(InvalidInputError):
-    """A trial is not what it was taken for.
+    """A trial is not in the expected state.
 
     Attributes:
-        trial: as it is.
+        trial: the trial in its present state.
     """
 
     def __init__(self, message: str, trial: RealTrial) -> None:
@@ -69,7 +69,7 @@ class TrialBook:
     """
 
     def __init__(self, path: str | Path) -> None:
-        """Reads the file once, to find out whether it can be.
+        """Reads the file once, to report errors early.
 
         Raises:
             DocumentError: it cannot be read, or does not fit the schema.
@@ -79,11 +79,11 @@ class TrialBook:
         self.sheet()
 
     def sheet(self) -> TrialSheet:
-        """What the file holds now; see `load_trials`."""
+        """Present contents of the file; see `load_trials`."""
         return self._read().sheet
 
     def trial(self, number: int | Literal["next"]) -> RealTrial:
-        """The trial of a number, or the first one without an outcome.
+        """The trial with a number, or the first one without an outcome.
 
         Raises:
             InvalidInputError: there is none.
@@ -91,7 +91,7 @@ class TrialBook:
         return self._find_trial(self.sheet(), number)
 
     def entries(self) -> list[Entry]:
-        """All that was ever recorded, in order."""
+        """All entries of the journal, in order."""
         return read_entries(journal_path(self.path))
 
     def damage(self) -> str:
@@ -107,7 +107,7 @@ class TrialBook:
         )
 
     def missing_values(self) -> list[MissingValues]:
-        """Entries that the file lacks; see `journal.missing_values`."""
+        """Recorded values that the file lacks; see `missing_values`."""
         return missing_values(self.sheet(), self.entries())
 
     def record(
@@ -119,15 +119,15 @@ class TrialBook:
         expected: RealTrial | None = None,
         **entry: Any,
     ) -> RealTrial:
-        """Enters what is known of a trial; all else in the file stays as it is, byte for byte.
+        """Records values of a trial; all else in the file stays the same, byte for byte.
 
-        The same entry twice is one. The journal keeps what is replaced.
+        A repeated entry is recorded once. The journal keeps replaced values.
 
         Args:
-            number: of the trial; `next` for the first one without an outcome.
-            correct: the entry replaces what contradicts it.
-            again: the trial was carried out once more: the entry replaces all that there is.
-            expected: only if the trial still is this one, and nobody has changed it meanwhile.
+            number: number of the trial; `next` for the first one without an outcome.
+            correct: the entry replaces contradicting values.
+            again: the trial was carried out once more; the entry replaces all values.
+            expected: record only if the trial still equals this one.
             entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and nothing
                 else is said), `operator`, `note`, `photo`, `placement`, `robot`, a `RobotReport`
                 or its fields that are known.
@@ -136,10 +136,10 @@ class TrialBook:
             The trial as it is on the disk.
 
         Raises:
-            UnknownNameError: there is no such field.
-            TrialChanged: it is not as expected.
-            InvalidInputError: there is no such trial, or no such outcome; the trial has another
-                entry already; or the file cannot be written.
+            UnknownNameError: a field does not exist.
+            TrialChanged: the trial is not as expected.
+            InvalidInputError: the trial or outcome does not exist; the trial has another entry
+                already; or the file cannot be written.
         """
         given = check_entry(entry)
 
@@ -160,13 +160,13 @@ class TrialBook:
         return self._record_change(number, change, how)
 
     def restore(self, numbers: Sequence[int] | None = None) -> list[RealTrial]:
-        """Enters again what the file lacks; what was edited by hand stays.
+        """Restores recorded values that the file lacks, except those edited by hand.
 
         Args:
-            numbers: of trials; all if None.
+            numbers: numbers of trials; all if None.
 
         Returns:
-            The trials that were changed.
+            The changed trials.
         """
         return [
             self._record_change(lost.number, self._restore_values, "restored")
@@ -175,10 +175,10 @@ class TrialBook:
         ]
 
     def keep(self, numbers: Sequence[int] | None = None) -> list[RealTrial]:
-        """Notes that the file is right where it differs from what was recorded.
+        """Records that the file is right where it differs from the journal.
 
         Args:
-            numbers: of trials; all if None.
+            numbers: numbers of trials; all if None.
 
         Returns:
             These trials.
@@ -190,7 +190,7 @@ class TrialBook:
         ]
 
     def _restore_values(self, trial: RealTrial) -> RealTrial:
-        """With the last entry's value of each field that has an older one; under the lock."""
+        """Restores last recorded values in place of older ones. The caller holds the lock."""
         lost = [found.values for found in self.missing_values() if found.number == trial.number]
         return replace_entered_values(trial, lost[0]) if lost else trial
 
@@ -202,15 +202,15 @@ class TrialBook:
         correct: bool = False,
         again: bool = False,
     ) -> None:
-        """Refuses an entry that contradicts one that is there, unless it is to replace it.
+        """Refuses an entry that contradicts present values, unless it may replace them.
 
         Args:
-            trial: as it is.
+            trial: the present trial.
             entry, correct, again: as for `record`.
 
         Raises:
-            UnknownNameError: there is no such field.
-            InvalidInputError: it contradicts, or cannot be read.
+            UnknownNameError: a field does not exist.
+            InvalidInputError: the entry contradicts the trial, or is invalid.
         """
         given = merge_robot_report(trial, check_entry(entry))
         if correct or again:
@@ -235,7 +235,7 @@ class TrialBook:
                 if new == old and how != "kept":
                     return old
                 after = before.with_trial(new)
-                if read_text(self.path) == before.text:  # no editor has written it meanwhile
+                if read_text(self.path) == before.text:  # unless an editor has written it meanwhile
                     break
             now = _current_time()
             names = (old.number, old.grasp, old.content, now, how)
@@ -259,7 +259,7 @@ class TrialBook:
         return sheet.next
 
     def _read(self) -> SheetText:
-        """What the file holds now; only what has changed since the last call is parsed."""
+        """Reads the file; parses only changes since the last call."""
         text, known = read_text(self.path), self._known
         known = SheetText.read(text, str(self.path)) if known is None else known.read_changed(text)
         self._known = known
@@ -276,15 +276,15 @@ TRIALS_LOCK_TIMEOUT = 30.0
 
 @contextlib.contextmanager
 def lock_trials_file(sheet_path: Path) -> Iterator[None]:
-    """One writer at a time; the end of its process, however it comes, releases the lock.
+    """Context manager that admits one writer at a time; any end of its process releases the lock.
 
     Args:
         sheet_path: the trials file.
 
     Raises:
-        InvalidInputError: the lock cannot be made, or another process keeps it.
+        InvalidInputError: the lock file cannot be created, or another process keeps the lock.
     """
-    real = Path(os.path.realpath(sheet_path))  # all links to a file share its lock
+    real = Path(os.path.realpath(sheet_path))  # links to a file share its lock
     path = real.with_name(f".{real.name}.lock")
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -317,7 +317,7 @@ How = Literal["recorded", "corrected", "again", "restored", "kept"]
 """`again`: the trial was carried out once more. `restored`: the file lacked it. `kept`: the file is
 right as it is."""
 JOURNAL_FIELDS = ("outcome", "time", "operator", "note", "photo", "placement", "robot")
-"""Fields of a trial that are recorded; the others are of its plan."""
+"""Recorded fields of a trial; the others belong to its plan."""
 
 
 @dataclass(frozen=True)
@@ -325,11 +325,10 @@ class Entry:
     """A line of the journal.
 
     Attributes:
-        number, grasp, content: of the trial.
-        at: when it was recorded, ISO 8601.
-        how: what was done.
-        before, after: values of `JOURNAL_FIELDS` in the file, as plain data, without those at
-            their default.
+        number, grasp, content: fields of the trial.
+        at: time of the record, ISO 8601.
+        how: kind of change.
+        before, after: values of `JOURNAL_FIELDS` in the file, as plain data, without defaults.
     """
 
     number: int
@@ -341,20 +340,19 @@ class Entry:
     after: dict[str, Any]
 
     def is_of(self, trial: RealTrial) -> bool:
-        """Whether it is of this trial, and not of one in a plan that the file had before."""
+        """Whether the entry belongs to this trial, not to one in an earlier plan of the file."""
         own = (trial.number, trial.grasp, trial.content)
         return (self.number, self.grasp, self.content) == own
 
 
 @dataclass(frozen=True)
 class MissingValues:
-    """What the file lacks of the entries for a trial.
+    """Recorded values of a trial that the file lacks.
 
     Attributes:
-        number: of the trial.
-        values: what was recorded last, as plain data, by field, where the file has what it had
-            before.
-        edited: fields that have a value in the file that was never recorded: edited by hand.
+        number: number of the trial.
+        values: last recorded values by field, as plain data, where the file has an older value.
+        edited: fields with a value in the file that was never recorded, so edited by hand.
     """
 
     number: int
@@ -363,15 +361,16 @@ class MissingValues:
 
 
 def entered_values(trial: RealTrial) -> dict[str, Any]:
-    """What has been entered for a trial, as plain data."""
+    """Entered values of a trial as plain data."""
     return {name: value for name, value in plain_data(trial).items() if name in JOURNAL_FIELDS}
 
 
 def replace_entered_values(trial: RealTrial, values: Mapping[str, Any]) -> RealTrial:
-    """A trial with other values, as `entered_values` has them; None stands for a field's default.
+    """A copy of a trial with other values in the form of `entered_values`; None is a field's
+    default.
 
     Raises:
-        DocumentError: they are not what `entered_values` makes.
+        DocumentError: the values do not have the form of `entered_values`.
     """
     plain = plain_data(trial) | dict(values)
     text = dump_document({name: value for name, value in plain.items() if value is not None})
@@ -387,7 +386,7 @@ def journal_path(path: Path) -> Path:
 
 
 def read_entries(path: Path) -> list[Entry]:
-    """All lines of a journal, in order, but for damaged ones; see `damaged_lines`.
+    """All undamaged entries of a journal, in order; see `damaged_lines`.
 
     Raises:
         InvalidInputError: it cannot be read.
@@ -396,8 +395,8 @@ def read_entries(path: Path) -> list[Entry]:
 
 
 def damaged_lines(path: Path) -> list[int]:
-    """Numbers, from 1, of the lines of a journal that cannot be read: a killed writer's, whose
-    entry was never acknowledged, or those that something else has damaged.
+    """Numbers, from 1, of the unreadable lines of a journal: from a killed writer, whose entry was
+    never acknowledged, or damaged otherwise.
 
     Raises:
         InvalidInputError: it cannot be read at all.
@@ -406,7 +405,7 @@ def damaged_lines(path: Path) -> list[int]:
 
 
 def _read_lines(path: Path) -> Iterator[tuple[int, Entry | None]]:
-    """The lines of a journal with their numbers; None for one that cannot be read."""
+    """Entries of a journal with their line numbers; None for unreadable lines."""
     max_line_size = 1 << 24  # bytes
     if not path.exists():
         return
@@ -423,8 +422,7 @@ def _read_entry(line: str) -> Entry:
     """The entry of a line.
 
     Raises:
-        ValueError, TypeError: it is not JSON, or its fields or their types are not those of an
-            entry.
+        ValueError, TypeError: the line is not JSON, or its fields or their types are wrong.
     """
     entry = Entry(**parse_json(line, "a line"))
     if type(entry.number) is not int or entry.how not in get_args(How):
@@ -438,7 +436,7 @@ def _read_entry(line: str) -> Entry:
 
 
 def append_entry(path: Path, entry: Entry) -> None:
-    """Adds a line; it is on the disk when this returns. The caller holds the lock.
+    """Appends an entry and waits until it is on the disk. The caller holds the lock.
 
     Raises:
         InvalidInputError: it cannot be written.
@@ -449,7 +447,7 @@ def append_entry(path: Path, entry: Entry) -> None:
         try:
             size = os.fstat(file).st_size
             if size and os.pread(file, 1, size - 1) != b"\n":
-                line = b"\n" + line  # a writer was killed within its line
+                line = b"\n" + line  # the last writer was killed within its line
             written = os.write(file, line)
             if written != len(line):
                 os.ftruncate(file, size)
@@ -465,7 +463,7 @@ def append_entry(path: Path, entry: Entry) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Waits until names of files in a folder are on the disk."""
+    """Waits until the file names of a folder are on the disk."""
     file = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(file)
@@ -474,10 +472,10 @@ def sync_folder(folder: Path) -> None:
 
 
 def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
-    """What the sheet lacks of what was recorded, trial by trial.
+    """Recorded values that the sheet lacks, by trial.
 
-    A field counts as lost if the sheet has a value of it that the journal knows from before the
-    last entry, and as edited by hand if it has one that the journal does not know.
+    A field counts as lost if the sheet has a value from before the last entry, and as edited by
+    hand if it has a value that is not in the journal.
     """
     found = []
     entries = list(entries)
@@ -502,14 +500,14 @@ EMPTY_ENTRY: dict[str, Any] = {
     "placement": {},
     "robot": None,
 }
-"""Fields of a trial without an entry."""
+"""Field values of a trial without an entry."""
 
 
 def parse_real_outcome(name: str) -> RealOutcome:
-    """The outcome of a name.
+    """The outcome with a name.
 
     Raises:
-        InvalidInputError: there is none; the message names the nearest.
+        InvalidInputError: there is none; the message suggests the nearest.
     """
     known = [outcome.value for outcome in RealOutcome]
     if name not in known:
@@ -537,7 +535,7 @@ def check_entry(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Adds the robot's report of a trial to fields of the report in an entry."""
+    """Fills the robot's report in an entry up with fields already reported for the trial."""
     robot = given.get("robot")
     if not isinstance(robot, Mapping):
         return dict(given)
@@ -545,7 +543,7 @@ def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, 
 
 
 def contains_value(value: Any, present: Any) -> bool:
-    """Whether a new value repeats the present one, or all fields that a report has so far."""
+    """Whether a new value equals the present one, or has all fields that a report has so far."""
     if isinstance(value, RobotReport) and isinstance(present, RobotReport):
         return all(v in (None, getattr(value, k)) for k, v in vars(present).items())
     return bool(value == present)

@@ -29,16 +29,16 @@ def summarize_placements(check: PlacementCheck) -> dict[str, ObjectPlace]:
 def require_scene_of_trial(
     scene: Scene | CheckedScene, sheet: TrialSheet, trial: RealTrial, where: str
 ) -> None:
-    """Refuses another scene than that of a trial.
+    """Refuses a scene that differs from that of a trial.
 
     Args:
-        scene: of a file or of a placement check.
+        scene: scene of a file or of a placement check.
         sheet: the trials.
         trial: the trial.
-        where: the file of the scene or of the check, for the message.
+        where: file of the scene or of the check, for the message.
 
     Raises:
-        InvalidInputError: it is another one.
+        InvalidInputError: the scene differs.
     """
     expected = sheet.runs[trial.run].scene
     if scene.content != expected.content:
@@ -99,15 +99,15 @@ def save_photo_and_placement(
 
     Args:
         sheet_path: the trials file.
-        number: of the trial.
+        number: number of the trial.
         photo: the photo; none if None.
         check: its placement check; none if None.
 
     Returns:
-        The copy of the photo, from the folder of the trials file; empty without a photo.
+        Path of the copied photo, relative to the trials file's folder; empty without a photo.
 
     Raises:
-        InvalidInputError: the photo cannot be read, or nothing be written.
+        InvalidInputError: the photo cannot be read, or a file cannot be written.
     """
     from burg_drake.cameras import decode_image
 
@@ -116,7 +116,7 @@ def save_photo_and_placement(
     if content is not None and decode_image(content) is None:
         raise InvalidInputError(f"{photo} is not a readable image; give a PNG or JPEG")
     copy = ""
-    with lock_trials_file(Path(sheet_path)):  # no other one takes the same name
+    with lock_trials_file(Path(sheet_path)):  # no other process takes the same name
         stem = _free_stem(folder, number)
         if photo is not None and content is not None:
             copy = f"photos/{stem}{Path(photo).suffix.lower()}"
@@ -127,7 +127,7 @@ def save_photo_and_placement(
 
 
 def _free_stem(folder: Path, number: int) -> str:
-    """A name that no photo and no placement check has yet."""
+    """An unused file name for a photo and a placement check."""
     for k in count(1):
         stem = f"{number:03d}" if k == 1 else f"{number:03d}_{k}"
         if not any(any((folder / place).glob(f"{stem}.*")) for place in ("photos", "placements")):

@@ -115,7 +115,7 @@ class SelectionSettings:
         self.selection()
 
     def selection(self) -> Selection:
-        """The same as trials files have it."""
+        """The settings as stored in trials files."""
         more = {
             "balance": "margin" if self._margin else self.balance,
             "margin": self._margin,
@@ -125,7 +125,7 @@ class SelectionSettings:
 
     @property
     def _margin(self) -> str:
-        """Name of the margin to balance by; empty if it is something else."""
+        """Name of the margin to balance by; empty for another balance."""
         return (
             self.balance.removeprefix(MARGIN_BALANCE_PREFIX)
             if self.balance.startswith(MARGIN_BALANCE_PREFIX)
@@ -152,19 +152,18 @@ def plan_trials(
         sheet = burg.trials.plan_trials("runs/first", settings=few, out="trials.yaml")
 
     Args:
-        runs: one or several, of one scene or of many, or their folders. A grasp that several have
-            judged on the same scene and station is tried once.
-        settings: how many of which grasps, and in which order; as usual if None.
-        robustness: table with probabilities, of the one run; those in the runs' folders if None.
+        runs: one or several runs, of one scene or of many, or their folders. A grasp that several
+            runs have judged on the same scene and station is tried once.
+        settings: number, choice and order of the grasps; the defaults if None.
+        robustness: table with probabilities, of the only run; those in the runs' folders if None.
         out: file to write; none if None.
 
     Returns:
         The sheet. Its notes say where there were too few grasps.
 
     Raises:
-        InvalidInputError: there is no run, or nothing to choose from; or the file has entries
-            already.
-        UnknownNameError: there is no such margin.
+        InvalidInputError: there is no run or no eligible grasp; or the file has entries already.
+        UnknownNameError: the margin does not exist.
     """
     given = [runs] if isinstance(runs, (Run, Campaign, str, Path)) else list(runs)
     selection = (settings or SelectionSettings()).selection()
@@ -199,10 +198,10 @@ def plan_trials(
 
 
 def require_unused(path: str | Path) -> None:
-    """Refuses to write over trials that have entries, in the file or in its journal.
+    """Refuses to overwrite trials with entries in the file or its journal.
 
     Raises:
-        InvalidInputError: it has, or is something else.
+        InvalidInputError: there are entries, or the file is no trials file.
     """
     path = Path(path)
     recorded = read_entries(journal_path(path))
@@ -222,8 +221,9 @@ def require_unused(path: str | Path) -> None:
 def _shuffle_trials(
     chosen: Chosen, selection: Selection
 ) -> list[tuple[int, EligibleGrasps, int, str]]:
-    """Grasps with the number of their block: blocks of a scene, and grasps of a block, in a random
-    order."""
+    """Puts blocks of each scene, and grasps of each block, into a random order; returns them with
+    block numbers.
+    """
     seed = selection.seed
     by_scene: defaultdict[str, list[tuple[str, EligibleGrasps, int, str]]] = defaultdict(list)
     for pool, k, key in chosen:

@@ -30,13 +30,13 @@ from burg_drake.evaluation import Input
 
 
 def require_minimum(value: int, least: int, name: str) -> None:
-    """Refuses a number of a document that is too small."""
+    """Refuses a number in a document below the minimum."""
     if value < least:
         raise FieldError(f"{name} is {value}; it must be at least {least}", name)
 
 
 def require_known(name: str, known: Iterable[str], what: str, *place: str | int) -> None:
-    """Refuses a name that nothing goes by; `what` says of what kind it is."""
+    """Refuses an unknown name of the kind `what`."""
     known = list(known)
     if name not in known:
         raise FieldError(
@@ -45,7 +45,7 @@ def require_known(name: str, known: Iterable[str], what: str, *place: str | int)
 
 
 def require_time(text: str, name: str) -> None:
-    """Refuses a time that is not ISO 8601; an empty one is not known."""
+    """Refuses a time that is not ISO 8601; empty means unknown."""
     try:
         if text:
             datetime.fromisoformat(text)
@@ -239,7 +239,7 @@ class RealTrial:
 
     @property
     def carried_out(self) -> bool:
-        """Whether it has an outcome, be it that nobody tried."""
+        """Whether the trial has an outcome, which may be that nobody tried."""
         return self.outcome is not None
 
 
@@ -283,8 +283,9 @@ class TrialSheet:
             self._check(i, trial)
 
     def _check(self, i: int, trial: RealTrial) -> None:
-        """Refuses a trial whose run or stratum is unknown, or not its own; a sheet without any
-        strata is one that nobody has balanced."""
+        """Refuses a trial with an unknown run or stratum, or the stratum of another run; a sheet
+        without strata is not balanced.
+        """
         require_known(trial.run, self.runs, "run", "trials", i, "run")
         if not self.strata:
             return
@@ -300,7 +301,7 @@ class TrialSheet:
                 )
 
     def trial(self, number: int) -> RealTrial:
-        """The trial of a number.
+        """The trial with a number.
 
         Raises:
             InvalidInputError: there is none.
@@ -308,7 +309,7 @@ class TrialSheet:
         return self.trials[self.index(number)]
 
     def index(self, number: int) -> int:
-        """Where among `trials` the one of a number is.
+        """Index in `trials` of the trial with a number.
 
         Raises:
             InvalidInputError: there is none.

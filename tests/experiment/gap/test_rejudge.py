@@ -167,8 +167,8 @@ def test_reality_slipped_and_only_the_displaced_scene_says_so(found: Rejudging) 
         "unpredictable": 0,
     }
     assert found.table == {(True, True, False): 2, (True, False, False): 1}
-    assert found.explained[:2] == (1, 3)
-    assert found.paired.p_value == 1.0
+    assert found.explained_disagreements[:2] == (1, 3)
+    assert found.mcnemar_test.p_value == 1.0
     assert [t.cause("lifted") for t in found.trials] == ["physics", "placement", None, "physics"]
 
 
@@ -270,7 +270,7 @@ def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
             yield from ()
 
     found = rejudge(sheet, "trials.yaml", tmp_path, executor=Failing(), progress=False)  # type: ignore[arg-type]
-    assert found.judged == () and found.paired.p_value is None
+    assert found.judged == () and found.mcnemar_test.p_value is None
     assert found.trials[0].failure_reason == "SimulationError: no such world"
     assert "None of the trials could be judged again." in rejudged_sentences(found)[0]
     assert "no such world" in rejudged_section(found)
