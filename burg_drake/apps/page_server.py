@@ -87,7 +87,8 @@ async def _read_json_body(request: Request) -> dict[str, Any]:
     if kind.strip().lower() != "application/json":
         raise core.RequestError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
     length = request.headers.get("Content-Length", "")
-    if not _is_number(length) or int(length) > max_body:
+    chunked = "Transfer-Encoding" in request.headers  # its length would not be the body's
+    if chunked or not _is_number(length) or int(length) > max_body:
         raise core.RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
     try:
         body = core.parse_json((await request.body()).decode(), "the body")
@@ -145,11 +146,13 @@ class _Connection(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Limits the time for a whole request, not only that between two bytes."""
-        is_next = self.cycle is not None and self.cycle.response_complete
+        before = self.cycle
+        is_next = before is not None and before.response_complete
         if self._deadline is None and is_next:
             self._set_deadline(REQUEST_TIMEOUT)
         super().data_received(data)
-        if self.cycle is not None and not self.cycle.more_body:
+        is_partial = is_next and self.cycle is before  # its head has not arrived
+        if self.cycle is not None and not self.cycle.more_body and not is_partial:
             self._set_deadline(None)
 
     def pause_writing(self) -> None:

@@ -197,7 +197,13 @@ def parse_record(text: str, where: str) -> SampleRecord:
         DocumentError: the record is of another version, or a value is invalid; the message names
             the value.
     """
-    fields = read_plain_data(parse_json(text, where), RecordFields, where)
+    values = parse_json(text, where)
+    fields = read_plain_data(values, RecordFields, where)
+    keys = values["view"]["intrinsics"].keys()
+    if keys != set(INTRINSICS_KEYS):  # a default distortion would be another camera
+        raise DocumentError(
+            f"{where}: view.intrinsics has the keys {sorted(keys)}, not {sorted(INTRINSICS_KEYS)}"
+        )
     with _locate_errors(f"{where}: view"):
         view = View(**vars(fields.view) | {"X_SC": _read_pose(fields.view.X_SC, "X_SC")})
     instances = []

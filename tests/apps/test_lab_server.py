@@ -231,6 +231,30 @@ def test_a_request_has_to_be_whole_in_time(
     kept.close()
 
 
+def test_a_second_request_has_to_be_whole_in_time(
+    server: LabServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Although its connection was admitted before."""
+    monkeypatch.setattr("burg_drake.apps.page_server.REQUEST_TIMEOUT", 0.3)
+    port = server.server_address[1]
+    with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as used:
+        used.sendall(HEAD + b"\r\n")
+        answer = used.recv(1 << 16)
+        assert answer.startswith(b"HTTP/1.1 200")
+        used.sendall(b"GET / HT")
+        while answer:  # the rest of the first answer, then the end
+            answer = used.recv(1 << 16)
+
+
+def test_a_body_in_chunks_is_refused(server: LabServer) -> None:
+    head = HEAD.replace(b"GET /states", b"POST /entry") + b"Content-Type: application/json\r\n"
+    port = server.server_address[1]
+    with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as sender:
+        sender.sendall(head + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n")
+        sender.sendall(b"2\r\n{}\r\n0\r\n\r\n")
+        assert sender.recv(1 << 16).startswith(b"HTTP/1.1 400")
+
+
 def _drip(slow: socket.socket, ended: threading.Event, is_sending: bool) -> None:
     """A byte every now and then."""
     while is_sending and not ended.wait(0.05):

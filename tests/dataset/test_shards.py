@@ -274,6 +274,7 @@ def file(name: str, data: bytes) -> Callable[[dict[str, bytes]], object]:
         (edited("scene", True), "000012_000.json: scene: 'True' is not a whole number"),
         (edited("view.intrinsics.width", 10**9), "view.intrinsics: image of 1000000000 x 48"),
         (edited("view.intrinsics.focal", [1, -1]), "view.intrinsics: width, height and focal"),
+        (edited("view.intrinsics.model", "fisheye"), "view.intrinsics has the keys"),
         (edited("view.X_SC", [[1, 0], [0]]), "view: X_SC is [[1, 0], [0]]; expected a pose"),
         (edited("X_WS.0.0", 2.0), "000012_000.json: X_WS is not a rigid"),
         (edited("depth_unit", float("nan")), "depth_unit: 'nan' is not a finite number"),
