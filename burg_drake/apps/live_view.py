@@ -138,7 +138,7 @@ def _finite_or_none(value: float) -> float | None:
 
 LIVE_PICTURE_TIMEOUT = 1.0
 """Seconds that a request for a picture waits for a newer one."""
-BOUNDARY = "picture"  # Between pictures of a stream.
+STREAM_BOUNDARY = "picture"  # Between pictures of a stream.
 LIVE_VIEW_FILES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
@@ -202,7 +202,7 @@ class ViewServer(PageServer):
         )
 
     def _stream(self, request: Request) -> Response:
-        kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+        kind = f"multipart/x-mixed-replace; boundary={STREAM_BOUNDARY}"
         return StreamingResponse(self._parts(), media_type=kind, headers={"Connection": "close"})
 
     def _parts(self) -> Iterator[bytes]:
@@ -211,10 +211,11 @@ class ViewServer(PageServer):
         while not self._closing.is_set():
             picture = self.live.next_picture(number, LIVE_PICTURE_TIMEOUT)
             if picture is None:
+                yield b""  # lets the server notice that the client has left
                 continue
             number = picture.number
             head = (
-                f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\n"
+                f"--{STREAM_BOUNDARY}\r\nContent-Type: image/jpeg\r\n"
                 f"Content-Length: {len(picture.jpeg)}\r\nX-Picture: {number}\r\n\r\n"
             )
             yield head.encode() + picture.jpeg + b"\r\n"

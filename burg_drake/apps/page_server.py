@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
+import logging
 import threading
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -22,7 +23,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.base import BaseHTTPMiddleware
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -92,6 +93,8 @@ async def _read_json_body(request: Request) -> dict[str, Any]:
         raise core.RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
     try:
         body = core.parse_json((await request.body()).decode(), "the body")
+    except ClientDisconnect as error:
+        raise core.RequestError(HTTPStatus.BAD_REQUEST, "the connection was closed") from error
     except ValueError as error:
         raise core.RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
     if not isinstance(body, dict):
@@ -320,6 +323,8 @@ class PageServer:
 
     def close(self) -> None:
         """Stops serving; requests that are being answered end soon."""
+        # uvicorn would report requests that the end cuts off as errors.
+        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
         self._server.should_exit = True
         if self._thread.is_alive():
             self._thread.join()

@@ -18,6 +18,7 @@ import functools
 import inspect
 import json
 import math
+import numbers
 import re
 import types
 import typing
@@ -354,6 +355,12 @@ class _PlainReader(Reader):
             node = _plain_node(node)
         return super().read(node, kind, where)
 
+    def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
+        is_text = node.tag == _TAGS[str]
+        if isinstance(node, yaml.ScalarNode) and is_text != (kind is str):
+            raise self.fail(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
+        return super().read_scalar(node, kind, where)
+
 
 def _plain_node(value: Any) -> yaml.Node:
     """Converts plain data to a YAML node; nested dicts and lists are kept."""
@@ -362,7 +369,8 @@ def _plain_node(value: Any) -> yaml.Node:
         return yaml.MappingNode(_TAGS[dict], entries)
     if isinstance(value, (list, tuple)):
         return yaml.SequenceNode(_TAGS[list], [_node_of_scalar(item) for item in value])
-    return yaml.ScalarNode(_TAGS.get(type(value), _TAGS[str]), str(value))
+    other = float if isinstance(value, numbers.Real) else str  # such as numbers of numpy
+    return yaml.ScalarNode(_TAGS.get(type(value), _TAGS[other]), str(value))
 
 
 def _node_of_scalar(value: Any) -> Any:

@@ -229,14 +229,14 @@ def parse_record(text: str, where: str) -> SampleRecord:
 def _read_pose(rows: Any, name: str) -> Array:
     """(4, 4) pose from four lists of four numbers."""
     try:
-        X = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
+        X = np.array(rows)
+    except ValueError:  # rows of different lengths
         X = np.empty(0)
-    if X.shape != (4, 4):
+    if X.shape != (4, 4) or X.dtype.kind not in "if":
         raise InvalidInputError(
             f"{name} is {quote_value(rows)}; expected a pose, four lists of four numbers"
         )
-    return check_pose(X, name)
+    return check_pose(X.astype(float), name)
 
 
 @contextmanager

@@ -136,6 +136,10 @@ class Candidates:
                 place += 1
         return found
 
+    def __getstate__(self) -> dict[str, object]:
+        # Other processes hash texts differently.
+        return {name: value for name, value in vars(self).items() if name != "_sorted_hashes"}
+
     @cached_property
     def _sorted_hashes(self) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
         """Hashes of the identifiers in ascending order, and the row of each.

@@ -229,7 +229,7 @@ def journal_lines(
             yield here, id, verdict
 
 
-JUDGED = 3  # Highest value of `JournalIndex.rank`.
+COMPLETED_RANK = 3  # `JournalIndex.rank` of a trial that came to an end.
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,11 +262,11 @@ class JournalIndex:
     def rank(self) -> NDArray[np.int8]:
         """(N,) rank for the choice between verdicts of a grasp; the higher one is taken.
 
-        `JUDGED` if the trial came to an end, `JUDGED - 1` if it failed, `JUDGED - 2` if its worker
+        `COMPLETED_RANK` if the trial came to an end, one less if it failed, two less if its worker
         was killed from outside, 0 without a verdict.
         """
         return np.where(
-            self.judged, JUDGED - self.failed - (self.failed & self.interrupted), 0
+            self.judged, COMPLETED_RANK - self.failed - (self.failed & self.interrupted), 0
         ).astype(np.int8)
 
     def select(self, rows: NDArray[np.int64]) -> JournalIndex:

@@ -26,8 +26,8 @@ from burg_drake.core import (
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.candidates import Candidates, share_rows
 from burg_drake.evaluation.journal import (
+    COMPLETED_RANK,
     JOURNAL_FILE,
-    JUDGED,
     MAX_JOURNAL_LINE,
     JournalIndex,
     encode_verdict,
@@ -82,7 +82,7 @@ def choose_verdicts(
         if taken is None:
             taken = index
             continue
-        both = (index.rank == JUDGED) & (taken.rank == JUDGED)
+        both = (index.rank == COMPLETED_RANK) & (taken.rank == COMPLETED_RANK)
         for known in np.unique(source[both]).tolist():
             rows = np.flatnonzero(both & (source == known))
             ids = [candidates.id[row] for row in chosen[rows].tolist()]

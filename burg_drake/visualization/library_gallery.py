@@ -39,7 +39,7 @@ from burg_drake.visualization.object_drawing import best_yaw, camera_rotation, u
 from burg_drake.visualization.thumbnails import explosion_offsets
 
 GALLERY_PATH = "/drake/library"  # Path of the gallery in Meshcat's tree.
-COLUMNS = 3
+MAX_COLUMNS = 3
 """Number of columns of the gallery: visual mesh, pieces, contact geometry."""
 
 
@@ -85,7 +85,9 @@ def show_library(
     objects = {name: _object_things(library, name, contact[name], unit) for name in chosen}
     labels = [_object_label(library, name, unit) for name in chosen]
     rows = [
-        GalleryRow(label[1], [t.item for t in things[:COLUMNS]], [t.item for t in things[COLUMNS:]])
+        GalleryRow(
+            label[1], [t.item for t in things[:MAX_COLUMNS]], [t.item for t in things[MAX_COLUMNS:]]
+        )
         for label, things in zip(labels, objects.values(), strict=True)
     ]
     layout = layout_gallery(rows, unit, TEXT_STRETCH * LINE_HEIGHT * unit)

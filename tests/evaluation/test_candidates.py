@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -157,3 +161,30 @@ def test_other_grasps_go_to_all_instances_of_their_object(tmp_path: Path, scene:
     GraspSet.create(X_OG, object="cub").save(tmp_path / "cub.npz")
     with pytest.raises(UnknownNameError, match=r"cub.npz has grasps of object 'cub', .* 'cube'"):
         read_grasps(scene, tmp_path / "cub.npz")
+
+
+def test_rows_are_found_in_another_process() -> None:
+    """Texts have other hashes there."""
+    candidates = given(4)
+    assert candidates.rows(candidates.id).tolist() == [0, 1, 2, 3]
+    found = subprocess.run(
+        [sys.executable, "-c", FIND_ROWS],
+        input=pickle.dumps(candidates),
+        capture_output=True,
+        env=os.environ | {"PYTHONHASHSEED": "7"},
+        check=True,
+    )
+    assert found.stdout.decode().strip() == "[0, 1, 2, 3]"
+
+
+FIND_ROWS = """
+import pickle, sys
+candidates = pickle.load(sys.stdin.buffer)
+print(candidates.rows(candidates.id).tolist())
+"""
+
+
+def given(count: int) -> Candidates:
+    X_OG = np.tile(np.eye(4), (count, 1, 1))
+    X_OG[:, 0, 3] = 0.01 * np.arange(count)
+    return Candidates(GraspSet.create(X_OG, object="box"), np.full(count, "box"))

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ class ClusterJob(ABC):
     Attributes:
         what: purpose of the bundle, for messages.
         bundle: the bundle; None if none is needed.
-        waiting: items that no worker has.
+        returned: items that workers did not begin; they are sent before further ones.
         suspects: items at which a worker was lost, with the number of lost workers; each is sent
             alone.
         sent: number of chunks held by workers.
@@ -92,9 +93,10 @@ class ClusterJob(ABC):
     result_timeout = 60.0
     """Seconds to wait for a result, which may have many megabytes or be lost with its worker."""
 
-    def __init__(self, what: str, bundle: Bundle | None, items: Iterable[Any]) -> None:
+    def __init__(self, what: str, bundle: Bundle | None, items: Sequence[Any]) -> None:
         self.what, self.bundle = what, bundle
-        self.waiting: deque[Any] = deque(items)
+        self._fresh, self._fresh_count = iter(items), len(items)
+        self.returned: deque[Any] = deque()
         self.suspects: deque[tuple[Any, int]] = deque()
         self.sent = 0
         self.failed = False
@@ -119,7 +121,7 @@ class ClusterJob(ABC):
     @property
     def unsent_count(self) -> int:
         """Number of items that no worker has."""
-        return len(self.waiting) + len(self.suspects)
+        return self._fresh_count + len(self.returned) + len(self.suspects)
 
     def take_chunk(self, places: int) -> SentChunk:
         """Takes items for the next chunk; chunks shrink towards the end of the work.
@@ -130,8 +132,11 @@ class ClusterJob(ABC):
         if self.suspects:
             item, losses = self.suspects.popleft()
             return SentChunk(self, (item,), losses)
-        size = min(self.max_items, -(-len(self.waiting) // places))
-        return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
+        size = min(self.max_items, -(-self.unsent_count // places))
+        again = [self.returned.popleft() for _ in range(min(size, len(self.returned)))]
+        fresh = list(islice(self._fresh, size - len(again)))
+        self._fresh_count -= len(fresh)
+        return SentChunk(self, (*again, *fresh))
 
     def take_back(self, chunk: SentChunk) -> None:
         """Returns the items of a chunk that was not begun to the queue."""
@@ -140,7 +145,7 @@ class ClusterJob(ABC):
         if chunk.losses:
             self.suspects.appendleft((chunk.items[0], chunk.losses))
         else:
-            self.waiting.extendleft(reversed(chunk.items))
+            self.returned.extendleft(reversed(chunk.items))
 
     def retry_alone(
         self,
@@ -172,7 +177,8 @@ class ClusterJob(ABC):
     def give_up(self) -> None:
         """Drops the items that no worker has."""
         self.failed = True
-        self.waiting.clear()
+        self._fresh_count = 0
+        self.returned.clear()
         self.suspects.clear()
 
 
