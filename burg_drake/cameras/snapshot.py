@@ -5,8 +5,6 @@ The image is stored without loss so that it can be analysed again.
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +22,7 @@ from burg_drake.core import (
     DocumentError,
     InvalidInputError,
     Pose,
+    atomic_folder,
     load_document,
     open_npy,
     require_writable,
@@ -135,26 +134,13 @@ def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
     Raises:
         InvalidInputError: the folder exists, or cannot be written.
     """
-    folder = require_new_folder(folder)
-    partial = None
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        partial = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
-        partial.mkdir()
-        write_image(partial / IMAGE_FILE, snapshot.image)
-        write_image(partial / OVERLAY_FILE, snapshot.overlay)
+    with atomic_folder(require_new_folder(folder)) as fresh:
+        write_image(fresh / IMAGE_FILE, snapshot.image)
+        write_image(fresh / OVERLAY_FILE, snapshot.overlay)
         if snapshot.depth is not None:
-            np.save(partial / DEPTH_FILE, snapshot.depth.astype(np.float32))
-        save_document(snapshot.document, partial / DOCUMENT_FILE)
-        save_document(snapshot.document.intrinsics, partial / "intrinsics.yaml")
-        partial.rename(folder)
-    except OSError as error:
-        raise InvalidInputError(
-            f"cannot write {folder}: {error.strerror or error}; choose a writable place"
-        ) from error
-    finally:
-        if partial is not None:
-            shutil.rmtree(partial, ignore_errors=True)
+            np.save(fresh / DEPTH_FILE, snapshot.depth.astype(np.float32))
+        save_document(snapshot.document, fresh / DOCUMENT_FILE)
+        save_document(snapshot.document.intrinsics, fresh / "intrinsics.yaml")
 
 
 def require_new_folder(folder: str | Path) -> Path:

@@ -19,7 +19,7 @@ from burg_drake.cameras.snapshot import (
     next_free_path,
     save_snapshot,
 )
-from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.core import BurgError, InvalidInputError, count_with_noun
 
 FIRST_PICTURE_TIMEOUT = 5.0  # Seconds to wait for the first picture of an idle session.
 
@@ -216,7 +216,7 @@ def placement_summary(check: PlacementCheck) -> str:
     words += [f"{counts['uncertain']} uncertain"] if counts["uncertain"] else []
     words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
     if check.extra:
-        words.append(f"{len(check.extra)} extra object{'s' if len(check.extra) > 1 else ''}")
+        words.append(count_with_noun(len(check.extra), "extra object"))
     return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
 
 

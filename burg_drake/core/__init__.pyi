@@ -98,6 +98,7 @@ from .files import (
     FileLimits as FileLimits,
     FolderLock as FolderLock,
     Limits as Limits,
+    atomic_folder as atomic_folder,
     atomic_write as atomic_write,
     atomic_write_all as atomic_write_all,
     copy_permissions as copy_permissions,
@@ -110,7 +111,6 @@ from .files import (
     read_text as read_text,
     remove_unfinished as remove_unfinished,
     report_read_errors as report_read_errors,
-    report_write_errors as report_write_errors,
     require_writable as require_writable,
     short_message as short_message,
     suppress_numpy_warnings as suppress_numpy_warnings,
@@ -138,6 +138,7 @@ from .grasp_set import (
     GraspSet as GraspSet,
     GraspSetFormat as GraspSetFormat,
     distinct_texts as distinct_texts,
+    grasp_identifiers as grasp_identifiers,
 )
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,

@@ -17,6 +17,7 @@ import lzma
 import os
 import re
 import secrets
+import shutil
 import stat
 import struct
 import tempfile
@@ -203,6 +204,37 @@ def ensure_writable_folder(path: str | Path) -> Path:
             f"cannot write to folder {path}: {why}; choose a writable place"
         ) from error
     return path
+
+
+@contextmanager
+def atomic_folder(path: Path, *, replace: bool = False) -> Iterator[Path]:
+    """Yields a new folder beside `path` that is renamed to `path` if the block succeeds.
+
+    Args:
+        path: folder that does not exist, or is empty; parent folders are created.
+        replace: let the new folder replace one that is not empty.
+
+    Raises:
+        InvalidInputError: the folder cannot be written; earlier contents stay.
+    """
+    token = secrets.token_hex(8)
+    fresh, old = (path.with_name(f".{path.name}.{token}{end}") for end in ("", ".old"))
+    ensure_writable_folder(path.parent)
+    try:
+        with report_write_errors(path):
+            fresh.mkdir()
+            yield fresh
+            if replace and path.exists():
+                path.rename(old)
+            try:
+                fresh.rename(path)
+            except OSError:
+                if old.exists():
+                    old.rename(path)
+                raise
+            shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
 
 
 @contextmanager

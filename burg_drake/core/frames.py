@@ -124,15 +124,27 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         InvalidInputError: wrong shape, not finite, beyond `MAX_POSE_COORDINATE`, not a right-handed
             rotation, or bad last row.
     """
-    tolerance = 1e-6  # Largest deviation from orthonormality.
     X = np.asarray(X_AB, dtype=float)
     if X.shape[-2:] != (4, 4):
         raise InvalidInputError(f"{name} has shape {X.shape}; expected (..., 4, 4)")
+    if X.ndim == 2:
+        _require_rigid(X, name)
+    step = 1 << 16  # Poses that are checked at a time, for memory.
+    for begin in range(0, len(X) if X.ndim > 2 else 0, step):
+        _require_rigid(X[begin : begin + step], name, begin)
+    return X
+
+
+def _require_rigid(X: Array, name: str, first: int = 0) -> None:
+    """Refuses poses (..., 4, 4) that are not rigid; `first` is the index of the first one."""
+    tolerance = 1e-6  # Largest deviation from orthonormality.
 
     def refuse(bad: NDArray[np.bool_], what: str) -> None:
         if bad.any():
-            index = ", ".join(str(i) for i in np.argwhere(bad)[0])
-            raise InvalidInputError(f"{name}{f'[{index}]' if index else ''} {what}")
+            index = np.argwhere(bad)[0]
+            index[:1] += first
+            where = ", ".join(str(i) for i in index)
+            raise InvalidInputError(f"{name}{f'[{where}]' if where else ''} {what}")
 
     refuse(
         ~np.isfinite(X).all(axis=(-2, -1)),
@@ -155,7 +167,6 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
     refuse(mirrored, "is not a rigid transform: its rotation part is a reflection (determinant -1)")
     last = np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
     refuse(last > tolerance, "has a last row that is not 0 0 0 1")
-    return X
 
 
 def swap_fingers(X_AG: ArrayLike) -> Array:

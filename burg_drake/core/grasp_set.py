@@ -25,6 +25,8 @@ from burg_drake.core.structured_text import parse_json
 
 def distinct_texts(texts: NDArray[np.str_]) -> set[str]:
     """The distinct texts of an array (N,)."""
+    if texts.strides == (0,):  # one text, repeated
+        texts = texts[:1]
     step = 1 << 14  # Texts that are converted to Python objects at a time.
     parts = (texts[begin : begin + step].tolist() for begin in range(0, len(texts), step))
     return set().union(*parts)
@@ -93,11 +95,11 @@ def _read_columns(
         raise ValueError(f"it has a further column {name!r}, which must not be called that")
     poses = array("X_OG")
     n = poses.require_rows(4, 4)
-    fixed = {"X_OG": poses.read("f").astype(float)}
+    fixed = {"X_OG": poses.read("f").astype(float, copy=False)}
     for name in FIXED_COLUMNS:
         is_text = name in ("id", "object")
         values = array(name).read("U" if is_text else "f", (n,))
-        fixed[name] = values if is_text else values.astype(float)
+        fixed[name] = values if is_text else values.astype(float, copy=False)
     columns = {name: array(key).read(NUMBER_KINDS + "U", (n,)) for name, key in further.items()}
     return fixed, columns
 
@@ -243,8 +245,8 @@ class GraspSet:
         poses = poses.reshape(-1, 4, 4)
         n = len(poses)
         names = _copy_column("object", np.asarray(object, dtype=str), n)
-        widths = _copy_column("width", np.asarray(np.nan if width is None else width, float), n)
-        widths += 0.0  # without negative zeros
+        widths = np.add(np.nan if width is None else width, 0.0, dtype=float)  # no negative zeros
+        widths = _copy_column("width", np.asarray(widths), n)
         _require_widths(widths)
         scores = _copy_column("score", np.asarray(np.nan if score is None else score, float), n)
         ids = grasp_identifiers(names, poses, widths)
@@ -335,12 +337,12 @@ class GraspSet:
             i = i.astype(int)  # an empty list is an array of floats
         return GraspSet(
             self.X_OG[i],
-            self.width[i],
-            self.id[i],
-            self.object[i],
-            self.score[i],
+            _select(self.width, i),
+            _select(self.id, i),
+            _select(self.object, i),
+            _select(self.score, i),
             self.provenance,
-            {name: values[i] for name, values in self.columns.items()},
+            {name: _select(values, i) for name, values in self.columns.items()},
         )
 
     @staticmethod
@@ -427,15 +429,15 @@ def require_valid_grasps(grasps: GraspSet) -> None:
     check_pose(grasps.X_OG, "X_OG")
     _require_widths(grasps.width)
     _, first, same = np.unique(grasps.id, return_index=True, return_inverse=True)
-    twin = first[same]
-    differs = grasps.object != grasps.object[twin]
-    differs |= (grasps.X_OG[twin] != grasps.X_OG).any((1, 2))
-    differs |= ~((grasps.width == grasps.width[twin]) | np.isnan(grasps.width))
-    differs |= np.isnan(grasps.width) != np.isnan(grasps.width[twin])
+    repeated = np.flatnonzero(first[same] != np.arange(len(grasps)))
+    twin = first[same[repeated]]
+    one, other = grasps.select(repeated), grasps.select(twin)
+    differs = (one.object != other.object) | (one.X_OG != other.X_OG).any((1, 2))
+    differs |= ~((one.width == other.width) | (np.isnan(one.width) & np.isnan(other.width)))
     if differs.any():
-        i = int(np.argmax(differs))
+        k = int(np.argmax(differs))
         raise InvalidInputError(
-            f"id[{twin[i]}] and id[{i}] are both {str(grasps.id[i])!r}, but the grasps"
+            f"id[{twin[k]}] and id[{repeated[k]}] are both {str(one.id[k])!r}, but the grasps"
             " differ; give each an id of its own"
         )
 
@@ -447,10 +449,18 @@ def _require_widths(width: Array) -> None:
 
 
 def _copy_column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
-    """A copy of values (n,), or a scalar repeated n times."""
+    """A copy of values (n,); a scalar is repeated n times, read-only and without further memory."""
     if values.shape not in ((), (n,)):
         raise InvalidInputError(f"{name} has shape {values.shape}; expected ({n},) or one value")
-    return np.array(np.broadcast_to(values, (n,)))
+    return np.broadcast_to(values.copy(), (n,)) if values.ndim == 0 else values.copy()
+
+
+def _select(values: NDArray[Any], index: NDArray[Any] | slice) -> NDArray[Any]:
+    """Values of a column at an index; a repeated one stays without memory of its own."""
+    chosen: NDArray[Any] = values[index]
+    if values.strides == (0,) and len(chosen):
+        return np.broadcast_to(values[0], chosen.shape)
+    return chosen
 
 
 def _concatenate_column(name: str, sets: list[GraspSet]) -> NDArray[Any]:

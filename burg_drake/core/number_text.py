@@ -40,8 +40,8 @@ def format_count(value: int | None) -> str:
 
 
 def count_with_noun(count: int, noun: str) -> str:
-    """A count with its noun, such as `1 object` and `2 objects`."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """A count with its noun, such as `1 object` and `2,000 objects`."""
+    return f"{format_count(count)} {noun}{'' if count == 1 else 's'}"
 
 
 def format_percent(share: float) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
-import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
@@ -20,7 +18,7 @@ from burg_drake.core import (
     InvalidInputError,
     Single,
     UnknownNameError,
-    ensure_writable_folder,
+    atomic_folder,
     suggest_names,
 )
 from burg_drake.dataset.sample import InstanceLabel, Sample
@@ -169,18 +167,8 @@ def new_folder(folder: str | Path) -> Iterator[Path]:
             raise InvalidInputError(f"{folder} is a file; give a folder for the export")
         if any(path.iterdir()):
             raise InvalidInputError(f"{folder} is not empty; choose another folder for the export")
-    ensure_writable_folder(path.parent)
-    fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    try:
-        fresh.mkdir()
+    with atomic_folder(path) as fresh:
         yield fresh
-        os.replace(fresh, path)
-    except OSError as error:
-        raise InvalidInputError(
-            f"cannot write {path}: {error.strerror or error}; choose a writable place with room"
-        ) from error
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
 
 
 def encode_color_image(image: Bytes, suffix: str) -> bytes:

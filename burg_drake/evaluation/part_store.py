@@ -376,7 +376,9 @@ def keep_parts(run: Run) -> None:
     """Writes parts of a run of one scene if it is large enough and pyarrow is installed."""
     if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
         return
-    update_parts(run)
+    writer = PartWriter(run)
+    writer.add_rows("", run)
+    writer.close()
 
 
 def update_parts(run: StoredResults) -> None:

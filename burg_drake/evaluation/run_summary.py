@@ -18,6 +18,7 @@ from burg_drake.core import (
     MarginNames,
     Outcome,
     Stage,
+    count_with_noun,
     list_names,
 )
 from burg_drake.evaluation.campaign_folder import Campaign
@@ -188,7 +189,7 @@ def _none_note(
     parts = [f"{_cause_words(Outcome(what), body)} in {n:,}" for (what, body), n in named]
     if rest := count - sum(n for _, n in named):
         parts.append(f"others in {rest:,}")
-    grasps = f"{count:,} grasp{'' if count == 1 else 's'}"
+    grasps = count_with_noun(count, "grasp")
     return f"{name}: none of {grasps} {achievement}: {', '.join(parts)}; {remedy}"
 
 

@@ -24,7 +24,6 @@ from .scene_export import (
     Exported as Exported,
     ExportRecord as ExportRecord,
     export_scene as export_scene,
-    replace_folder as replace_folder,
     require_own_folder as require_own_folder,
     write_record as write_record,
 )

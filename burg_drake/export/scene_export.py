@@ -5,10 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import pkgutil
-import secrets
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,10 +17,9 @@ from burg_drake.core import (
     InvalidInputError,
     MissingDependencyError,
     UnknownNameError,
-    ensure_writable_folder,
+    atomic_folder,
     list_names,
     load_document,
-    report_write_errors,
     save_document,
     suggest_names,
 )
@@ -148,7 +144,7 @@ def export_scene(
 
         parts = read_hand(build_station_diagram(scene, station, robot="hand"))
         write = partial(write, hand=parts)
-    with replace_folder(path) as fresh:
+    with atomic_folder(path, replace=True) as fresh:
         notes = write(layout, fresh)
         record = ExportRecord(
             format=to,
@@ -253,44 +249,6 @@ def require_own_folder(folder: str | Path) -> Path:
             f" write ({list_names(foreign)}); move them away, or choose a new folder"
         )
     return path
-
-
-@contextmanager
-def replace_folder(path: Path) -> Iterator[Path]:
-    """Yields a new folder beside `path` that replaces `path` when the block ends without an error.
-
-    Args:
-        path: result of `require_own_folder`.
-
-    Yields:
-        The folder to write into.
-
-    Raises:
-        InvalidInputError: the folder cannot be written; earlier contents stay.
-    """
-    token = secrets.token_hex(8)
-    fresh, old = (path.with_name(f".{path.name}.{token}{end}") for end in ("", ".old"))
-    ensure_writable_folder(path.parent)
-    try:
-        with report_write_errors(path):
-            fresh.mkdir()
-            yield fresh
-            _swap_folders(fresh, path, old)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
-
-
-def _swap_folders(fresh: Path, path: Path, old: Path) -> None:
-    """Replaces `path` by `fresh`; `path` is kept as `old` until that has succeeded."""
-    if path.exists():
-        path.rename(old)
-    try:
-        fresh.rename(path)
-    except OSError:
-        if old.exists():
-            old.rename(path)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
 
 
 def write_record(folder: Path, record: ExportRecord) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core import (
     MESH_FILE,
@@ -18,6 +19,7 @@ from burg_drake.core import (
     Outcome,
     UnknownNameError,
     distinct_texts,
+    grasp_identifiers,
     list_names,
     make_name,
     provenance_parts,
@@ -166,14 +168,29 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
             raise UnknownNameError(
                 f"no grasps are of object {name!r}; {suggest_names(name, known)}"
             )
+    if all(old == new for old, new in names.items()):
+        ids = grasp_identifiers(grasps.object, grasps.X_OG, grasps.width)
+        if np.array_equal(ids, grasps.id):
+            return grasps
     return GraspSet.create(
         grasps.X_OG,
-        object=np.array([names.get(name, name) for name in grasps.object.tolist()], dtype=str),
+        object=_rename(grasps.object, {name: names.get(name, name) for name in known}),
         width=grasps.width,
         score=grasps.score,
         provenance=_rename_in_provenance(grasps.provenance, names),
         columns=grasps.columns,
     )
+
+
+def _rename(objects: NDArray[np.str_], names: Mapping[str, str]) -> NDArray[np.str_] | str:
+    """New names (N,) of objects with the given names, or the only one."""
+    longest = max(names.values(), key=len)
+    if len({*names.values()}) == 1:
+        return longest
+    renamed = np.full(len(objects), longest)
+    for old, new in names.items():
+        renamed[objects == old] = new
+    return renamed
 
 
 def _rename_in_provenance(provenance: Any, names: Mapping[str, str]) -> Any:

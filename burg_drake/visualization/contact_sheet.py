@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import burg_drake
-from burg_drake.core import atomic_write
+from burg_drake.core import atomic_write, count_with_noun
 from burg_drake.objects import ContactGeometry, ObjectEntry, ObjectLibrary, StablePose
 from burg_drake.visualization.html_page import render_page
 from burg_drake.visualization.thumbnails import ObjectRenderer
@@ -50,7 +50,7 @@ def write_contact_sheet(
     page = render_page(
         "visualization/contact_sheet.html.jinja",
         library=library,
-        about=f"{_count_text(len(chosen), 'object')}, {_count_text(poses, 'stable pose')}",
+        about=f"{count_with_noun(len(chosen), 'object')}, {count_with_noun(poses, 'stable pose')}",
         cards=cards,
         remarks=remarks or {},
         version=burg_drake.__version__,
@@ -75,7 +75,7 @@ def _object_card(library: ObjectLibrary, name: str, renderer: ObjectRenderer) ->
         "description": entry.description,
         "portrait": renderer.portrait(name),
         "pieces": renderer.pieces(name),
-        "piece_count": _count_text(len(entry.pieces), "piece"),
+        "piece_count": count_with_noun(len(entry.pieces), "piece"),
         "figures": _object_figures(entry),
         "poses": poses,
         "notes": surface_notes(library, name),
@@ -160,7 +160,3 @@ def _three_digits(value: float) -> str:
 
 def _length_text(length: float) -> str:
     return f"{1e3 * length:.0f}" if length >= 0.00995 else f"{1e3 * length:.1f}"
-
-
-def _count_text(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -19,6 +19,7 @@ from burg_drake.core import (
     InvalidInputError,
     Outcome,
     Rgba,
+    count_with_noun,
     describe_column,
     transform_points,
 )
@@ -122,7 +123,7 @@ def group_by_name(names: Sequence[str]) -> tuple[GraspGroup, ...]:
     ]
     rest = ranked[len(own) :]
     if rest:
-        label = f"{len(rest)} other{'' if len(rest) == 1 else 's'}"
+        label = count_with_noun(len(rest), "other")
         groups.append(
             GraspGroup("others", label, OTHERS_COLOR, np.flatnonzero(np.isin(texts, rest)))
         )

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from pydrake.geometry import Box, Mesh, Meshcat, Rgba
 from pydrake.math import RigidTransform
 
-from burg_drake.core import Array, GraspSet, InvalidInputError, distinct_colors, make_pose, rot_z
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    InvalidInputError,
+    count_with_noun,
+    distinct_colors,
+    make_pose,
+    rot_z,
+)
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 from burg_drake.visualization.colors import hex_color
@@ -199,7 +207,7 @@ def _object_things(
     draw_contact = partial(_draw_contact, meshes=contact, R_WO=R_WO)
     columns = (
         ("visual", "visual", corners, draw_visual),
-        ("pieces", f"{count} piece{'' if count == 1 else 's'}", np.vstack(apart), draw_pieces),
+        ("pieces", count_with_noun(count, "piece"), np.vstack(apart), draw_pieces),
         ("contact", kind, touching, draw_contact),
     )
     things = []
@@ -385,7 +393,7 @@ def _object_with_grasps(
     own = grasps.object == name
     drawn, _ = grasp_triangles(grasps.X_OG[own], width[own])
     count = int(own.sum())
-    caption = _caption_mesh((name, f"{count} grasp{'' if count == 1 else 's'}"), unit)
+    caption = _caption_mesh((name, count_with_noun(count, "grasp")), unit)
     item = _room_for(np.vstack([corners, drawn.T]) @ R_WO.T, caption)
     visual = gltf_mesh(library.path(library.entry(name).mesh))
     path = f"{GALLERY_PATH}/visual/{name}"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Box, Meshcat, Rgba
 from pydrake.math import RigidTransform
 
-from burg_drake.core import Array, make_pose, transform_points
+from burg_drake.core import Array, count_with_noun, make_pose, transform_points
 from burg_drake.motion import ArmSpan, ReachabilityMap
 from burg_drake.scene import Scene
 from burg_drake.station import Camera, Robot, Station, SurroundingsProperties, frustum
@@ -92,7 +92,7 @@ def board_condition(scene: Scene) -> str:
     count = len(scene.instances) + len(scene.background)
     if count == 0:
         return "board empty"
-    return f"with the {count} object{'' if count == 1 else 's'} of {scene.name} in the way"
+    return f"with the {count_with_noun(count, 'object')} of {scene.name} in the way"
 
 
 def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[LegendEntry, Array]:

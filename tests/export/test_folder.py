@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core import InvalidInputError, load_document
+from burg_drake.core import InvalidInputError, atomic_folder, load_document
 from burg_drake.export import (
     ExportRecord,
     export_scene,
-    replace_folder,
     require_own_folder,
     write_record,
 )
@@ -20,7 +19,7 @@ RECORD = ExportRecord(format="sdf", scene="s", scene_content="", main="a", softw
 
 
 def export(path: Path, **files: str) -> None:
-    with replace_folder(require_own_folder(path)) as fresh:
+    with atomic_folder(require_own_folder(path), replace=True) as fresh:
         for name, text in files.items():
             (fresh / name).write_text(text)
         write_record(fresh, RECORD)
@@ -80,7 +79,7 @@ def test_what_fails_half_way_leaves_everything_as_it_was(tmp_path: Path) -> None
     export(tmp_path / "out", a="1")
     with (
         pytest.raises(ZeroDivisionError),
-        replace_folder(require_own_folder(tmp_path / "out")) as fresh,
+        atomic_folder(require_own_folder(tmp_path / "out"), replace=True) as fresh,
     ):
         (fresh / "a").write_text("2")
         raise ZeroDivisionError

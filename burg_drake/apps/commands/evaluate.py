@@ -75,8 +75,8 @@ def second_opinion_line(columns: evaluation.Columns) -> str:
         for was, now in zip(before[again].tolist(), outcome[again].tolist(), strict=True)
         if was != now
     )
-    many = "" if len(again) == 1 else "s"
-    text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
+    settled = core.count_with_noun(len(again), "contested grasp")
+    text = f"settled {settled} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     text += f" ({details})" if details else ""
     close = int((confidence[again] < core.CONTESTED_CONFIDENCE).sum())

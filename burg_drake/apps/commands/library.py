@@ -31,8 +31,7 @@ def run_library_list(arguments: argparse.Namespace) -> int:
 
     library = load_library(arguments.library)
     print_library(library)
-    count = len(library.objects)
-    print(f"{count} object{'' if count == 1 else 's'} in {library.root}")
+    print(f"{core.count_with_noun(len(library.objects), 'object')} in {library.root}")
     return 0
 
 
@@ -48,7 +47,7 @@ def run_library_check(arguments: argparse.Namespace) -> int:
         print(f"{'error' if issue.is_error else 'warning'}: {where}{issue.kind}: {issue.message}")
     errors = sum(issue.is_error for issue in issues)
     counts = {"object": len(library.objects), "error": errors, "warning": len(issues) - errors}
-    words = [f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items()]
+    words = [core.count_with_noun(n, what) for what, n in counts.items()]
     print(f"{library.root}: {', '.join(words)}")
     return 1 if errors else 0
 

@@ -233,7 +233,7 @@ def run_scene_validate(arguments: argparse.Namespace) -> int:
         print(f"{'error' if issue.is_error else 'warning'}: {issue.message}")
     count = len(scene.instances)
     if not issues and count:
-        objects = f"{count} object{'' if count == 1 else 's'}"
+        objects = core.count_with_noun(count, "object")
         print(
             f"{scene.path}: no mistakes on station {station.name}: {objects}, all standing within"
             " the board, none overlapping another"

@@ -8,6 +8,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from burg_drake import core
 from burg_drake.apps import options
 from burg_drake.apps.terminal import (
     ignore_interrupts,
@@ -100,7 +101,7 @@ def _serve_setup_page(
 def _print_opened(served: ServedPage, session: ComposeSession) -> None:
     view = session.view
     count = len(view.instances)
-    objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
+    objects = "no objects yet" if count == 0 else core.count_with_noun(count, "object")
     where = view.path or f"not saved yet, to be saved in {session.folder}"
     print(f"{view.document.name} ({objects}, {where}): open {served.url} in a browser", flush=True)
     for notice in view.notices:

@@ -11,7 +11,14 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import CONTESTED_CONFIDENCE, Outcome, Stage, atomic_write, format_count
+from burg_drake.core import (
+    CONTESTED_CONFIDENCE,
+    Outcome,
+    Stage,
+    atomic_write,
+    count_with_noun,
+    format_count,
+)
 from burg_drake.evaluation.campaign_folder import LEDGER_FILE, SCENES_FOLDER, Campaign
 from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, member_codes
 from burg_drake.evaluation.report.failure_sections import (
@@ -152,7 +159,7 @@ def _render_report(summary: Summary, **values: object) -> str:
 
 
 def _run_notice(run: Run) -> str:
-    judged, mine = len(run.results["id"]), len(run.assigned_ids)
+    judged, mine = run.rows().count, len(run.assigned_ids)
     parts = []
     if run.document.shard:
         number, _, whole = run.document.shard.partition("/")
@@ -195,7 +202,7 @@ def campaign_page(campaign: Campaign) -> str:
     text_columns = ("id", "object", "blocker", "outcome", "stage")
     document, summary = campaign.document, summarize(campaign)
     number = len(campaign.names)
-    scenes = f"{format_count(number)} scene{'' if number == 1 else 's'}"
+    scenes = count_with_noun(number, "scene")
     names = {*MAIN_MARGINS, *FURTHER_MARGINS, *CAUSE_MARGINS, *text_columns, *DRAWN_COLUMNS}
     stored = campaign.rows(sorted(names))
     outcomes = member_codes(stored.codes("outcome"), tuple(Outcome))

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core import format_duration, load_document, option_name
+from burg_drake.core import count_with_noun, format_duration, load_document, option_name
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.report.page_elements import ReportSection
@@ -272,7 +272,6 @@ def _session_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, 
     for session in document.stretches:
         judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
         took = "" if session.seconds is None else f" in {format_duration(session.seconds)}"
-        plural = "" if session.workers == 1 else "s"
-        text = f"{session.started}: {judged}{took}, {session.workers} worker{plural}"
+        text = f"{session.started}: {judged}{took}, {count_with_noun(session.workers, 'worker')}"
         lines.append(("judged", text))
     return [*lines, ("command", document.command)]

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, Mode, RealOutcome
+from burg_drake.core import InvalidInputError, Mode, RealOutcome, count_with_noun
 from burg_drake.evaluation import (
     HASH_DIGITS,
     RUN_FILE,
@@ -61,7 +61,7 @@ class Side:
         """Names of the engines of the verdicts, as text."""
         parts = [f"engine {self.engine}"]
         for name, count in self.judged_again.items():
-            parts.append(f"{count:,} grasp{'' if count == 1 else 's'} judged again by {name}")
+            parts.append(f"{count_with_noun(count, 'grasp')} judged again by {name}")
         return ", ".join(parts)
 
 

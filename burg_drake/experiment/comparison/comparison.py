@@ -9,7 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from burg_drake.core import MISSING_NUMBER, display_unit, format_number, outcome_label
+from burg_drake.core import (
+    MISSING_NUMBER,
+    count_with_noun,
+    display_unit,
+    format_number,
+    outcome_label,
+)
 from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
 from burg_drake.experiment.comparison.confusion_matrix import (
@@ -191,11 +197,10 @@ def headline_sentence(comparison: Comparison) -> str:
             f" success in {brief_share_text(found.predicted)} by the first ({c.first.label}) and in"
             f" {brief_share_text(found.actual)} by the second ({c.reference.label})."
         )
-    plural = "" if found.trials == 1 else "s"
-    trials = f"{found.trials:,} trial{plural} on the robot"
+    trials = f"{count_with_noun(found.trials, 'trial')} on the robot"
     where = f"In {trials}"
     if population_agreement(c.judgement) is not None:
-        stand = "stand" if plural else "stands"
+        stand = "stands" if found.trials == 1 else "stand"
         where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for,"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
@@ -339,7 +344,7 @@ def unpredictable_sentence(judged: Judgement) -> str:
     every = None if population_agreement(judged) is None else found.all_grasps
     without = every or found.selected
     return (
-        f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
+        f"{count_with_noun(count, 'trial')} failed for reasons that a run of the hand"
         f" alone cannot predict ({outcome_counts_text(found.outcomes)}),"
         f" {found.predicted_successes:,} of them after a predicted success. They count as"
         f" failures; without them precision is {brief_share_text(without.precision)}"

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import PUSHED_PREFIX, Outcome, atomic_write, format_percent, outcome_label
+from burg_drake.core import (
+    PUSHED_PREFIX,
+    Outcome,
+    atomic_write,
+    count_with_noun,
+    format_percent,
+    outcome_label,
+)
 from burg_drake.evaluation import (
     GROUP_CLASSES,
     MIN_PUSH,
@@ -154,8 +161,8 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
     columns = []
     for step in steps.steps:
         outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
-        plural = "" if len(step.runs) == 1 else "s"
-        scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
+        placed = step.name == "placed"
+        scenes = f" in {count_with_noun(len(step.runs), 'scene')}" if placed else ""
         columns.append(FlowColumn(GAP_STEP_TITLES[step.name] + scenes, outcomes))
     scale = [1.0 / max(len(step.runs), 1) for step in steps.steps]
     return section(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import product
 
-from burg_drake.core import Stage, TextTable, format_percent, outcome_label
+from burg_drake.core import Stage, TextTable, count_with_noun, format_percent, outcome_label
 from burg_drake.evaluation import command, interval_mark, section
 from burg_drake.experiment.comparison.finding_tables import FindingTable
 from burg_drake.experiment.gap.rejudging import (
@@ -64,7 +64,6 @@ def _unpredictable_sentence(found: Rejudging) -> list[str]:
     if not apart:
         return []
     ended = Counter(outcome_label(trial.real) for trial in apart)
-    plural = "" if len(apart) == 1 else "s"
     texts = ", ".join(f"{n} {name}" for name, n in ended.most_common())
     precision = "; ".join(
         f"{name} {_share_text(found.precision(measured=m, every=True))} with them,"
@@ -72,7 +71,7 @@ def _unpredictable_sentence(found: Rejudging) -> list[str]:
         for name, m in (("as planned", False), ("as measured", True))
     )
     return [
-        f"{len(apart)} trial{plural} failed for reasons that a run of the hand alone"
+        f"{count_with_noun(len(apart), 'trial')} failed for reasons that a run of the hand alone"
         f" cannot predict ({texts}). They are counted separately, as neither placement"
         f" nor physics caused them. Precision {precision}."
     ]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import burg_drake
-from burg_drake.core import RealOutcome, outcome_label, transform_points
+from burg_drake.core import RealOutcome, count_with_noun, outcome_label, transform_points
 from burg_drake.experiment.lab.trial_pictures import (
     GRASP_PICTURE_SIZE,
     SETUP_PICTURE_SIZE,
@@ -162,8 +162,7 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
     robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in tried))
     scenes = list(dict.fromkeys(one.scene.name for one in tried))
     done = sum(trial.outcome is not None for trial in sheet.trials)
-    count = len(sheet.trials)
-    about = [f"{count} trials in {len(blocks)} block{'' if len(blocks) == 1 else 's'}"]
+    about = [f"{len(sheet.trials)} trials in {count_with_noun(len(blocks), 'block')}"]
     about += [f"seed {sheet.selection.seed}", f"file {runs.path.name}"]
     about += [f"planned {sheet.created[:10]}"] if sheet.created else []
     about += [f"{done} carried out so far"] if done else []
