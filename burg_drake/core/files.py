@@ -224,7 +224,7 @@ def atomic_folder(path: Path, *, replace: bool = False) -> Iterator[Path]:
         with report_write_errors(path):
             fresh.mkdir()
             yield fresh
-            if replace and path.exists():
+            if replace and path.is_dir():
                 path.rename(old)
             try:
                 fresh.rename(path)

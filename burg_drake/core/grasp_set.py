@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -25,7 +25,7 @@ from burg_drake.core.structured_text import parse_json
 
 def distinct_texts(texts: NDArray[np.str_]) -> set[str]:
     """The distinct texts of an array (N,)."""
-    if texts.strides == (0,):  # one text, repeated
+    if _is_repeated(texts):
         texts = texts[:1]
     step = 1 << 14  # Texts that are converted to Python objects at a time.
     parts = (texts[begin : begin + step].tolist() for begin in range(0, len(texts), step))
@@ -187,6 +187,9 @@ class GraspSet:
         grasps = grasps.select(grasps.score > 0.5)
         grasps.save("grasps.h5")
 
+    The arrays are not to be changed in place, as identifiers depend on them; a value that was given
+    for all grasps is stored once, read-only.
+
     Attributes:
         X_OG: (N, 4, 4) grasp poses in the object frame.
         width: (N,) distance between the contacts along the closing direction [m]; NaN if unknown.
@@ -245,7 +248,7 @@ class GraspSet:
         poses = poses.reshape(-1, 4, 4)
         n = len(poses)
         names = _copy_column("object", np.asarray(object, dtype=str), n)
-        widths = np.add(np.nan if width is None else width, 0.0, dtype=float)  # no negative zeros
+        widths = np.asarray(np.nan if width is None else width, float) + 0.0  # no negative zeros
         widths = _copy_column("width", np.asarray(widths), n)
         _require_widths(widths)
         scores = _copy_column("score", np.asarray(np.nan if score is None else score, float), n)
@@ -301,7 +304,7 @@ class GraspSet:
         for name, given in values.items():
             column = _copy_column(name, np.asarray(given), len(self))
             if name == "score":
-                score = column.astype(float)
+                score = column.astype(float, copy=False)
             elif name in FIXED_COLUMNS:
                 raise InvalidInputError(
                     f"column {name!r} is a part of every grasp and cannot be replaced;"
@@ -364,10 +367,10 @@ class GraspSet:
             return replace(one, provenance={"parts": [dict(one.provenance)]})
         return GraspSet(
             np.concatenate([s.X_OG for s in parts]),
-            np.concatenate([s.width for s in parts]),
-            np.concatenate([s.id for s in parts]),
-            np.concatenate([s.object for s in parts]),
-            np.concatenate([s.score for s in parts]),
+            _join([s.width for s in parts]),
+            _join([s.id for s in parts]),
+            _join([s.object for s in parts]),
+            _join([s.score for s in parts]),
             {"parts": [dict(s.provenance) for s in parts]},
             {name: _concatenate_column(name, parts) for name in names},
         )
@@ -449,18 +452,32 @@ def _require_widths(width: Array) -> None:
 
 
 def _copy_column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
-    """A copy of values (n,); a scalar is repeated n times, read-only and without further memory."""
+    """A copy of values (n,), or one value for all."""
     if values.shape not in ((), (n,)):
         raise InvalidInputError(f"{name} has shape {values.shape}; expected ({n},) or one value")
-    return np.broadcast_to(values.copy(), (n,)) if values.ndim == 0 else values.copy()
+    if values.ndim == 0 or _is_repeated(values):
+        return np.broadcast_to(np.atleast_1d(values)[:1].copy(), n)
+    return values.copy()
+
+
+def _is_repeated(values: NDArray[Any]) -> bool:
+    """Whether a column (N,) holds one value that all grasps share, in the memory of one."""
+    return values.strides == (0,) and len(values) > 0
 
 
 def _select(values: NDArray[Any], index: NDArray[Any] | slice) -> NDArray[Any]:
-    """Values of a column at an index; a repeated one stays without memory of its own."""
+    """Values of a column at an index."""
     chosen: NDArray[Any] = values[index]
-    if values.strides == (0,) and len(chosen):
-        return np.broadcast_to(values[0], chosen.shape)
-    return chosen
+    return np.broadcast_to(values[:1], len(chosen)) if _is_repeated(values) else chosen
+
+
+def _join(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Joins the values of a column in several sets."""
+    if all(map(_is_repeated, columns)):
+        values = {(column.dtype, column[:1].tobytes()) for column in columns}
+        if len(values) == 1:
+            return np.broadcast_to(columns[0][:1], sum(map(len, columns)))
+    return np.concatenate(columns)
 
 
 def _concatenate_column(name: str, sets: list[GraspSet]) -> NDArray[Any]:
@@ -472,4 +489,4 @@ def _concatenate_column(name: str, sets: list[GraspSet]) -> NDArray[Any]:
         )
     missing = "" if kinds == {True} else np.nan
     filled = [s.columns.get(name, np.full(len(s), missing)) for s in sets]
-    return np.concatenate([values for values in filled if len(values)] or filled[:1])
+    return _join([values for values in filled if len(values)] or filled[:1])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import overload
 
@@ -118,6 +120,15 @@ class Candidates:
         """Identifiers in order: instance and grasp, joined by a hyphen."""
         return GraspIds(self.instance, self.grasps.id)
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of grasps of each instance that has some."""
+        begins = np.flatnonzero(np.append(True, self.instance[1:] != self.instance[:-1]))
+        counts: Counter[str] = Counter()
+        for begin, end in pairwise([*begins.tolist(), len(self)]):
+            counts[str(self.instance[begin])] += end - begin
+        return counts
+
     def at(self, rows: Sequence[int] | NDArray[np.int64]) -> Sequence[Candidate]:
         """Candidates at the given rows (M,), each made on access."""
         return _ChosenCandidates(self, rows)
@@ -175,7 +186,7 @@ class Candidates:
 
 
 def _hashes(ids: Iterable[str], count: int) -> NDArray[np.int64]:
-    """Hashes (N,) of identifiers, in less memory than the identifiers take."""
+    """Hashes (N,) of identifiers, of which each takes eight bytes; a text takes fifty."""
     return np.fromiter(map(hash, ids), np.int64, count)
 
 
@@ -226,9 +237,14 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
                 f"the grasps given for {name!r} are of object {min(others)!r}, but "
                 f"{name!r} is object {expected!r} in the scene"
             )
-    return join_candidates(
-        {name: drop_equal_grasps(grasps[name]) for name in scene.instances if name in grasps}
-    )
+    known = {name: without_instance(grasps[name]) for name in scene.instances if name in grasps}
+    return join_candidates({name: drop_equal_grasps(part) for name, part in known.items()})
+
+
+def without_instance(grasps: GraspSet) -> GraspSet:
+    """The grasps without the column `instance`."""
+    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN}
+    return dataclasses.replace(grasps, columns=columns)
 
 
 def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> None:
@@ -268,7 +284,7 @@ def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
 
 def drop_equal_grasps(grasps: GraspSet) -> GraspSet:
     """Keeps the first of equal grasps, in the given order."""
-    hashes = _hashes(grasps.id, len(grasps))  # sorted in less memory than identifiers
+    hashes = _hashes(grasps.id, len(grasps))  # sorted in less memory than texts
     if len(np.unique(hashes)) == len(grasps):
         return grasps
     _, first = np.unique(grasps.id, return_index=True)

@@ -509,8 +509,8 @@ def _record_grasps(
 ) -> RunDocument:
     names = document.grasps.only or scene.instances
     counts = Counter({scene.instance(name).object: 0 for name in names})
-    for name, count in zip(*np.unique(candidates.instance, return_counts=True), strict=True):
-        counts[scene.instance(str(name)).object] += int(count)
+    for name, count in candidates.counts.items():
+        counts[scene.instance(name).object] += count
     return replace(
         document,
         grasps=replace(

@@ -33,7 +33,7 @@ from burg_drake.evaluation.outcome_counts import (
     member_codes,
     stage_cost,
 )
-from burg_drake.evaluation.results_table import contested_rows
+from burg_drake.evaluation.results_table import TextValues, contested_rows
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.evaluation.trial_origin import read_motion
 from burg_drake.station import GraspMotion
@@ -80,8 +80,7 @@ def run_shortfall_notes(run: Run) -> list[str]:
     asked = run.document.grasps.per_object
     if asked is None:
         return []
-    names, counts = np.unique(run.candidates.instance, return_counts=True)
-    found = Counter(dict(zip(names.tolist(), counts.tolist(), strict=True)))
+    found = run.candidates.counts
     parts = run.candidates.grasps.provenance.get("parts", {})
     notes = (shortfall_note(name, asked, part, found[name]) for name, part in parts.items())
     return [note for note in notes if note]
@@ -99,13 +98,33 @@ def _unexecuted_notes(run: Run) -> list[str]:
     for name, count in run.document.grasps.objects.items():
         mine = np.flatnonzero(objects.equal(name))
         if count and len(mine) == count and not executed[mine].any():
-            outcomes, blockers = (rows.cells(key, mine) for key in ("outcome", "blocker"))
-            stages = Counter(rows.cells("stage", mine).tolist())
-            remedy = _remedy(Stage(stages.most_common(1)[0][0]), given=given)
-            if other := _motion_remedy(_most_frequent_outcome(outcomes, blockers), motion):
+            causes = _causes_of_rows(outcome, rows.codes("blocker"), mine)
+            ((stage, _),) = rows.codes("stage").most_common(mine, 1)
+            remedy = _remedy(Stage(stage), given=given)
+            if other := _motion_remedy(_most_frequent_outcome(causes), motion):
                 remedy = f"{other} may help; {remedy}"
-            notes.append(_none_note(name, "was executed", outcomes, blockers, remedy))
+            notes.append(_none_note(name, "was executed", causes, remedy))
     return notes
+
+
+Causes = Counter[tuple[str, str]]
+"""Number of grasps by outcome and blocker."""
+
+
+def _causes_of_rows(outcome: TextValues, blocker: TextValues, rows: NDArray[np.int64]) -> Causes:
+    """Causes of the grasps in the given rows (M,), in the order in which they occur."""
+    pairs = outcome.codes[rows].astype(np.int64) * len(blocker.names) + blocker.codes[rows]
+    found, first, counts = np.unique(pairs, return_index=True, return_counts=True)
+    causes: Causes = Counter()
+    for k in np.argsort(first).tolist():
+        what, body = divmod(int(found[k]), len(blocker.names))
+        causes[outcome.names[what], blocker.names[body]] = int(counts[k])
+    return causes
+
+
+def _causes_of(outcomes: NDArray[np.str_], blockers: NDArray[np.str_]) -> Causes:
+    """Causes of grasps with these outcomes and blockers (N,)."""
+    return Counter(zip(outcomes.tolist(), blockers.tolist(), strict=True))
 
 
 def _remedy(stage: Stage, *, given: bool) -> str:
@@ -151,7 +170,8 @@ def unclear_notes(
         mine = objects == name
         if not clear[mine].any():
             remedy = _remedy(Stage.CLEAR, given=given)
-            notes.append(_none_note(name, "is clear", outcomes[mine], blockers[mine], remedy))
+            causes = _causes_of(outcomes[mine], blockers[mine])
+            notes.append(_none_note(name, "is clear", causes, remedy))
     return tuple(notes)
 
 
@@ -172,20 +192,17 @@ def unmoved_notes(
     notes = []
     for name in dict.fromkeys(objects.tolist()):
         mine = objects == name
-        own = (outcomes[mine], blockers[mine])
-        if (own[0] == Outcome.REACHABLE).any():
+        if (outcomes[mine] == Outcome.REACHABLE).any():
             continue
-        if other := _motion_remedy(_most_frequent_outcome(*own), motion):
-            notes.append(_none_note(name, "is reachable", *own, f"{other} may help"))
+        causes = _causes_of(outcomes[mine], blockers[mine])
+        if other := _motion_remedy(_most_frequent_outcome(causes), motion):
+            notes.append(_none_note(name, "is reachable", causes, f"{other} may help"))
     return tuple(notes)
 
 
-def _none_note(
-    name: str, achievement: str, outcomes: NDArray[np.str_], blockers: NDArray[np.str_], remedy: str
-) -> str:
-    """Note that none of an object's grasps gets that far, with the most frequent causes."""
-    count = len(outcomes)
-    named = _frequent_causes(outcomes, blockers)
+def _none_note(name: str, achievement: str, causes: Causes, remedy: str) -> str:
+    """Note that none of an object's grasps gets that far, with the three most frequent causes."""
+    count, named = causes.total(), causes.most_common(3)
     parts = [f"{_cause_words(Outcome(what), body)} in {n:,}" for (what, body), n in named]
     if rest := count - sum(n for _, n in named):
         parts.append(f"others in {rest:,}")
@@ -193,16 +210,9 @@ def _none_note(
     return f"{name}: none of {grasps} {achievement}: {', '.join(parts)}; {remedy}"
 
 
-def _frequent_causes(
-    outcomes: NDArray[np.str_], blockers: NDArray[np.str_]
-) -> list[tuple[tuple[str, str], int]]:
-    """The three most frequent pairs of outcome and blocker, with their counts."""
-    return Counter(zip(outcomes.tolist(), blockers.tolist(), strict=True)).most_common(3)
-
-
-def _most_frequent_outcome(outcomes: NDArray[np.str_], blockers: NDArray[np.str_]) -> Outcome:
-    """The outcome of the most frequent pair of outcome and blocker."""
-    return Outcome(_frequent_causes(outcomes, blockers)[0][0][0])
+def _most_frequent_outcome(causes: Causes) -> Outcome:
+    """The outcome of the most frequent cause."""
+    return Outcome(causes.most_common(1)[0][0][0])
 
 
 def _cause_words(outcome: Outcome, blocker: str) -> str:

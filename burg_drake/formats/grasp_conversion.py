@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -168,13 +169,14 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
             raise UnknownNameError(
                 f"no grasps are of object {name!r}; {suggest_names(name, known)}"
             )
-    if all(old == new for old, new in names.items()):
+    objects = _rename(grasps.object, {name: names.get(name, name) for name in known})
+    if all(old == new for old, new in names.items()):  # needs no copy of the poses
         ids = grasp_identifiers(grasps.object, grasps.X_OG, grasps.width)
         if np.array_equal(ids, grasps.id):
-            return grasps
+            return replace(grasps, object=objects)
     return GraspSet.create(
         grasps.X_OG,
-        object=_rename(grasps.object, {name: names.get(name, name) for name in known}),
+        object=objects,
         width=grasps.width,
         score=grasps.score,
         provenance=_rename_in_provenance(grasps.provenance, names),
@@ -182,11 +184,11 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
     )
 
 
-def _rename(objects: NDArray[np.str_], names: Mapping[str, str]) -> NDArray[np.str_] | str:
-    """New names (N,) of objects with the given names, or the only one."""
+def _rename(objects: NDArray[np.str_], names: Mapping[str, str]) -> NDArray[np.str_]:
+    """Objects (N,) by their new names; `names` has a new name for each."""
     longest = max(names.values(), key=len)
     if len({*names.values()}) == 1:
-        return longest
+        return np.broadcast_to(np.array(longest), len(objects))
     renamed = np.full(len(objects), longest)
     for old, new in names.items():
         renamed[objects == old] = new

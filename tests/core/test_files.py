@@ -7,6 +7,7 @@ import pytest
 
 from burg_drake.core import (
     InvalidInputError,
+    atomic_folder,
     atomic_write,
     atomic_write_all,
     ensure_writable_folder,
@@ -138,6 +139,23 @@ def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> Non
         atomic_write_all({beside: "new", table / "below": "new"})
     assert (table.read_text(), beside.read_text()) == ("1", "2")
     assert sorted(tmp_path.iterdir()) == [table, beside]
+
+
+def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "folder"
+    with pytest.raises(KeyError), atomic_folder(target) as fresh:
+        (fresh / "half").write_text("")
+        raise KeyError
+    assert [*(tmp_path / "new").iterdir()] == []
+    with atomic_folder(target) as fresh:
+        (fresh / "one").write_text("")
+    with pytest.raises(InvalidInputError, match="not empty"), atomic_folder(target) as fresh:
+        (fresh / "two").write_text("")
+    assert [path.name for path in target.iterdir()] == ["one"]
+    with atomic_folder(target, replace=True) as fresh:
+        (fresh / "two").write_text("")
+    assert [path.name for path in target.iterdir()] == ["two"]
+    assert [path.name for path in target.parent.iterdir()] == ["folder"]
 
 
 def test_a_lock_is_for_one_or_shared(tmp_path: Path) -> None:

@@ -188,5 +188,12 @@ def test_check_pose_error_texts():
     assert message(bad) == "X_SO of 'mug'[0] has a last row that is not 0 0 0 1"
 
 
+def test_check_pose_names_a_pose_far_down():
+    many = np.tile(np.eye(4), (140_000, 1, 1))
+    many[131_500, 3, 1] = 0.5
+    with pytest.raises(InvalidInputError, match=r"^X\[131500\] has a last row"):
+        frames.check_pose(many, "X")
+
+
 def test_check_pose_accepts_what_text_files_round():
     frames.check_pose(np.round(random_poses(100, 14), 7), "X")

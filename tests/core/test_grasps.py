@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -58,6 +59,35 @@ def test_storage_restores_every_bit(tmp_path: Path, suffix: str):
     grasps().select([]).save(tmp_path / f"empty{suffix}")
     empty = GraspSet.load(tmp_path / f"empty{suffix}")
     assert len(empty) == 0 and empty.column_names == grasps().column_names
+
+
+def test_a_value_for_all_grasps_is_stored_once_and_files_do_not_tell(tmp_path: Path):
+    once = GraspSet.create(poses(20), object="größe", score=-0.5, columns={"hand": "panda"})
+    full = dataclasses.replace(
+        once,
+        **{name: once.column(name).copy() for name in ("width", "object", "score")},
+        columns={"hand": once.columns["hand"].copy()},
+    )
+    chosen = np.arange(20) % 3 > 0
+    for name, change in {
+        "same": lambda g: g,
+        "mask": lambda g: g.select(chosen),
+        "rows": lambda g: g.select([3, 3, 1]),
+        "one": lambda g: g.select([4]),
+        "none": lambda g: g.select([]),
+        "joined": lambda g: GraspSet.concatenate([g.select(chosen), g]),
+        "other": lambda g: GraspSet.concatenate([g, GraspSet.create(poses(2), object="mug")]),
+        "swapped": lambda g: g.canonical(),
+    }.items():
+        sets = [change(once), change(full)]
+        assert_identical(*sets)
+        for suffix in (".npz", ".h5"):
+            paths = [tmp_path / f"{name}_{k}{suffix}" for k in range(2)]
+            for grasps, path in zip(sets, paths, strict=True):
+                grasps.save(path)
+            assert paths[0].read_bytes() == paths[1].read_bytes()
+    joined = GraspSet.concatenate([once.select(chosen), once])
+    assert {joined.column(name).strides for name in ("width", "object", "score", "hand")} == {(0,)}
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".h5"])

@@ -119,6 +119,19 @@ def test_given_grasps_are_used_as_they_are(scene: Scene) -> None:
     given = given_candidates(scene, {"right": GraspSet.create(X_OG, object="cube")})
     assert given.instance.tolist() == ["right", "right"]  # the third is the first again
     np.testing.assert_array_equal(given.grasps.X_OG, X_OG[:2])
+    assert given.counts == {"right": 2}
+
+
+def test_grasps_with_equal_hashes_are_not_taken_for_equal(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2], [0, 0, 0.1]])
+    grasps = GraspSet.create(X_OG, object="cube").with_columns(instance="elsewhere")
+    monkeypatch.setattr(sys.modules[Candidates.__module__], "hash", lambda _: 7, raising=False)
+    given = given_candidates(scene, {"right": grasps, "left": grasps.select([1])})
+    assert given.counts == {"left": 1, "right": 2}
+    assert given.rows(given.id).tolist() == [0, 1, 2]
+    assert not given.grasps.columns  # the mapping says on which instance the grasps are
 
 
 def test_given_grasps_must_fit_the_scene(scene: Scene) -> None:

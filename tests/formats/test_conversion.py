@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,20 @@ def test_objects_are_renamed_with_what_files_said_of_them() -> None:
         "seed": 1,
     }
     assert with_objects_renamed(grasps, {"": "mug"}).object.tolist() == ["mug"]
+
+
+def test_a_name_that_stays_gives_the_same_bytes_as_a_new_set() -> None:
+    X_OG = np.stack([np.eye(4), np.diag([-1.0, -1.0, 1.0, 1.0])])
+    both = GraspSet.create(X_OG, object=["mug", "screwdriver"])
+    kept, expected = both.select([0]), GraspSet.create(X_OG[:1], object="mug")
+    renamed = with_objects_renamed(kept, {"mug": "mug"})
+    assert renamed.object.dtype == expected.object.dtype != kept.object.dtype
+    assert renamed.id.tolist() == expected.id.tolist() and renamed.X_OG is kept.X_OG
+    moved = replace(kept, X_OG=X_OG[1:])  # its identifier is that of the old pose
+    fresh = GraspSet.create(X_OG[1:], object="mug")
+    assert with_objects_renamed(moved, {"mug": "mug"}).id.tolist() == fresh.id.tolist()
+    swapped = with_objects_renamed(both, {"mug": "screwdriver", "screwdriver": "mug"})
+    assert swapped.object.tolist() == ["screwdriver", "mug"]
 
 
 def test_names_that_do_not_fit_are_refused(both: GraspSet) -> None:

@@ -27,8 +27,9 @@ from burg_drake.evaluation.candidates import (
     InstanceNames,
     instances_by_name,
     require_instances,
+    without_instance,
 )
-from burg_drake.evaluation.grasp_sets.input import read_input, split_by_instance, without_instance
+from burg_drake.evaluation.grasp_sets.input import read_input, split_by_instance
 from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading, with_poses
 from burg_drake.formats import (
     PANDA_GRIPPER,

@@ -25,7 +25,7 @@ from burg_drake.core import (
     software_versions,
     suggest_names,
 )
-from burg_drake.evaluation.candidates import INSTANCE_COLUMN
+from burg_drake.evaluation.candidates import INSTANCE_COLUMN, without_instance
 from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, correct_grasps
 from burg_drake.evaluation.results_table import TEXT_COLUMNS
 from burg_drake.evaluation.run_folder import SCENE_FILE, STATION_FILE, Run, load_run
@@ -168,12 +168,6 @@ def split_by_instance(grasps: GraspSet) -> dict[str, GraspSet]:
         own = rest.select(slice(rows[0], rows[-1] + 1) if together else rows)
         found[name] = dataclasses.replace(own, provenance=provenance)
     return found
-
-
-def without_instance(grasps: GraspSet) -> GraspSet:
-    """The grasps without the column `instance`."""
-    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN}
-    return dataclasses.replace(grasps, columns=columns)
 
 
 OWN_FORMAT = "burg_drake"
