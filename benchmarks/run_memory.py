@@ -83,9 +83,8 @@ def measure(count: int) -> None:
     object = next(iter(scene.instances.values())).object
     grasps = burg.GraspSet.create(X_OG, object=object)
     del X_OG
-    arrays = sum(
-        a.nbytes for a in (grasps.X_OG, grasps.width, grasps.id, grasps.object, grasps.score)
-    )
+    columns = (grasps.X_OG, grasps.width, grasps.id, grasps.object, grasps.score)
+    arrays = sum(a.itemsize if a.strides == (0,) else a.nbytes for a in columns)
     reset_peak()
     executor, begun = RejectingExecutor(), time.process_time()
     settings = burg.EvaluationSettings(mode="hand")
