@@ -136,7 +136,7 @@ from .lab.lab_book import (
 )
 from .lab.lab_camera import LabCamera as LabCamera
 from .lab.painters import HAND_BODY as HAND_BODY, NO_BODY as NO_BODY
-from .lab.protocol import SheetOptions as SheetOptions, sheet_page as sheet_page
+from .lab.protocol import ProtocolOptions as ProtocolOptions, protocol_page as protocol_page
 from .lab.trial_pictures import (
     TARGET_RIM_COLOR as TARGET_RIM_COLOR,
     PictureCache as PictureCache,

@@ -110,7 +110,7 @@ def _entry_lines(trial: RealTrial) -> Html:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SheetOptions:
+class ProtocolOptions:
     """Options of the protocol page.
 
     Attributes:
@@ -122,8 +122,8 @@ class SheetOptions:
     printouts: Mapping[int, str] | None = None
 
 
-def sheet_page(
-    runs: TriedRuns, pictures: TrialPictures, options: SheetOptions | None = None
+def protocol_page(
+    runs: TriedRuns, pictures: TrialPictures, options: ProtocolOptions | None = None
 ) -> str:
     """The page.
 
@@ -132,14 +132,14 @@ def sheet_page(
         pictures: pictures of its trials.
         options: options; the defaults if None.
     """
-    options = options or SheetOptions()
+    options = options or ProtocolOptions()
     blocks = trials_by_block(runs.sheet)
     sections = [
         _block_section(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]
     return html_document(
         f"Trials on the robot: {runs.path.name}",
-        page_style("burg_drake.experiment.lab", "sheet_page.css"),
+        page_style("burg_drake.experiment.lab", "protocol.css"),
         _header(runs, blocks),
         *sections,
         element("footer", f"Written by burg_drake {burg_drake.__version__}."),
@@ -191,7 +191,7 @@ def _block_section(
     pictures: TrialPictures,
     number: int,
     trials: tuple[RealTrial, ...],
-    options: SheetOptions,
+    options: ProtocolOptions,
 ) -> Html:
     scene = runs.of(trials[0]).scene
     first, last = trials[0].number, trials[-1].number

@@ -106,31 +106,32 @@ def list_eligible_grasps(
 ) -> tuple[list[EligibleGrasps], list[str]]:
     """Eligible grasps of each run, and notes about them.
 
-    A grasp that several runs have judged on the same scene and station is one; it belongs to the
-    run that checks most: mode `arm` before `reach` before `hand`.
+    A grasp that several runs have judged on the same scene and station is listed once, for the run
+    that checks most: mode `arm` before `reach` before `hand`.
 
     Raises:
         InvalidInputError: reachable grasps are wanted of a run without an arm.
     """
     notes: list[str] = []
     pools = []
-    owned: defaultdict[tuple[str, str], set[str]] = defaultdict(set)
+    listed: defaultdict[tuple[str, str], set[str]] = defaultdict(set)
     order = sorted(runs, key=lambda k: (-MODES.index(runs[k].document.mode), runs[k].document.hash))
-    shared = _shared_worlds(runs)
+    shared = _shared_scenes_and_stations(runs)
     for key in order:
         run = runs[key]
         pool = _make_pool(key, run, among, notes)
-        world = (run.document.scene.content, run.document.station.content)
-        if world in shared:
-            own = grasp_contents(run)
-            twice = np.isin(pool.cells("id"), [id for id, c in own.items() if c in owned[world]])
-            owned[world].update(own.values())
-            if twice.any():
+        place = (run.document.scene.content, run.document.station.content)
+        if place in shared:
+            contents = grasp_contents(run)
+            repeated_ids = [id for id, content in contents.items() if content in listed[place]]
+            repeated = np.isin(pool.cells("id"), repeated_ids)
+            listed[place].update(contents.values())
+            if repeated.any():
                 notes.append(
-                    f"{twice.sum()} grasps of run {key} are also in another run of the"
+                    f"{repeated.sum()} grasps of run {key} are also in another run of the"
                     " same scene; each is tried once and counts there"
                 )
-                pool = replace(pool, rows=pool.rows[~twice])
+                pool = replace(pool, rows=pool.rows[~repeated])
         pools.append(pool)
     return sorted((p for p in pools if len(p.rows)), key=lambda p: p.key), notes
 
@@ -149,19 +150,19 @@ def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGr
         )
     results = run.results
     failed = results["outcome"] == Outcome.SIMULATION_FAILED.value
-    passed = np.isin(results["stage"], [stage.value for stage in DECIDED_STAGES[among]])
+    eligible = np.isin(results["stage"], [stage.value for stage in DECIDED_STAGES[among]])
     if failed.any():
         notes.append(f"{failed.sum()} grasps of run {key} could not be simulated and are left out")
     count, judged = run.document.grasps.count, len(results["id"])
     if judged < count:
         notes.append(f"run {key} is not complete: {judged} of {count} grasps are judged")
-    return EligibleGrasps(key, run, np.flatnonzero(passed & ~failed))
+    return EligibleGrasps(key, run, np.flatnonzero(eligible & ~failed))
 
 
-def _shared_worlds(runs: dict[str, Run]) -> set[tuple[str, str]]:
-    """Scenes and stations shared by several runs."""
-    worlds = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
-    return {world for world in worlds if worlds.count(world) > 1}
+def _shared_scenes_and_stations(runs: dict[str, Run]) -> set[tuple[str, str]]:
+    """Pairs of scene and station that several runs have in common."""
+    places = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
+    return {place for place in places if places.count(place) > 1}
 
 
 def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
@@ -208,9 +209,9 @@ def stratum_labels(
         name = "probability"
     objects = pool.cells("object")
     labels = np.full(len(values), "", dtype=object)
-    for held in np.unique(objects):
-        mine = objects == held
-        labels[mine] = _quantile_labels(values[mine], name, selection.bins)
+    for object_name in np.unique(objects):
+        rows = objects == object_name
+        labels[rows] = _quantile_labels(values[rows], name, selection.bins)
     return labels.astype(np.str_)
 
 
@@ -231,19 +232,19 @@ def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]
             f"{run.path}`, which predicts how often grasps are lifted"
         )
     shares = lifted_shares(found, {run.document.hash}, run.candidates.id)
-    return {id: share for (of, id), share in shares.items() if of == run.document.hash}
+    return {id: share for (hash, id), share in shares.items() if hash == run.document.hash}
 
 
 def allocate_to_strata(
     populations: Mapping[str, int], wanted: int, first: Sequence[str]
 ) -> dict[str, int]:
-    """Number of grasps for each stratum, as even as the populations allow, with the sum `wanted` if
-    there are enough.
+    """Divides a number of grasps among strata, as evenly as their populations allow. The numbers
+    sum to `wanted` if there are enough grasps.
 
     Args:
         populations: number of grasps by stratum.
         wanted: total number.
-        first: the strata in the order in which they get a remainder.
+        first: strata in the order in which they receive the remainder.
     """
     chosen = dict.fromkeys(populations, 0)
     left = min(wanted, sum(populations.values()))
@@ -265,22 +266,25 @@ def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
 
 
 def _quantile_labels(values: NDArray[np.float64], name: str, bins: int) -> NDArray[np.str_]:
-    """Labels of bins with about equally many grasps; equal values share a bin."""
+    """Labels of bins with about equally many grasps; equal values share a bin, and values that are
+    not finite have an empty label.
+    """
     known = np.isfinite(values)
     labels = np.full(len(values), "", dtype=object)
     if known.any():
         edges = np.unique(np.quantile(values[known], np.linspace(0.0, 1.0, bins + 1)))
-        place = np.searchsorted(edges[1:-1], values, side="right")
-        for k in np.unique(place[known]):
-            own = known & (place == k)
-            low, high = (format_number(float(v), 4) for v in (values[own].min(), values[own].max()))
+        bins_of_values = np.searchsorted(edges[1:-1], values, side="right")
+        for k in np.unique(bins_of_values[known]):
+            rows = known & (bins_of_values == k)
+            bounds = values[rows].min(), values[rows].max()
+            low, high = (format_number(float(bound), 4) for bound in bounds)
             text = low if low == high else f"{low} to {high}"
-            labels[own] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
+            labels[rows] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
     return labels
 
 
 MAX_SHORTFALL_ITEMS = 20
-"""Maximum number of lines, and of objects in a line; the rest is counted."""
+"""Maximum number of notes on shortfalls, and of objects in a note; the rest is counted."""
 
 
 @dataclass(frozen=True)
@@ -288,11 +292,11 @@ class Shortfall:
     """Missing grasps of an object of a run.
 
     Attributes:
-        run, object: key of the run, and name in the library.
-        kind: kind of shortfall; objects with the same kind share a line.
+        run, object: key of the run, and name of the object in the library.
+        kind: kind of shortfall; objects with the same kind share a note.
         counts: available and wanted number, such as `3 of 5`.
-        description: text of kind and counts if all objects of a line have the same; the kind if
-            empty.
+        description: text of the note, with the counts, if all its objects have the same counts;
+            `kind` if empty.
     """
 
     run: str
@@ -303,7 +307,7 @@ class Shortfall:
 
 
 def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
-    """Shortfall of one object with too few grasps in a stratum or overall; empty if there are
+    """Shortfall of one object that has too few grasps in a stratum or overall; empty if it has
     enough.
 
     Args:
@@ -327,7 +331,7 @@ def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
 
 
 def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
-    """A line for each kind with its objects, and counts by object if they differ."""
+    """A note for each kind of shortfall with its objects, and counts by object if they differ."""
     kinds: defaultdict[str, list[Shortfall]] = defaultdict(list)
     for one in found:
         kinds[one.kind].append(one)
@@ -350,7 +354,7 @@ def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
 
 
 Chosen = list[tuple[EligibleGrasps, int, str]]
-"""Grasps with the key of their stratum; the number is an index into the pool."""
+"""Chosen grasps: the pool, the index in the pool, and the key of the stratum."""
 
 
 def draw_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[EligibleGrasps]:
@@ -375,16 +379,16 @@ def select_grasps(
         labels = stratum_labels(pool, selection, lambda run: robustness_by_grasp(run, table))
         objects = pool.cells("object")
         unknown += int((labels == "").sum())
-        for held in np.unique(objects).tolist():
+        for object_name in np.unique(objects).tolist():
             members: defaultdict[str, list[int]] = defaultdict(list)
-            for k in np.flatnonzero((objects == held) & (labels != "")).tolist():
+            for k in np.flatnonzero((objects == object_name) & (labels != "")).tolist():
                 members[str(labels[k])].append(k)
             if selection.balance == "outcome":
                 members["success"], members["failure"]  # create both, even if empty
             if not members:
-                short.append(Shortfall(pool.key, held, "no grasp to choose from"))
+                short.append(Shortfall(pool.key, object_name, "no grasp to choose from"))
                 continue
-            found = _make_strata(pool, held, members, selection)
+            found = _make_strata(pool, object_name, members, selection)
             strata |= found
             short += find_shortfall(list(found.values()), selection.per_object)
             for key, stratum in found.items():
@@ -416,22 +420,28 @@ def _rare_class_note(chosen: Chosen, selection: Selection) -> list[str]:
 
 
 def _make_strata(
-    pool: EligibleGrasps, held: str, members: Mapping[str, Sequence[int]], selection: Selection
+    pool: EligibleGrasps,
+    object_name: str,
+    members: Mapping[str, Sequence[int]],
+    selection: Selection,
 ) -> dict[str, Stratum]:
     """Strata of one object, with the number of chosen grasps."""
-    seed = selection.seed
-    first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
-    share, more = divmod(selection.per_object, len(first))
-    asked = {label: share + (k < more) for k, label in enumerate(first)}
-    taken = allocate_to_strata({k: len(v) for k, v in members.items()}, selection.per_object, first)
+    first = sorted(
+        members,
+        key=lambda label: content_hash(selection.seed, "more", pool.scene, object_name, label),
+    )
+    share, remainder = divmod(selection.per_object, len(first))
+    wanted = {label: share + (k < remainder) for k, label in enumerate(first)}
+    populations = {label: len(indices) for label, indices in members.items()}
+    selected = allocate_to_strata(populations, selection.per_object, first)
     return {
-        f"{pool.key}/{held}/{label}": Stratum(
+        f"{pool.key}/{object_name}/{label}": Stratum(
             run=pool.key,
-            object=held,
+            object=object_name,
             label=label,
-            population=len(members[label]),
-            selected=taken[label],
-            wanted=asked[label],
+            population=populations[label],
+            selected=selected[label],
+            wanted=wanted[label],
         )
         for label in sorted(members)
     }
