@@ -14,7 +14,10 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError, Mode, Outcome, setting, wilson_interval
 from burg_drake.evaluation import Run
-from burg_drake.experiment.comparison.compared_runs import JudgedRuns, outcomes_unpredictable_for
+from burg_drake.experiment.comparison.compared_runs import (
+    ComparedRuns,
+    outcomes_unpredictable_for_runs,
+)
 from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
     count_cells,
@@ -319,7 +322,7 @@ def agreement_by_step(
         answers = np.array(predicted, dtype=bool), np.array(actual, dtype=bool)
         strata = selection_strata(sheet, told)
         every = None if strata is None else strata.agreement(*answers)
-        beyond = outcomes_unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
+        beyond = outcomes_unpredictable_for_runs(ComparedRuns(runs[0])) if runs else frozenset()
         apart = sum(trial.outcome in beyond for trial in told)
         found.append(
             StepAgreement(step.name, estimate_agreement(count_cells(*answers)), every, apart)
