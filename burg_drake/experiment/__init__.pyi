@@ -105,7 +105,7 @@ from .gap.gap_steps import (
     OutcomeChange as OutcomeChange,
     agreement_by_step as agreement_by_step,
     gap_changes as gap_changes,
-    tried_grasps as tried_grasps,
+    trials_of_run as trials_of_run,
 )
 from .gap.gap_words import (
     gap_json as gap_json,

@@ -377,7 +377,7 @@ def deciding_stages(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
 
 
 def _stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
-    """Table of grasps that only one run holds, by the deciding stages; the page counts all grasps."""
+    """Table of grasps that only one run holds by deciding stage; the page counts all grasps."""
     columns = deciding_stages(apart)
     table = TextTable("Stages that decided the grasps which only one of the runs holds")
     table.texts("first run").numbers(*(f"{name} in the second" for name in columns))

@@ -23,7 +23,7 @@ def rejudged_sentences(found: Rejudging) -> list[str]:
     """Sentences about the results."""
     if not found.judged:
         return ["None of the trials could be judged again.", *_skipped_sentence(found)]
-    of, whole = found.causes, len(found.predictable)
+    causes, whole = found.causes, len(found.predictable)
     planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
     count, wrong, low, high = found.explained_disagreements
     sentences = _unpredictable_sentence(found)
@@ -39,17 +39,17 @@ def rejudged_sentences(found: Rejudging) -> list[str]:
         sentences.append(
             f"Of the {wrong} that disagree{'s' if wrong == 1 else ''} as planned, placement"
             f" explains {count} ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
-            f" {100 * high:.0f} %), and {of['physics']}"
-            f" {'is' if of['physics'] == 1 else 'are'} left to physics."
+            f" {100 * high:.0f} %), and {causes['physics']}"
+            f" {'is' if causes['physics'] == 1 else 'are'} left to physics."
         )
-    if of["worsened"]:
+    if causes["worsened"]:
         sentences.append(
-            f"{of['worsened']} agreed with the objects as planned, but not where they stood."
+            f"{causes['worsened']} agreed with the objects as planned, but not where they stood."
         )
-    within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
-    if within:
+    overlaps = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
+    if overlaps:
         sentences.append(
-            f"In {within} trials the open hand would overlap a displaced object, which"
+            f"In {overlaps} trials the open hand would overlap a displaced object, which"
             " counts as a collision, although a robot may push it aside."
         )
     not_judged = [trial for trial in found.trials if trial not in found.judged]

@@ -39,7 +39,7 @@ def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated
     Args:
         trial: the trial.
         runs: runs of the trials file.
-        picture: JPEG of its grasp.
+        picture: JPEG of the trial's grasp.
         show_simulated: whether to show the simulated outcome.
     """
     alt = f"the hand at the grasp of trial {trial.number}, on {trial.instance}"
@@ -125,11 +125,11 @@ class ProtocolOptions:
 def protocol_page(
     runs: TriedRuns, pictures: TrialPictures, options: ProtocolOptions | None = None
 ) -> str:
-    """The page.
+    """The protocol of the trials as an HTML page.
 
     Args:
         runs: runs of the trials file.
-        pictures: pictures of its trials.
+        pictures: pictures of the trials.
         options: options; the defaults if None.
     """
     options = options or ProtocolOptions()
@@ -158,9 +158,9 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
         "If a person interfered or an object fell before the trial, tick “not attempted” and"
         " go on; repeat the trial at the end if there is time.",
     )
-    sheet, tried = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
-    robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in tried))
-    scenes = list(dict.fromkeys(one.scene.name for one in tried))
+    sheet, setups = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
+    robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in setups))
+    scenes = list(dict.fromkeys(one.scene.name for one in setups))
     done = sum(trial.outcome is not None for trial in sheet.trials)
     about = [f"{len(sheet.trials)} trials in {count_with_noun(len(blocks), 'block')}"]
     about += [f"seed {sheet.selection.seed}", f"file {runs.path.name}"]

@@ -35,7 +35,7 @@ from burg_drake.experiment import (
     reality_sentence,
     reality_table,
     step_sentences,
-    tried_grasps,
+    trials_of_run,
 )
 from burg_drake.scene import Scene
 from burg_drake.station import ENGINES
@@ -288,10 +288,10 @@ def sheet_of(run: Run, trials: tuple[RealTrial, ...]) -> TrialSheet:
 def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
     trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
     sheet = sheet_of(run, (trials[0], replace(trials[1], content="0123456789ab")))
-    assert tried_grasps(sheet, "trials.yaml", run) == trials[:1]
+    assert trials_of_run(sheet, "trials.yaml", run) == trials[:1]
     own = replace(sheet, runs={"a": replace(sheet.runs["a"], hash=run.document.hash)})
     with pytest.raises(InvalidInputError, match=r"trial 2: grasp .* it had 0123456789ab when"):
-        tried_grasps(own, "trials.yaml", run)
+        trials_of_run(own, "trials.yaml", run)
 
 
 def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
@@ -300,14 +300,14 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     later = replace(trials[0], number=4, outcome=None)
     sheet = sheet_of(known.first, (*trials, later))
     found = agreement_by_step(known, sheet, [*trials, later], "lifted")
-    assert [(a.step, *a.found.cells) for a in found] == [
+    assert [(a.step, *a.selected.cells) for a in found] == [
         ("hand", 1, 1, 1, 0),
         ("reach", 2, 0, 0, 1),
         ("placed", 1, 0, 1, 0),
     ]
-    assert found[1].found.precision.value == 1.0
-    assert found[2].found.recall.value == 0.5
-    assert all(a.all_grasps is None and a.estimated is a.found for a in found)
+    assert found[1].selected.precision.value == 1.0
+    assert found[2].selected.recall.value == 0.5
+    assert all(a.all_grasps is None and a.estimated is a.selected for a in found)
     assert "each counted once" in reality_sentence(found)
     stopped = [replace(t, outcome=RealOutcome.NO_PATH) for t in trials]
     apart = agreement_by_step(known, sheet, stopped, "lifted")
@@ -329,7 +329,7 @@ def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known
     told = [replace(trial, stratum=label) for trial, label in zip(trials, labels, strict=True)]
     sheet = replace(sheet_of(known.first, tuple(told)), strata=strata)
     hand = agreement_by_step(known, sheet, told, "lifted")[0]
-    assert hand.found.accuracy.value == pytest.approx(1 / 3)
+    assert hand.selected.accuracy.value == pytest.approx(1 / 3)
     assert hand.all_grasps is not None
     assert hand.all_grasps.cells == pytest.approx((5, 5, 90, 0))
     assert hand.estimated.accuracy.value == pytest.approx(0.05)
