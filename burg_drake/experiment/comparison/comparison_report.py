@@ -69,7 +69,7 @@ def comparison_page(
 
     Args:
         comparison: the comparison.
-        path: path of the page, to which links to photos are relative.
+        path: path of the page; links to photos are relative to its folder.
         line: command that repeats the comparison; left out if empty.
         more: further sections.
     """
@@ -243,7 +243,7 @@ def _describe_side(side: Side) -> str:
 
 
 def _photo_folder(c: Comparison, path: Path) -> Path | None:
-    """Folder of the trials file relative to the page's."""
+    """Folder of the trials file, relative to the folder of the page; None without trials."""
     if c.reference.kind != "trials":
         return None
     folder = Path(c.reference.path).absolute().parent
@@ -256,26 +256,26 @@ def _case_section(comparison: Comparison, judgement: Judgement, photos: Path | N
     Args:
         comparison: the comparison.
         judgement: assessment of one judge.
-        photos: folder of the trials file relative to the page's; None without trials.
+        photos: folder of the trials file, relative to the folder of the page; None without trials.
     """
     max_rows = 50  # Maximum number of wrong verdicts in the table.
     if not judgement.disagreements:
         return None
     tables: list[Html] = []
-    apart = judgement.unpredictable
-    beyond = {} if apart is None else apart.outcomes
-    promised = 0 if apart is None else apart.predicted_successes
+    unpredictable = judgement.unpredictable
+    outcomes = {} if unpredictable is None else unpredictable.outcomes
+    predicted_successes = 0 if unpredictable is None else unpredictable.predicted_successes
     false_successes = [d for d in judgement.disagreements if d.kind == "fp"]
     groups = [
         (
             cell_name(comparison, "fp"),
-            [d for d in false_successes if d.ended not in beyond],
-            round(judgement.selected.fp) - promised,
+            [d for d in false_successes if d.ended not in outcomes],
+            round(judgement.selected.fp) - predicted_successes,
         ),
         (
             "success predicted, failed for reasons that the hand alone cannot predict",
-            [d for d in false_successes if d.ended in beyond],
-            promised,
+            [d for d in false_successes if d.ended in outcomes],
+            predicted_successes,
         ),
         (
             cell_name(comparison, "fn"),
@@ -324,7 +324,7 @@ def _note_and_photo(case: Disagreement, photos: Path | None) -> str:
 
 
 def _outcome_section(comparison: Comparison, judgement: Judgement) -> Html:
-    """Section of simulated by actual outcomes."""
+    """Section that counts grasps by simulated and actual outcome."""
     happened = sorted({name for row in judgement.outcomes.values() for name in row})
     rows = [
         (outcome_label(simulated), [row.get(name, "·") for name in happened])
@@ -360,8 +360,8 @@ def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Htm
 
 
 def _stage_section(found: RunAgreement) -> Html:
-    """Section of all grasps by the stages of both runs, with those that only one run holds in
-    brackets.
+    """Section that counts all grasps by the deciding stages of both runs, and in brackets the
+    grasps that only one run holds.
     """
     columns = deciding_stages(found.stages)
 
@@ -410,7 +410,7 @@ def _margin_section(comparison: Comparison, judgement: Judgement) -> Html | None
 
 
 def _distance_from_chance(found: MarginCalibration) -> float:
-    """Distance of the AUROC's interval from chance, which selects the margins to plot."""
+    """Distance of the AUROC's interval from chance, by which the margins to plot are selected."""
     area = found.auroc_weighted or found.auroc
     low, high = area.low, area.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)

@@ -62,15 +62,12 @@ class Estimate:
         return cls(value, min(value, low), max(value, high))
 
 
-def estimate_share(successes: float, trials: float, reason: str = "no trials") -> Estimate:
-    """A proportion with Wilson's interval; effective counts need not be integers.
-
-    Args:
-        successes, trials: counts.
-        reason: reason for an undefined proportion, without trials.
+def estimate_share(successes: float, trials: float) -> Estimate:
+    """A proportion with Wilson's interval; undefined without trials. Effective counts need not be
+    integers.
     """
     if trials <= 0:
-        return Estimate.undefined(reason)
+        return Estimate.undefined("no trials")
     successes, trials = float(successes), float(trials)
     value = min(1.0, successes / trials)
     low, high = wilson_interval(successes, trials)
@@ -162,25 +159,22 @@ CELL_PRIOR = 0.5
 """Prior number of trials in each cell, over all strata."""
 
 
-def draw_cells(
-    counts: Values, population: Array, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
-) -> Array:
+def draw_cells(counts: Values, population: Array, rng: np.random.Generator) -> Array:
     """Draws confusion matrices from the posterior distribution given the observed one.
 
     Args:
         counts: (S, 4) trials by stratum and cell.
         population: (S,) population of each stratum; strata without trials are left out.
         rng: random generator.
-        draws: number of draws.
 
     Returns:
-        (draws, 4) cells of all strata together, in units of `population`.
+        (`RESAMPLING_DRAWS`, 4) cells of all strata together, in units of `population`.
     """
     seen = counts.sum(axis=1) > 0
     counts, population = counts[seen].astype(float), population[seen]
     size = counts.sum(axis=1, keepdims=True)
     alpha = counts * np.maximum(size - 2, size / 3) / size + distribute_prior(counts, population)
-    drawn = rng.standard_gamma(alpha, (draws, *alpha.shape))
+    drawn = rng.standard_gamma(alpha, (RESAMPLING_DRAWS, *alpha.shape))
     proportions = drawn / drawn.sum(axis=2, keepdims=True)
     expected: Array = np.einsum("dsc,s->dc", proportions, population)
     return expected
@@ -206,10 +200,8 @@ def distribute_prior(counts: Array, population: Array) -> Array:
     return CELL_PRIOR * shares
 
 
-def draw_unstratified_cells(
-    counts: Values, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
-) -> Array:
-    """As `draw_cells` for many independent matrices.
+def draw_unstratified_cells(counts: Values, rng: np.random.Generator, draws: int) -> Array:
+    """Draws as `draw_cells`, for many independent matrices.
 
     Args:
         counts: (G, 4) trials by matrix and cell.

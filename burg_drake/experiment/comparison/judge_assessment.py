@@ -248,16 +248,20 @@ class Strata:
     population: Array
 
     @property
+    def trials(self) -> NDArray[np.intp]:
+        """(S,) number of trials in each stratum."""
+        return np.bincount(self.index, minlength=len(self.population))
+
+    @property
     def weight(self) -> Array:
         """(N,) number of grasps that each trial represents."""
-        size = np.bincount(self.index, minlength=len(self.population))
-        return (self.population / np.maximum(size, 1))[self.index]
+        return (self.population / np.maximum(self.trials, 1))[self.index]
 
     def select_trials(self, rows: Flags) -> Strata:
         """The strata of selected trials, which keep their weights."""
-        size = np.bincount(self.index, minlength=len(self.population))
-        kept = np.bincount(self.index[rows], minlength=len(self.population))
-        return Strata(self.index[rows], self.population * kept / np.maximum(size, 1))
+        selected = Strata(self.index[rows], self.population)
+        population = self.population * selected.trials / np.maximum(self.trials, 1)
+        return Strata(selected.index, population)
 
     def agreement(self, first: Flags, second: Flags, *, seed: int = 0) -> Agreement:
         """Figures of all grasps from two answers (N,) about each trial."""
@@ -267,8 +271,7 @@ class Strata:
     @property
     def not_represented(self) -> int:
         """Number of grasps that no trial represents."""
-        size = np.bincount(self.index, minlength=len(self.population))
-        return int(self.population[size == 0].sum())
+        return int(self.population[self.trials == 0].sum())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -369,8 +369,8 @@ def reach_verdicts(
     hand: Run,
     known: Mapping[str, Verdict],
     *,
-    executor: Executor | None = None,
-    progress: bool | Listener = True,
+    executor: Executor,
+    progress: bool | Listener,
 ) -> Iterator[tuple[str, Verdict]]:
     """Verdicts of mode `reach` on the grasps of a run of the hand, equal to those of `evaluate` bit
     for bit.
@@ -384,7 +384,6 @@ def reach_verdicts(
     Yields:
         Ids and verdicts of the grasps without an existing verdict.
     """
-    executor = LocalExecutor.of_this_machine() if executor is None else executor
     origin = origin_of(hand.document)
     build = StationJudgeFactory(
         hand.scene(), hand.station(), origin.engine, "reach", origin.settings(f"{hand.path}: trial")

@@ -109,7 +109,7 @@ def rejudged_section(found: Rejudging) -> Html:
         " ".join(rejudged_sentences(found)),
         *(element("div", part, style="margin-top:20px") for part in tables if part is not None),
         element("p", f"Rows of {REJUDGED_TABLE_FILE} can be replayed in the scene as measured:"),
-        command(replay_line(found, 1)),
+        command(_first_replay(found)),
     )
 
 
@@ -179,7 +179,7 @@ def _add_trials(shown: FindingTable, trials: Sequence[Rejudged], head: str) -> N
         )
 
 
-def replay_line(found: Rejudging, row: int) -> str:
-    """Command that shows a row of the table, counted from 1."""
+def _first_replay(found: Rejudging) -> str:
+    """Command that shows the first row of the table."""
     table_file = str(found.path / REJUDGED_TABLE_FILE)
-    return shlex.join(["burg-drake", "replay", table_file, "--row", str(row)])
+    return shlex.join(["burg-drake", "replay", table_file, "--row", "1"])

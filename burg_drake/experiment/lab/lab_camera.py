@@ -158,10 +158,10 @@ class LabCamera:
             )
             self._check_thread.start()
 
-    def wait_for_check(self, seconds: float | None = None) -> None:
+    def wait_for_check(self) -> None:
         """Waits for the running placement check, if any."""
         if self._check_thread is not None:
-            self._check_thread.join(seconds)
+            self._check_thread.join()
 
     def status(self) -> dict[str, Any]:
         """Status for the page, shown beside the picture."""

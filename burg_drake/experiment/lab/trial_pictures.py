@@ -56,7 +56,7 @@ class ViewedGrasp:
     hand: Array
 
 
-def pinhole(size: tuple[int, int], half_view: float = PICTURE_HALF_VIEW) -> Intrinsics:
+def pinhole(size: tuple[int, int], half_view: float) -> Intrinsics:
     """Pinhole intrinsics from image size and the tangent of half the vertical angle of view."""
     width, height = size
     focal = height / 2.0 / half_view
@@ -170,15 +170,12 @@ def mark_target(painting: Painting, placed: Sequence[PlacedBody], target: str) -
     return image
 
 
-def write_names(
-    painting: Painting, placed: Sequence[PlacedBody], marked: Sequence[str] = ()
-) -> Bytes:
+def write_names(painting: Painting, placed: Sequence[PlacedBody]) -> Bytes:
     """(H, W, 3) the picture with the names of the objects.
 
     Args:
         painting: picture of the objects.
         placed: bodies of the picture.
-        marked: names of objects whose name is highlighted.
     """
     min_pixels = 30  # Objects with fewer visible pixels get no name.
     letter_height_share = 0.042  # Of the picture's height.
@@ -192,8 +189,8 @@ def write_names(
         rows, columns = np.nonzero(body)
         if len(rows) >= min_pixels:
             boxes.append([[columns.min(), rows.min()], [columns.max(), rows.max()]])
-            color = (255, 205, 120) if name in marked else (255, 255, 255)
-            plates.append(render_tag(name, color, round(letter_height_share * image.shape[0])))
+            height = round(letter_height_share * image.shape[0])
+            plates.append(render_tag(name, (255, 255, 255), height))
     if plates:
         draw_tags(image, np.array(boxes, float), plates, bodies)
     return image

@@ -119,7 +119,7 @@ class TriedRuns:
             raise InvalidInputError(
                 f"{path} has no trials; burg-drake trials plan makes a file with trials"
             )
-        used = dict.fromkeys(trial.run for trial in self.sheet.trials)
+        used = {trial.run for trial in self.sheet.trials}
         runs = load_sources(self.sheet, path, moved=moved, only=used)
         self._tried = {
             key: TriedScene(run, run.scene(), run.station()) for key, run in runs.items()

@@ -7,7 +7,7 @@ depend on the order of the runs, and a smaller selection is a part of a larger o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -180,17 +180,17 @@ def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
 
 
 def stratum_labels(
-    pool: EligibleGrasps, selection: Selection, probability: Callable[[Run], Mapping[str, float]]
+    pool: EligibleGrasps, selection: Selection, table: Path | None
 ) -> NDArray[np.str_]:
     """(N,) stratum of each grasp within its object; empty if it has none.
 
     Args:
         pool: the grasps.
         selection: settings with the balance.
-        probability: returns the predicted probability of success by grasp id.
+        table: table of robustness for the balance `probability`; see `robustness_by_grasp`.
 
     Raises:
-        InvalidInputError: the run lacks the margin.
+        InvalidInputError: the run lacks the margin, or has no valid table of robustness.
     """
     if selection.balance == "none":
         return np.full(len(pool.rows), "all")
@@ -204,8 +204,8 @@ def stratum_labels(
     if selection.balance == "margin":
         values, name = _margin_values(pool, selection.margin), selection.margin
     else:
-        known = probability(pool.run)
-        values = np.array([known.get(id, np.nan) for id in pool.cells("id").tolist()])
+        shares = robustness_by_grasp(pool.run, table)
+        values = np.array([shares.get(id, np.nan) for id in pool.cells("id").tolist()])
         name = "probability"
     objects = pool.cells("object")
     labels = np.full(len(values), "", dtype=object)
@@ -215,7 +215,7 @@ def stratum_labels(
     return labels.astype(np.str_)
 
 
-def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]:
+def robustness_by_grasp(run: Run, table: Path | None) -> dict[str, float]:
     """Share of a grasp's perturbed repeats that were lifted, by grasp id.
 
     Args:
@@ -376,7 +376,7 @@ def select_grasps(
     short: list[Shortfall] = []
     unknown = 0
     for pool in pools:
-        labels = stratum_labels(pool, selection, lambda run: robustness_by_grasp(run, table))
+        labels = stratum_labels(pool, selection, table)
         objects = pool.cells("object")
         unknown += int((labels == "").sum())
         for object_name in np.unique(objects).tolist():

@@ -125,7 +125,7 @@ def export_trials(
     sheet, out = load_trials(path), Path(out)
     for trial in sheet.trials:
         require_name(trial.grasp)
-    runs = load_sources(sheet, path, moved=moved, only={t.run: t for t in sheet.trials})
+    runs = load_sources(sheet, path, moved=moved, only={trial.run for trial in sheet.trials})
     _require_export_folder(out)
     jobs = []
     for key, run in runs.items():

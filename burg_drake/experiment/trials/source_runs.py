@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +47,7 @@ def load_sources(
     path: str | Path,
     *,
     moved: Moved | None = None,
-    only: Mapping[str, object] | None = None,
+    only: Collection[str] | None = None,
 ) -> dict[str, Run]:
     """Opens the runs of a trials file, by key, and checks that they have every tried grasp.
 
