@@ -254,7 +254,7 @@ def _agreement_by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup
 
 
 def _count_stage_pairs(first: TextFactor, second: TextFactor) -> dict[str, dict[str, int]]:
-    """Counts of grasps by the stages of both runs, in their order, without zeros."""
+    """Counts of grasps by the stages of both runs, in the order of the stages, without zeros."""
     counts, order = cross_tabulate(first, second), [stage.value for stage in Stage]
     return {
         row: {column: counts[row][column] for column in order if column in counts[row]}

@@ -279,7 +279,7 @@ def differing_phases(first: ComparedRuns, second: ComparedRuns) -> list[str]:
 
 
 def _phase_settings(runs: ComparedRuns) -> dict[str, Value]:
-    """Resolved settings of a run's trials by name; those of the motion first."""
+    """Resolved settings of a run's trials by name; settings of the motion first."""
     from burg_drake.simulation import NO_GRIP_LIMITS
 
     settings = read_trial_settings(runs.opened.document.trial, str(runs.path))

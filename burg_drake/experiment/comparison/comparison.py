@@ -102,8 +102,8 @@ def comparison_json(comparison: Comparison, more: Mapping[str, Any] | None = Non
 
 
 def json_values(value: Any) -> Any:
-    """Dataclasses as mappings of all their fields, sequences as lists; numbers that are not finite
-    are None."""
+    """Value for JSON: dataclasses become mappings of all fields, sequences lists, and numbers that
+    are not finite None."""
     if dataclasses.is_dataclass(value):
         return {f.name: json_values(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
@@ -402,7 +402,7 @@ def no_outliers_sentence(judgement: Judgement) -> str:
 
 
 def margin_title(name: str) -> tuple[str, str, float]:
-    """Displayed name of a margin, its displayed unit, and the factor from its column's unit."""
+    """Displayed name and unit of a margin, and the factor from the column's to this unit."""
     if name == PROBABILITY_MARGIN:
         return "predicted probability", "", 1.0
     if name.endswith("_mm"):

@@ -1,4 +1,4 @@
-"""Findings of a comparison for a terminal and for a page, and their order in a terminal."""
+"""Tables of the findings of a comparison, for a terminal and for a page."""
 
 from __future__ import annotations
 
@@ -372,7 +372,7 @@ def confidence_finding(groups: Sequence[FactorGroup]) -> FindingTable:
 
 
 def deciding_stages(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
-    """The stages of the second run that occur, in their order."""
+    """Names of the stages that decided in the second run, in the order of the stages."""
     return [stage.value for stage in Stage if any(stage.value in row for row in counts.values())]
 
 

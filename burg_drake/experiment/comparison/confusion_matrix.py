@@ -97,7 +97,7 @@ class Measure:
 
     @property
     def is_share(self) -> bool:
-        """Whether it is a proportion of trials."""
+        """Whether the measure is a proportion of trials."""
         return bool(self.whole)
 
 
@@ -390,13 +390,13 @@ def _make_agreement(
     *,
     weighted: bool = False,
 ) -> Agreement:
-    """An agreement from its cells, and (M,) values of its measures with their bounds."""
+    """An agreement from cells, and from (M,) values of the measures with their bounds."""
     figures = {}
     for k, (name, measure) in enumerate(AGREEMENT_MEASURES.items()):
         if interval is None or not np.isfinite(values[k]):
             figures[name] = Estimate.undefined(measure.reason if trials else "no trials")
         elif measure.is_share and not weighted:
-            part, whole = (sum(cells[c] for c in cs) for cs in (measure.part, measure.whole))
+            part, whole = sum(cells[c] for c in measure.part), sum(cells[c] for c in measure.whole)
             figures[name] = estimate_share(part, whole)
         else:
             low, high = float(interval[0][k]), float(interval[1][k])

@@ -182,7 +182,7 @@ class StoredNumbers(dict[str, Values]):
         return self[name]
 
     def same(self, other: StoredNumbers, name: str) -> bool:
-        """Whether a column is known to be the same in both, without reading it."""
+        """Whether a column is known to be equal in both stores, without reading it."""
         return bool(self._rows.table.column(name).equals(other._rows.table.column(name)))
 
 
@@ -224,7 +224,7 @@ class ResultTable:
         )
 
     def same(self, other: ResultTable, name: str) -> bool:
-        """Whether a column of numbers is known to be the same in both."""
+        """Whether a column of numbers is known to be equal in both tables."""
         one, two = self.numbers, other.numbers
         return (
             isinstance(one, StoredNumbers)
@@ -252,10 +252,10 @@ GRASP_CONTENT_COLUMNS: tuple[str, ...] = ("x", "y", "z", "qw", "qx", "qy", "qz",
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Rows of the same grasps in two tables.
+    """Rows of the grasps that two tables have in common.
 
     Attributes:
-        first, second: (N,) rows.
+        first, second: (N,) rows in each table.
         other_content: number of grasps that share only their id.
         only_first, only_second: number of grasps in one table alone.
     """
@@ -278,9 +278,9 @@ def match_rows(first: ResultTable, second: ResultTable) -> Match:
         order = np.argsort(one)
         one, other = one[order], other[order]
     same = np.ones(len(one), dtype=bool)
-    whole = one is other
+    same_rows = one is other
     for name in GRASP_CONTENT_COLUMNS:
-        if whole and first.same(second, name):
+        if same_rows and first.same(second, name):
             continue
         a, b = first.numbers[name][one], second.numbers[name][other]
         same &= (np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b))

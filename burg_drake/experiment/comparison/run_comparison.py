@@ -302,9 +302,9 @@ def _comparison_notes(
         tried = {trial.stratum for trial in trials}
         without = [s for key, s in sheet.strata.items() if s.population and key not in tried]
         kinds = list_names([f"{s.object} ({s.label})" for s in without])
-        every = sum(s.population for s in sheet.strata.values())
+        population = sum(s.population for s in sheet.strata.values())
         notes.append(
-            f"figures for all grasps leave out {judgement.not_represented} of the {every}"
+            f"figures for all grasps leave out {judgement.not_represented} of the {population}"
             f" grasps from which the trials were chosen, as no trial of {kinds} was"
             " compared"
         )

@@ -229,8 +229,8 @@ def _judge_in_mode(
     options: dict[str, Any],
     first: dict[str, Any],
 ) -> Run:
-    """Runs the step of a mode, unless the given run is this step. The first step takes the `first`
-    arguments of `evaluate`, if no run is given; others take those of an earlier run.
+    """Runs the step of a mode, unless the given run is this step. The arguments of `evaluate` are
+    those of an earlier run, or `first` if there is none.
     """
     if run is not None and run.document.mode == mode:
         return run
@@ -264,7 +264,7 @@ def _arguments_in_mode(arguments: dict[str, Any], mode: Mode) -> dict[str, Any]:
 
 
 def group_candidates_by_instance(candidates: Candidates) -> dict[str, GraspSet]:
-    """The grasps by name of their instance."""
+    """The grasps by name of the instance."""
     names = dict.fromkeys(candidates.instance.tolist())
     return {n: candidates.grasps.select(np.flatnonzero(candidates.instance == n)) for n in names}
 

@@ -98,8 +98,8 @@ def _subtitle(steps: GapSteps, success: Success) -> str:
 
 
 def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
-    whole = len(steps.first.candidates)
-    entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
+    grasps = len(steps.first.candidates)
+    entries: list[tuple[str, Child, str]] = [("Grasps", f"{grasps}", "the same in every step")]
     first = found[0].successes if found else 0
     if found and found[0].step != "placed":
         entries.append((GAP_STEP_TITLES["hand"].capitalize(), f"{first}", "succeed"))
@@ -177,10 +177,9 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
 def objects_section(steps: GapSteps, success: Success) -> Html:
     """Section with the successes of each object in each step."""
     by_step = [successes_by_object(step, success) for step in steps.steps]
-    whole = by_step[0]
     head = ["grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
     rows = []
-    for name, (_, grasps) in whole.items():
+    for name, (_, grasps) in by_step[0].items():
         cells: list[Child] = [grasps]
         for step, counts in zip(steps.steps, by_step, strict=True):
             good, all = counts.get(name, (0, 0))

@@ -60,19 +60,19 @@ def rejudged_sentences(found: Rejudging) -> list[str]:
 
 def _unpredictable_sentence(found: Rejudging) -> list[str]:
     """Sentence about unpredictable failures, and precision with and without them."""
-    apart = [trial for trial in found.judged if trial.unpredictable]
-    if not apart:
+    unpredictable = [trial for trial in found.judged if trial.unpredictable]
+    if not unpredictable:
         return []
-    ended = Counter(outcome_label(trial.real) for trial in apart)
-    texts = ", ".join(f"{n} {name}" for name, n in ended.most_common())
+    outcomes = Counter(outcome_label(trial.real) for trial in unpredictable)
+    texts = ", ".join(f"{n} {name}" for name, n in outcomes.most_common())
     precision = "; ".join(
         f"{name} {_share_text(found.precision(measured=m, every=True))} with them,"
         f" {_share_text(found.precision(measured=m))} without"
         for name, m in (("as planned", False), ("as measured", True))
     )
     return [
-        f"{count_with_noun(len(apart), 'trial')} failed for reasons that a run of the hand alone"
-        f" cannot predict ({texts}). They are counted separately, as neither placement"
+        f"{count_with_noun(len(unpredictable), 'trial')} failed for reasons that a run of the hand"
+        f" alone cannot predict ({texts}). They are counted separately, as neither placement"
         f" nor physics caused them. Precision {precision}."
     ]
 

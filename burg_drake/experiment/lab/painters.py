@@ -172,9 +172,9 @@ def _object_bodies(scene: Scene) -> list[PlacedBody]:
 
 def _hand_body(station: Station, number: int, visual: HandVisual) -> DrawnBody:
     color = (visual.color.r(), visual.color.g(), visual.color.b())
-    own = isinstance(visual.model, Mesh)
+    has_color = isinstance(visual.model, Mesh)
     key = f"hand {station.hand_model} {number}"
-    return DrawnBody(key, visual.model, None if own else color)
+    return DrawnBody(key, visual.model, None if has_color else color)
 
 
 def count_bodies(pictures: Sequence[Sequence[PlacedBody]]) -> dict[str, tuple[DrawnBody, int]]:

@@ -66,7 +66,7 @@ class EligibleGrasps:
 
 
 def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
-    """Runs by short keys that do not depend on their order; each run once.
+    """Opens runs, each once, and gives them short keys that do not depend on their order.
 
     Args:
         given: runs, of one scene or of many, or their folders.
@@ -182,7 +182,7 @@ def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
 def stratum_labels(
     pool: EligibleGrasps, selection: Selection, table: Path | None
 ) -> NDArray[np.str_]:
-    """(N,) stratum of each grasp within its object; empty if it has none.
+    """(N,) label of each grasp's stratum among the strata of its object; empty without a stratum.
 
     Args:
         pool: the grasps.
@@ -258,9 +258,9 @@ def allocate_to_strata(
 
 def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
     if name not in pool.run.results or name not in MarginNames.all:
-        there = [margin for margin in MarginNames.all if margin in pool.run.results]
+        known = [margin for margin in MarginNames.all if margin in pool.run.results]
         raise InvalidInputError(
-            f"{pool.run.path} has no margin {quote_value(name)}; {suggest_names(name, there)}"
+            f"{pool.run.path} has no margin {quote_value(name)}; {suggest_names(name, known)}"
         )
     return pool.cells(name).astype(float)
 
@@ -343,14 +343,14 @@ def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
 
 
 def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
-    alike = len({one.description for one in members}) == 1
+    same_counts = len({one.description for one in members}) == 1
     by_run: defaultdict[str, list[str]] = defaultdict(list)
     for one in members[:MAX_SHORTFALL_ITEMS]:
-        by_run[one.run].append(one.object if alike else f"{one.object} ({one.counts})")
+        by_run[one.run].append(one.object if same_counts else f"{one.object} ({one.counts})")
     where = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
     more = len(members) - MAX_SHORTFALL_ITEMS
     where += f" and {more} others" if more > 0 else ""
-    return f"{where}: {members[0].description or kind}" if alike else f"{where}: {kind}"
+    return f"{where}: {members[0].description or kind}" if same_counts else f"{where}: {kind}"
 
 
 Chosen = list[tuple[EligibleGrasps, int, str]]

@@ -1,4 +1,4 @@
-"""Timed robot motions of the trials: one file for each trial, named by its number.
+"""Timed robot motions of the trials: one file for each trial, named by the trial's number.
 
 017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plan_files`
 index.csv                    all trials with their files, or the reason why there is no motion
@@ -74,7 +74,7 @@ class ExportedMotion:
 
 @dataclass(frozen=True)
 class TrialPlans(PlanFolder):
-    """Folder of plans named by trial, apart from their journal.
+    """Folder of a journal, with the plans in another folder, named by trial.
 
     Attributes:
         out: folder of the plans.
@@ -129,19 +129,20 @@ def export_trials(
     _require_export_folder(out)
     jobs = []
     for key, run in runs.items():
-        own = [trial for trial in sheet.trials if trial.run == key]
-        jobs.append((own, _make_judge_factory(run, own, out / "runs" / key, out, format, station)))
+        trials = [trial for trial in sheet.trials if trial.run == key]
+        folder = out / "runs" / key
+        jobs.append((trials, _make_judge_factory(run, trials, folder, out, format, station)))
     ensure_writable_folder(out)
     remove_unfinished(out)
     rows: dict[int, ExportedMotion] = {}
     with Reporter(progress) as reporter:
-        for own, (factory, candidates) in jobs:
+        for trials, (factory, candidates) in jobs:
             plans = factory.plans
             assert isinstance(plans, TrialPlans)
             verdicts = plan_into_folder(
                 plans, candidates, factory, workers or None, reporter, retry_failed=retry_failed
             )
-            for trial in own:
+            for trial in trials:
                 rows[trial.number] = _make_row(trial, verdicts[trial.grasp], plans)
     ordered = [rows[trial.number] for trial in sheet.trials]
     atomic_write(out / MOTION_INDEX_FILE, _index_csv(ordered))

@@ -86,7 +86,7 @@ class SheetText:
         return changed or SheetText.read(text, self.name)
 
     def with_trial(self, new: RealTrial) -> SheetText:
-        """The text with a new trial in place of the one with the same number.
+        """The text with a new trial in place of the trial with this number.
 
         Raises:
             DocumentError: the trial cannot be edited in place, such as with an alias.

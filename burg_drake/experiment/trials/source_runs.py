@@ -24,15 +24,15 @@ Moved = Mapping[str, "str | Path"]
 
 
 def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
-    """Short hash of a grasp: of the exact bits of its pose in the object frame and its width, and
-    of its instance.
+    """Short hash of a grasp: its instance, and the exact bits of its width and its pose in the
+    object frame.
     """
     pose = check_pose(X_OG, "X_OG")
     return content_hash(instance, pose, float(width))[:HASH_DIGITS]
 
 
 def grasp_contents(run: Run, ids: Iterable[str] | None = None) -> dict[str, str]:
-    """`grasp_content` of a run's grasps by id; only of those in `ids` if given."""
+    """`grasp_content` of a run's grasps by id; of all grasps if `ids` is None."""
     grasps, instances = run.candidates.grasps, run.candidates.instance
     wanted = None if ids is None else {*ids}
     return {

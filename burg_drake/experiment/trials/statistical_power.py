@@ -47,7 +47,7 @@ def half_width(share: float, trials: int) -> float:
 
 
 def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05) -> float:
-    """Chance that McNemar's exact test tells two methods apart on the same trials.
+    """Power of McNemar's exact test to tell two methods apart on the same trials.
 
     Args:
         trials: number of trials.
@@ -57,14 +57,14 @@ def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05)
     """
     from scipy.stats import binom
 
-    apart = better + worse
-    if apart <= 0.0:
+    disagreement = better + worse
+    if disagreement <= 0.0:
         return 0.0
-    m = np.arange(trials + 1)
-    most = _rejection_limit(m, alpha)
-    q = better / apart
-    found = np.where(most >= 0, binom.cdf(most, m, q) + binom.sf(m - most - 1, m, q), 0.0)
-    return float(binom.pmf(m, trials, min(apart, 1.0)) @ found)
+    m = np.arange(trials + 1)  # number of trials on which the methods disagree
+    limit = _rejection_limit(m, alpha)
+    q = better / disagreement
+    power = np.where(limit >= 0, binom.cdf(limit, m, q) + binom.sf(m - limit - 1, m, q), 0.0)
+    return float(binom.pmf(m, trials, min(disagreement, 1.0)) @ power)
 
 
 def smallest_difference(

@@ -202,7 +202,7 @@ class TrialBook:
         correct: bool = False,
         again: bool = False,
     ) -> None:
-        """Refuses an entry that contradicts present values, unless it may replace them.
+        """Refuses an entry that contradicts present values, unless `correct` or `again` is set.
 
         Args:
             trial: the present trial.
@@ -276,7 +276,8 @@ TRIALS_LOCK_TIMEOUT = 30.0
 
 @contextlib.contextmanager
 def lock_trials_file(trials_path: Path) -> Iterator[None]:
-    """Context manager that admits one writer at a time; any end of its process releases the lock.
+    """Context manager that admits one writer at a time. The lock is released when the writer's
+    process ends, in whatever way.
 
     Args:
         trials_path: the trials file.
@@ -341,8 +342,8 @@ class Entry:
 
     def is_of(self, trial: RealTrial) -> bool:
         """Whether the entry belongs to this trial, not to one in an earlier plan of the file."""
-        own = (trial.number, trial.grasp, trial.content)
-        return (self.number, self.grasp, self.content) == own
+        key = (trial.number, trial.grasp, trial.content)
+        return (self.number, self.grasp, self.content) == key
 
 
 @dataclass(frozen=True)
@@ -380,7 +381,7 @@ def replace_entered_values(trial: RealTrial, values: Mapping[str, Any]) -> RealT
 
 
 def journal_path(path: Path) -> Path:
-    """The journal of a trials file: beside the file itself, also where the path is a link to it."""
+    """The journal of a trials file. It lies beside the file itself, even if the path is a link."""
     real = Path(os.path.realpath(path))
     return real.with_name(f"{real.stem}.entries.jsonl")
 
@@ -480,12 +481,12 @@ def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingV
     found = []
     entries = list(entries)
     for trial in sheet.trials:
-        own = [entry for entry in entries if entry.is_of(trial)]
-        if not own:
+        recorded = [entry for entry in entries if entry.is_of(trial)]
+        if not recorded:
             continue
-        now, last = entered_values(trial), own[-1].after
+        now, last = entered_values(trial), recorded[-1].after
         differing = [name for name in JOURNAL_FIELDS if now.get(name) != last.get(name)]
-        known = [values for entry in own for values in (entry.before, entry.after)]
+        known = [values for entry in recorded for values in (entry.before, entry.after)]
         missing = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
         if differing:
             edited = tuple(name for name in differing if name not in missing)

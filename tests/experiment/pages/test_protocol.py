@@ -1,4 +1,4 @@
-"""The protocol: every trial once, blind, and nothing of it unescaped."""
+"""The protocol has every trial once, hides simulated outcomes, and escapes all texts."""
 
 from __future__ import annotations
 

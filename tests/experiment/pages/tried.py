@@ -1,4 +1,4 @@
-"""Trials of two scenes with their runs, without physics: verdicts follow from the grasps' ids."""
+"""Trials of two scenes with their runs, without simulation: verdicts follow from grasp ids."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 def grasps_of(height: float, object: str, count: int) -> GraspSet:
-    """Grasps from above and from sides, turned about the vertical one by one."""
+    """Grasps from above and from the sides, each turned further about the vertical."""
     poses = []
     for k in range(count):
         a, tilt = 0.7 * k, 0.3 * (k % 3)
