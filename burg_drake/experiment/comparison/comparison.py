@@ -160,18 +160,18 @@ def success_description(comparison: Comparison) -> str:
     return "success in the second run" if comparison.kind == "runs" else "actual success"
 
 
-def estimate_text(found: Estimate, *, percent: bool) -> str:
+def estimate_text(estimate: Estimate, *, percent: bool) -> str:
     """Displayed value of an estimate."""
-    if found.value is None:
+    if estimate.value is None:
         return MISSING_NUMBER
-    return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
+    return f"{100 * estimate.value:.2f} %" if percent else f"{estimate.value + 0.0:.3f}"
 
 
-def bracketed_interval(found: Estimate, *, percent: bool) -> str:
+def bracketed_interval(estimate: Estimate, *, percent: bool) -> str:
     """The interval of a figure in brackets; empty if there is none."""
-    if found.low is None or found.high is None:
+    if estimate.low is None or estimate.high is None:
         return ""
-    bounds, decimals = [found.low, found.high], 2
+    bounds, decimals = [estimate.low, estimate.high], 2
     if percent:
         bounds = [100 * bound for bound in bounds]
         decimals = 0 if bounds[1] - bounds[0] >= 2.0 else 1
@@ -179,11 +179,11 @@ def bracketed_interval(found: Estimate, *, percent: bool) -> str:
     return f"[{low}, {high}]"
 
 
-def brief_share_text(found: Estimate) -> str:
+def brief_share_text(estimate: Estimate) -> str:
     """A share in whole per cents with its interval."""
-    if found.value is None:
-        return f"undefined ({found.reason})"
-    return f"{100 * found.value:.0f} % {bracketed_interval(found, percent=True)}"
+    if estimate.value is None:
+        return f"undefined ({estimate.reason})"
+    return f"{100 * estimate.value:.0f} % {bracketed_interval(estimate, percent=True)}"
 
 
 def headline_sentence(comparison: Comparison) -> str:
@@ -374,18 +374,18 @@ def outcome_counts_text(outcomes: Mapping[str, int]) -> str:
     return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
 
 
-def outlier_name(one: OutlierGroup) -> str:
+def outlier_name(group: OutlierGroup) -> str:
     """Displayed name of an outlier group."""
-    return outcome_label(one.name) if one.kind == "verdict" else one.name
+    return outcome_label(group.name) if group.kind == "verdict" else group.name
 
 
 def outlier_sentence(judgement: Judgement) -> str:
     """A sentence on the outlier groups; empty if there are none."""
     parts = [
-        f"{outlier_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
-        f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
-        f" {one.other_wrong} of {one.other_trials})"
-        for one in judgement.standing_out
+        f"{outlier_name(group)} ({group.kind}; {group.wrong} of {group.trials} predicted"
+        f" {'successes failed' if group.predicted else 'failures succeeded'}, of all others"
+        f" {group.other_wrong} of {group.other_trials})"
+        for group in judgement.standing_out
     ]
     return f"What stands out: {', '.join(parts)}." if parts else ""
 

@@ -70,22 +70,22 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     yield from (f"note: {text}" for text in c.notes)
 
 
-def _agreement_tables(found: RunAgreement) -> Iterator[TextTable | str]:
+def _agreement_tables(agreement: RunAgreement) -> Iterator[TextTable | str]:
     """Tables of agreement by object, disagreements by stage, and differences of margins; without
     empty tables.
     """
-    if len(found.objects) > 1:
-        yield run_agreement_finding("object", found.objects).text_table()
-    if found.apart:
-        yield _stage_table(found.apart)
-    if found.parted:
-        yield parted_finding(found.parted).text_table()
-    if found.confidence:
-        yield confidence_finding(found.confidence).text_table()
-    if found.margins:
-        yield _margin_bin_table(found.margins)
-    if found.differences:
-        yield margin_difference_finding(found.differences).text_table()
+    if len(agreement.objects) > 1:
+        yield run_agreement_finding("object", agreement.objects).text_table()
+    if agreement.apart:
+        yield _stage_table(agreement.apart)
+    if agreement.parted:
+        yield parted_finding(agreement.parted).text_table()
+    if agreement.confidence:
+        yield confidence_finding(agreement.confidence).text_table()
+    if agreement.margins:
+        yield _margin_bin_table(agreement.margins)
+    if agreement.differences:
+        yield margin_difference_finding(agreement.differences).text_table()
 
 
 def _judgement_tables(c: Comparison, judgement: Judgement, name: str) -> Iterator[TextTable | str]:
@@ -227,15 +227,15 @@ def outlier_finding(judgement: Judgement) -> FindingTable:
     found = FindingTable(title="What stands out", caption=caption, text=text)
     found.names("what", "").texts("predicted").numbers("wrong", "others wrong")
     found.texts("ended").numbers("p corrected")
-    for one in judgement.standing_out:
+    for group in judgement.standing_out:
         found.row(
-            one.kind,
-            outlier_name(one),
-            "success" if one.predicted else "failure",
-            f"{one.wrong} of {one.trials}",
-            f"{one.other_wrong} of {one.other_trials}",
-            outcome_counts_text(one.ended),
-            format_number(one.corrected),
+            group.kind,
+            outlier_name(group),
+            "success" if group.predicted else "failure",
+            f"{group.wrong} of {group.trials}",
+            f"{group.other_wrong} of {group.other_trials}",
+            outcome_counts_text(group.ended),
+            format_number(group.corrected),
         )
     return found
 

@@ -159,13 +159,17 @@ def _keep_percent_signs(text: str) -> str:
     return text.replace(" %", "\u00a0%")
 
 
-def _figure_tile(name: str, found: Estimate, key: str) -> tuple[str, Child, str]:
+def _figure_tile(name: str, estimate: Estimate, key: str) -> tuple[str, Child, str]:
     percent = key in PERCENT_MEASURES
-    if found.value is None:
-        return name, "-", found.reason
+    if estimate.value is None:
+        return name, "-", estimate.reason
     if percent:
-        return name, f"{100 * found.value:.0f} %", f"{bracketed_interval(found, percent=True)} %"
-    return name, estimate_text(found, percent=False), bracketed_interval(found, percent=False)
+        return (
+            name,
+            f"{100 * estimate.value:.0f} %",
+            f"{bracketed_interval(estimate, percent=True)} %",
+        )
+    return name, estimate_text(estimate, percent=False), bracketed_interval(estimate, percent=False)
 
 
 def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
@@ -341,36 +345,36 @@ def _outcome_section(comparison: Comparison, judgement: Judgement) -> Html:
     )
 
 
-def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Html | None]:
+def _agreement_sections(comparison: Comparison, agreement: RunAgreement) -> list[Html | None]:
     """Sections on the agreement of two runs."""
     title, text = "Agreement on holding", agreement_sentence(comparison)
     parts: list[Html | None] = [
-        run_agreement_finding("object", found.objects, title, text).section(),
-        _stage_section(found),
+        run_agreement_finding("object", agreement.objects, title, text).section(),
+        _stage_section(agreement),
     ]
-    if found.parted:
-        parts.append(parted_finding(found.parted).section())
-    if found.confidence:
-        parts.append(confidence_finding(found.confidence).section())
-    if found.margins:
-        parts.append(_margin_bin_section(found.margins))
-    if found.differences:
-        parts.append(margin_difference_finding(found.differences).section())
+    if agreement.parted:
+        parts.append(parted_finding(agreement.parted).section())
+    if agreement.confidence:
+        parts.append(confidence_finding(agreement.confidence).section())
+    if agreement.margins:
+        parts.append(_margin_bin_section(agreement.margins))
+    if agreement.differences:
+        parts.append(margin_difference_finding(agreement.differences).section())
     return parts
 
 
-def _stage_section(found: RunAgreement) -> Html:
+def _stage_section(agreement: RunAgreement) -> Html:
     """Section that counts all grasps by the deciding stages of both runs, and in brackets the
     grasps that only one run holds.
     """
-    columns = deciding_stages(found.stages)
+    columns = deciding_stages(agreement.stages)
 
     def cell(stage: str, other: str) -> Child:
-        count = found.stages[stage].get(other, 0)
-        parted = found.apart.get(stage, {}).get(other, 0)
+        count = agreement.stages[stage].get(other, 0)
+        parted = agreement.apart.get(stage, {}).get(other, 0)
         return f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
 
-    rows = [(stage, [cell(stage, other) for other in columns]) for stage in found.stages]
+    rows = [(stage, [cell(stage, other) for other in columns]) for stage in agreement.stages]
     text = (
         "Rows: the stage that decided in the first run. Columns: in the second run. In"
         " brackets: grasps that only one of the runs holds."
@@ -391,8 +395,8 @@ def _margin_bin_section(margins: Sequence[MarginCalibration]) -> Html:
     return section("Do the runs disagree at small margins?", text, plots)
 
 
-def _plots(found: Sequence[MarginCalibration], vertical: str) -> Html:
-    plots = (reliability_plot(c, vertical) for c in found)
+def _plots(calibrations: Sequence[MarginCalibration], vertical: str) -> Html:
+    plots = (reliability_plot(c, vertical) for c in calibrations)
     return element("div", *plots, class_="charts plots")
 
 
@@ -409,9 +413,9 @@ def _margin_section(comparison: Comparison, judgement: Judgement) -> Html | None
     return section(title, words) if words else None
 
 
-def _distance_from_chance(found: MarginCalibration) -> float:
+def _distance_from_chance(calibration: MarginCalibration) -> float:
     """Distance of the AUROC's interval from chance, by which the margins to plot are selected."""
-    area = found.auroc_weighted or found.auroc
+    area = calibration.auroc_weighted or calibration.auroc
     low, high = area.low, area.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
 
@@ -447,12 +451,12 @@ def _matrix_section(comparison: Comparison, judgements: NamedJudgements) -> Html
     return section(title, text, element("div", *blocks, class_="beside"))
 
 
-def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
+def _matrix_table(comparison: Comparison, title: str, agreement: Agreement) -> Html:
     runs = comparison.kind == "runs"
     judge, other = ("in the first", "in the second") if runs else ("predicted", "on the robot")
 
     def cell(name: str, style: str) -> Html:
-        value = format_count(round(getattr(found, name)))
+        value = format_count(round(getattr(agreement, name)))
         tip = cell_name(comparison, name)
         return element(
             "td", element("b", value), element("small", name.upper()), class_=style, title=tip

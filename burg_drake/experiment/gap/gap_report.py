@@ -97,13 +97,13 @@ def _subtitle(steps: GapSteps, success: Success) -> str:
     return f"{about}; success: {counts}"
 
 
-def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
+def _tiles(steps: GapSteps, changes: Sequence[Change]) -> list[tuple[str, Child, str]]:
     grasps = len(steps.first.candidates)
     entries: list[tuple[str, Child, str]] = [("Grasps", f"{grasps}", "the same in every step")]
-    first = found[0].successes if found else 0
-    if found and found[0].step != "placed":
+    first = changes[0].successes if changes else 0
+    if changes and changes[0].step != "placed":
         entries.append((GAP_STEP_TITLES["hand"].capitalize(), f"{first}", "succeed"))
-    for change in found:
+    for change in changes:
         left = change.successes - len(change.lost) + len(change.won)
         if change.step == "placed":
             share = format_percent(left / change.successes) if change.successes else "-"
@@ -154,9 +154,9 @@ GAP_STEP_DESCRIPTIONS = {
 """Description of each step."""
 
 
-def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
+def flow_section(steps: GapSteps, changes: Sequence[Change]) -> Html | None:
     """Section with the chart of all steps."""
-    if not found:
+    if not changes:
         return None
     columns = []
     for step in steps.steps:
@@ -170,7 +170,7 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
         "How grasps end in each step; the colour of a band is that of the outcome in the"
         " next step. In displaced scenes only grasps that succeeded in the step before"
         " are tried, each once a scene.",
-        element("div", flow_chart(columns, [c.flow for c in found], scale), class_="scroll"),
+        element("div", flow_chart(columns, [c.flow for c in changes], scale), class_="scroll"),
     )
 
 

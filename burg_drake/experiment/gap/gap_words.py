@@ -108,14 +108,14 @@ def replay_arguments(run: str, grasp: str) -> list[str]:
     return ["burg-drake", "replay", run, "--grasp", grasp]
 
 
-def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
+def steps_view(steps: GapSteps, changes: Sequence[Change]) -> TextTable:
     """Table of grasps that each step keeps and loses."""
     table = TextTable("Where grasps are lost", caption=_caption(steps))
     table.names("step").numbers(
         "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
     )
     table.texts("turned into")
-    for change in found:
+    for change in changes:
         lost, whole = len(change.lost), change.successes
         low, high = change.share_lost
         outcomes = Counter(outcome_label(move.after) for move in change.lost)
@@ -164,17 +164,17 @@ def reality_table(agreement: Sequence[StepAgreement]) -> FindingTable:
     return found
 
 
-def _share_cell(found: Estimate) -> tuple[str, Html]:
-    if found.value is None or found.low is None or found.high is None:
+def _share_cell(estimate: Estimate) -> tuple[str, Html]:
+    if estimate.value is None or estimate.low is None or estimate.high is None:
         return "-", Html("-")
-    mark = interval_mark(found.value, found.low, found.high)
-    text = f"{100 * found.value:.0f} {bracketed_interval(found, percent=True)} %"
-    return text, join(mark, f" {format_percent(found.value)}")
+    mark = interval_mark(estimate.value, estimate.low, estimate.high)
+    text = f"{100 * estimate.value:.0f} {bracketed_interval(estimate, percent=True)} %"
+    return text, join(mark, f" {format_percent(estimate.value)}")
 
 
 def gap_json(
     steps: GapSteps,
-    found: Sequence[Change],
+    changes: Sequence[Change],
     agreement: Sequence[StepAgreement],
     success: Success,
 ) -> dict[str, Any]:
@@ -184,7 +184,7 @@ def gap_json(
     return {
         "success": success,
         "asked": plain_data(steps.document),
-        "story": step_sentences(steps, found, success),
+        "story": step_sentences(steps, changes, success),
         "steps": [
             {
                 "name": step.name,
@@ -199,7 +199,7 @@ def gap_json(
             }
             for step in steps.steps
         ],
-        "changes": [_change_json(change) for change in found],
+        "changes": [_change_json(change) for change in changes],
         "pushed": None if pushed is None else asdict(pushed),
         "reality": [
             {

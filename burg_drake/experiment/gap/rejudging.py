@@ -489,28 +489,32 @@ def rejudged_scene_file(trial: Rejudged, folder: Path) -> Path:
     return folder / "scenes" / f"{trial.number:03d}.yaml"
 
 
-def write_rejudging(found: Rejudging) -> None:
+def write_rejudging(rejudging: Rejudging) -> None:
     """Writes scenes, table and figures.
 
     Raises:
         InvalidInputError: a file cannot be written.
     """
-    for trial in found.trials:
+    for trial in rejudging.trials:
         if trial.scene is not None:
-            save_displaced_scene(trial.scene, rejudged_scene_file(trial, found.path))
-    rows = [row for trial in found.trials if (row := _trial_columns(trial, found)) is not None]
+            save_displaced_scene(trial.scene, rejudged_scene_file(trial, rejudging.path))
+    rows = [
+        row for trial in rejudging.trials if (row := _trial_columns(trial, rejudging)) is not None
+    ]
     if rows:
-        write_table(found.path / REJUDGED_TABLE_FILE, concatenate_tables(rows))
-    atomic_write(found.path / "rejudged.json", json.dumps(rejudging_json(found), indent=1) + "\n")
+        write_table(rejudging.path / REJUDGED_TABLE_FILE, concatenate_tables(rows))
+    atomic_write(
+        rejudging.path / "rejudged.json", json.dumps(rejudging_json(rejudging), indent=1) + "\n"
+    )
 
 
-def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
+def _trial_columns(trial: Rejudged, rejudging: Rejudging) -> Columns | None:
     """Table row of one trial; None for a trial without a verdict."""
     if trial.scene is None or trial.candidate is None or trial.verdict is None:
         return None
     origin = replace(
         trial.origin,
-        scene=str(rejudged_scene_file(trial, found.path)),
+        scene=str(rejudged_scene_file(trial, rejudging.path)),
         scene_content=trial.scene.content[:HASH_DIGITS],
         run="",
     )
@@ -528,7 +532,7 @@ def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
         "trial": trial.number,
         "real": trial.real.value,
         "planned": trial.planned.value,
-        "cause": trial.cause(found.success) or "",
+        "cause": trial.cause(rejudging.success) or "",
         "notes": "; ".join(trial.notes),
     }
     return {name: np.array([value]) for name, value in values.items()} | columns
@@ -547,41 +551,41 @@ def concatenate_tables(tables: list[Columns]) -> Columns:
     return {name: np.concatenate([part(table, name) for table in tables]) for name in names}
 
 
-def rejudging_json(found: Rejudging) -> dict[str, Any]:
+def rejudging_json(rejudging: Rejudging) -> dict[str, Any]:
     """The figures as JSON values."""
-    count = len(found.predictable)
+    count = len(rejudging.predictable)
     return {
-        "success": found.success,
-        "judged": len(found.judged),
-        "unpredictable": found.causes["unpredictable"],
+        "success": rejudging.success,
+        "judged": len(rejudging.judged),
+        "unpredictable": rejudging.causes["unpredictable"],
         "agree": {
             name: {"count": right, "of": count, "low": low, "high": high}
             for name, measured in (("planned", False), ("measured", True))
-            for right, low, high in [found.agreement(measured=measured)]
+            for right, low, high in [rejudging.agreement(measured=measured)]
         },
         "precision": {
             name: {
                 which: dict(zip(("count", "of"), shares, strict=True))
                 for which, every in (("all", True), ("predictable", False))
-                for shares in [found.precision(measured=measured, every=every)]
+                for shares in [rejudging.precision(measured=measured, every=every)]
             }
             for name, measured in (("planned", False), ("measured", True))
         },
-        "causes": {cause: found.causes[cause] for cause in DISAGREEMENT_CAUSES},
+        "causes": {cause: rejudging.causes[cause] for cause in DISAGREEMENT_CAUSES},
         "explained": dict(
-            zip(("count", "of", "low", "high"), found.explained_disagreements, strict=True)
+            zip(("count", "of", "low", "high"), rejudging.explained_disagreements, strict=True)
         ),
-        "mcnemar_p": found.mcnemar_test.p_value,
+        "mcnemar_p": rejudging.mcnemar_test.p_value,
         "table": [
             {"planned": p, "measured": m, "real": r, "count": n}
-            for (p, m, r), n in sorted(found.table.items())
+            for (p, m, r), n in sorted(rejudging.table.items())
         ],
-        "trials": [_trial_json(trial, found) for trial in found.trials],
-        "skipped": {str(number): why for number, why in found.skipped.items()},
+        "trials": [_trial_json(trial, rejudging) for trial in rejudging.trials],
+        "skipped": {str(number): why for number, why in rejudging.skipped.items()},
     }
 
 
-def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
+def _trial_json(trial: Rejudged, rejudging: Rejudging) -> dict[str, Any]:
     return {
         "number": trial.number,
         "run": trial.run,
@@ -590,7 +594,7 @@ def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
         "real": trial.real.value,
         "planned": trial.planned.value,
         "measured": None if trial.outcome is None else trial.outcome.value,
-        "cause": trial.cause(found.success),
+        "cause": trial.cause(rejudging.success),
         "why_not": trial.failure_reason,
         "notes": list(trial.notes),
     }

@@ -76,8 +76,8 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
     """
     runs: dict[str, Run] = {}
     places = []
-    for one in given:
-        for run in _open_runs(one):
+    for source in given:
+        for run in _open_runs(source):
             places.append(str(run.path))
             if not run.document.hash or not len(run.results["id"]):
                 continue
@@ -136,10 +136,10 @@ def list_eligible_grasps(
     return sorted((p for p in pools if len(p.rows)), key=lambda p: p.key), notes
 
 
-def _open_runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
-    if isinstance(one, Run):
-        return [one]
-    return one.runs if isinstance(one, Campaign) else load_runs(one)
+def _open_runs(source: Run | Campaign | str | Path) -> Sequence[Run]:
+    if isinstance(source, Run):
+        return [source]
+    return source.runs if isinstance(source, Campaign) else load_runs(source)
 
 
 def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGrasps:
@@ -330,11 +330,11 @@ def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
     return [Shortfall(first.run, first.object, kind, counts + rest, description + rest)]
 
 
-def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
+def shortfall_notes(shortfalls: Iterable[Shortfall]) -> list[str]:
     """A note for each kind of shortfall with its objects, and counts by object if they differ."""
     kinds: defaultdict[str, list[Shortfall]] = defaultdict(list)
-    for one in found:
-        kinds[one.kind].append(one)
+    for shortfall in shortfalls:
+        kinds[shortfall.kind].append(shortfall)
     lines = [_shortfall_line(kind, members) for kind, members in kinds.items()]
     more = len(lines) - MAX_SHORTFALL_ITEMS
     if more > 0:
