@@ -245,7 +245,7 @@ def group_finding(comparison: Comparison, kind: str, groups: Sequence[FactorGrou
     right = "same verdict in both runs" if comparison.kind == "runs" else "right verdicts"
     title = f"By {kind}{selection_suffix(comparison)}"
     text = f"Share of {right}, precision and recall, with 95 % intervals."
-    return _group_finding(title, text, kind, groups)
+    return _group_table(title, text, kind, groups)
 
 
 def placement_finding(comparison: Comparison, judgement: Judgement) -> FindingTable | None:
@@ -264,14 +264,14 @@ def placement_finding(comparison: Comparison, judgement: Judgement) -> FindingTa
         " cause is placement and not physics."
     )
     title = f"By placement of the objects{selection_suffix(comparison)}"
-    found = _group_finding(title, text, "placement", groups)
+    found = _group_table(title, text, "placement", groups)
     area = Figure(p.largest.auroc, percent=False)
     if area.estimate.value is not None:
         found.caption = f"AUROC of the largest offset for right verdicts: {' '.join(area.texts)}"
     return found
 
 
-def _group_finding(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> FindingTable:
+def _group_table(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> FindingTable:
     """Table of counts and shares with intervals by group of trials."""
     found = FindingTable(title=title, text=text, style="groups", max_rows=20, max_page_rows=60)
     found.names(head).numbers("trials", "TP", "FP", "FN", "TN")

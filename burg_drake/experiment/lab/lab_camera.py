@@ -9,7 +9,6 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from burg_drake.cameras import (
 )
 from burg_drake.core import BurgError, InvalidInputError, one_line
 from burg_drake.experiment.lab.lab_book import LabBook
+from burg_drake.experiment.trials.trial_book import current_time
 from burg_drake.experiment.trials.trial_photos import save_photo_and_placement, summarize_placements
 from burg_drake.scene import Scene
 
@@ -222,7 +222,7 @@ class LabCamera:
             report["problem"] = f"the check failed: {one_line(error)}"
             traceback.print_exc()
         report["seconds"] = time.monotonic() - begun
-        report["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
+        report["time"] = current_time()
         self._last_report = report
 
     def _save(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:

@@ -153,7 +153,7 @@ class TrialBook:
             new = replace(base, **merge_robot_report(base, given))
             if new.outcome is not None and "time" not in given:
                 same = not again and new.outcome is trial.outcome and trial.time
-                new = replace(new, time=trial.time if same else _current_time())
+                new = replace(new, time=trial.time if same else current_time())
             return new
 
         how: How = "again" if again else "corrected" if correct else "recorded"
@@ -237,11 +237,16 @@ class TrialBook:
                 after = before.with_trial(new)
                 if read_text(self.path) == before.text:  # unless an editor has written it meanwhile
                     break
-            now = _current_time()
-            names = (old.number, old.grasp, old.content, now, how)
-            append_entry(
-                journal_path(self.path), Entry(*names, entered_values(old), entered_values(new))
+            entry = Entry(
+                number=old.number,
+                grasp=old.grasp,
+                content=old.content,
+                at=current_time(),
+                how=how,
+                before=entered_values(old),
+                after=entered_values(new),
             )
+            append_entry(journal_path(self.path), entry)
             if new != old:
                 atomic_write(self.path, after.text.encode())
                 sync_folder(Path(os.path.realpath(self.path)).parent)
@@ -266,7 +271,8 @@ class TrialBook:
         return known
 
 
-def _current_time() -> str:
+def current_time() -> str:
+    """The present time, ISO 8601 with time zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
@@ -317,8 +323,15 @@ def _acquire_lock(file: int, trials_path: Path) -> None:
 How = Literal["recorded", "corrected", "again", "restored", "kept"]
 """`again`: the trial was carried out once more. `restored`: the file lacked recorded values.
 `kept`: the file is right where it differs from the journal."""
-JOURNAL_FIELDS = ("outcome", "time", "operator", "note", "photo", "placement", "robot")
-"""Recorded fields of a trial; the others belong to its plan."""
+EMPTY_ENTRY: dict[str, Any] = {
+    "outcome": None,
+    **dict.fromkeys(("time", "operator", "note", "photo"), ""),
+    "placement": {},
+    "robot": None,
+}
+"""Recorded fields of a trial, with their values without an entry."""
+JOURNAL_FIELDS = tuple(EMPTY_ENTRY)
+"""Recorded fields of a trial; all others are set when the trial is planned."""
 
 
 @dataclass(frozen=True)
@@ -493,15 +506,6 @@ def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingV
             values = {name: last.get(name) for name in missing}
             found.append(MissingValues(trial.number, values, edited))
     return found
-
-
-EMPTY_ENTRY: dict[str, Any] = {
-    **dict.fromkeys(("time", "operator", "note", "photo"), ""),
-    "outcome": None,
-    "placement": {},
-    "robot": None,
-}
-"""Field values of a trial without an entry."""
 
 
 def parse_real_outcome(name: str) -> RealOutcome:

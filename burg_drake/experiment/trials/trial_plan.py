@@ -10,7 +10,6 @@ import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
@@ -37,7 +36,12 @@ from burg_drake.experiment.trials.grasp_selection import (
     select_grasps,
 )
 from burg_drake.experiment.trials.source_runs import grasp_contents, make_source_run
-from burg_drake.experiment.trials.trial_book import entered_values, journal_path, read_entries
+from burg_drake.experiment.trials.trial_book import (
+    current_time,
+    entered_values,
+    journal_path,
+    read_entries,
+)
 from burg_drake.experiment.trials.trial_sheet import (
     Balance,
     RealTrial,
@@ -184,7 +188,7 @@ def plan_trials(
     folder = None if out is None else Path(os.path.realpath(out)).parent
     used = {pool.key: pool.run for pool, _, _ in chosen}
     sheet = TrialSheet(
-        created=datetime.now().astimezone().isoformat(timespec="seconds"),
+        created=current_time(),
         runs={key: make_source_run(used[key], folder) for key in sorted(used)},
         selection=selection,
         strata=strata,

@@ -61,7 +61,7 @@ class Pages(HTMLParser):
             self.cards[self._card] += f" {data}"
 
 
-class Twice:
+class CachedPictures:
     """Makes each picture once for all pages of a test."""
 
     def __init__(self, pictures: TrialPictures) -> None:
@@ -85,7 +85,7 @@ def with_trials(runs: TriedRuns, change: object) -> TriedRuns:
 
 @pytest.fixture(scope="module")
 def once(pictures: TrialPictures) -> TrialPictures:
-    return Twice(pictures)  # type: ignore[return-value]
+    return CachedPictures(pictures)  # type: ignore[return-value]
 
 
 def test_every_trial_is_there_once(runs: TriedRuns, once: TrialPictures) -> None:

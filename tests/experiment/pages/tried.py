@@ -79,7 +79,7 @@ def make_trials(folder: Path, runs: list[Run], **first: object) -> Path:
     trials: list[RealTrial] = []
     for block, run in enumerate(runs, 1):
         for candidate in run.candidates:
-            thing = run.scene().instance(candidate.instance).object
+            object_name = run.scene().instance(candidate.instance).object
             trials.append(
                 RealTrial(
                     number=len(trials) + 1,
@@ -88,9 +88,9 @@ def make_trials(folder: Path, runs: list[Run], **first: object) -> Path:
                     grasp=candidate.id,
                     content=grasp_content(candidate.instance, candidate.X_OG, candidate.width),
                     instance=candidate.instance,
-                    object=thing,
+                    object=object_name,
                     simulated=run.verdicts[candidate.id].outcome,
-                    stratum=f"r{block}_{thing}",
+                    stratum=f"r{block}_{object_name}",
                 )
             )
     trials[0] = replace(trials[0], **first)
