@@ -264,7 +264,7 @@ class LabServer(PageServer):
         return Response(picture.jpeg, headers=headers, media_type="image/jpeg")
 
     def _enter(self, body: dict[str, Any]) -> dict[str, Any]:
-        return {"entry": entry_data(self.lab.enter(parse_lab_entry(body, self.lab.plan)))}
+        return {"entry": entry_data(self.lab.enter(parse_lab_entry(body, self.lab.plan_hash)))}
 
     def _watch(self, body: dict[str, Any]) -> dict[str, Any]:
         self._camera().watch(parse_trial_number(body))

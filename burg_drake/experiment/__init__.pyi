@@ -105,7 +105,7 @@ from .gap.gap_steps import (
     OutcomeChange as OutcomeChange,
     agreement_by_step as agreement_by_step,
     gap_changes as gap_changes,
-    tried_grasps as tried_grasps,
+    trials_of_run as trials_of_run,
 )
 from .gap.gap_words import (
     gap_json as gap_json,
@@ -136,7 +136,7 @@ from .lab.lab_book import (
 )
 from .lab.lab_camera import LabCamera as LabCamera
 from .lab.painters import HAND_BODY as HAND_BODY, NO_BODY as NO_BODY
-from .lab.protocol import SheetOptions as SheetOptions, sheet_page as sheet_page
+from .lab.protocol import ProtocolOptions as ProtocolOptions, protocol_page as protocol_page
 from .lab.trial_pictures import (
     TARGET_RIM_COLOR as TARGET_RIM_COLOR,
     PictureCache as PictureCache,

@@ -1,4 +1,4 @@
-"""Runs on disk whose verdicts are made up, on a scene without physics behind it."""
+"""Runs on disk with invented verdicts, without a simulation."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ OBJECTS = ("mug", "box")
 
 
 def make_scene(folder: Path, name: str = "two", x: float = 0.12) -> Scene:
-    """A mug and a box of the library that comes along."""
-    places = {"mug": (x, 0.11, 0.0), "box": (0.35, 0.2, 0.0)}
-    instances = tuple(Instance(object=o, X_SO=Pose(places[o])) for o in OBJECTS)
+    """A scene with a mug and a box of the library `household`."""
+    positions = {"mug": (x, 0.11, 0.0), "box": (0.35, 0.2, 0.0)}
+    instances = tuple(Instance(object=name, X_SO=Pose(positions[name])) for name in OBJECTS)
     document = SceneDocument(name=name, library="household", instances=instances)
     save_scene(document, folder / f"{name}.yaml")
     return load_scene(folder / f"{name}.yaml")
@@ -66,29 +66,29 @@ def make_run(
     poses: Mapping[str, Array] | None = None,
     **recorded: Any,
 ) -> Run:
-    """A run in a folder.
+    """Writes a run with given verdicts.
 
     Args:
-        folder: for it.
-        scene: of it.
-        verdicts: one a grasp, by instance; None for a grasp that is not judged yet.
-        mode: what was asked.
-        seed: of the poses.
-        poses: by instance, in place of random ones.
-        recorded: other fields of its document.
+        folder: folder of the run.
+        scene: scene of the run.
+        verdicts: a verdict for each grasp, by instance; None for a grasp that is not judged yet.
+        mode: mode of the run.
+        seed: random seed of the poses.
+        poses: poses of the grasps by instance; random if None.
+        recorded: other fields of the run's document.
     """
     station = load_station("panda_tabletop")
     sets = [
         GraspSet.create(
-            random_poses(len(own), seed + k) if poses is None else poses[name],
+            random_poses(len(of_instance), seed + k) if poses is None else poses[name],
             object=name,
             width=0.03 if poses is None else 0.06,
         )
-        for k, (name, own) in enumerate(verdicts.items())
+        for k, (name, of_instance) in enumerate(verdicts.items())
     ]
-    instances = np.array([name for name, own in verdicts.items() for _ in own])
+    instances = np.array([name for name, of_instance in verdicts.items() for _ in of_instance])
     candidates = Candidates(GraspSet.concatenate(sets), instances)
-    counts = {name: len(own) for name, own in verdicts.items()}
+    counts = {name: len(of_instance) for name, of_instance in verdicts.items()}
     document = RunDocument(
         scene=input_of(scene, "scenes"),
         station=input_of(station, "stations"),
@@ -108,19 +108,19 @@ def make_run(
     document = replace(document, **recorded)
     document = replace(document, hash=run_hash(document))
     run = create_run(folder, document, scene, station, candidates)
-    told = [verdict for own in verdicts.values() for verdict in own]
+    in_order = [verdict for of_instance in verdicts.values() for verdict in of_instance]
     with Journal(run.path / JOURNAL_FILE) as journal:
-        for id, verdict in zip(candidates.id, told, strict=True):
+        for id, verdict in zip(candidates.id, in_order, strict=True):
             if verdict is not None:
                 journal.append(id, verdict)
     return load_run(run.path)
 
 
 def ended(outcome: str, **margins: float) -> Verdict:
-    """A verdict of an outcome, of the stage that decides it."""
+    """A verdict with an outcome and the stage that decides it."""
     return Verdict(Outcome(outcome), Outcome(outcome).stage, margins=margins)
 
 
 def failed() -> Verdict:
-    """A trial that could not be stepped."""
+    """A verdict of a trial whose simulation failed."""
     return Verdict(Outcome.SIMULATION_FAILED, Stage.EXECUTED, reason="NaN")

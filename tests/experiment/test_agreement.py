@@ -1,4 +1,4 @@
-"""Figures of a confusion matrix, held against scikit-learn and statsmodels."""
+"""Figures of a confusion matrix, compared with scikit-learn and statsmodels."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Cells = st.tuples(*[st.integers(0, 40)] * 4)
 
 
 def trials(cells: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Predicted and actual success of as many trials."""
+    """Predicted and actual success of trials, with these counts."""
     predicted = np.repeat([True, True, False, False], cells)
     return predicted, np.repeat([True, False, True, False], cells)
 
@@ -72,7 +72,7 @@ def test_intervals_stay_within_what_is_possible(
 
 
 def test_excess_where_all_were_to_succeed() -> None:
-    """It is the share of failures: Wilson's interval of 1 - 2 / 2."""
+    """If all are predicted to succeed, the excess is the share of failures, with its interval."""
     found = estimate_agreement(np.array([2, 0, 0, 0])).excess
     low, high = proportion_confint(0, 2, method="wilson")
     assert (found.value, found.low, found.high) == (0.0, pytest.approx(low), pytest.approx(high))

@@ -1,4 +1,4 @@
-"""Calibration of margins, held against scikit-learn, SciPy and a bootstrap."""
+"""Calibration of margins, compared with scikit-learn, SciPy and a bootstrap."""
 
 from __future__ import annotations
 

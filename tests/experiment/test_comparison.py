@@ -1,4 +1,4 @@
-"""Runs against trials and against each other: rows by hand on made-up runs."""
+"""Runs compared with trials and with each other: invented runs, rows counted by hand."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def make_runs(folder: Path) -> tuple[Run, Run]:
 
 
 def make_sheet(run: Run, folder: Path, real: tuple[str, ...] = REAL, **fields: object) -> Path:
-    """All grasps of a run as trials, which ended by turns as `real` says."""
+    """Trials of all grasps of a run; their outcomes repeat those of `real` in order."""
     results, grasps = run.results, run.candidates
     strata, trials = {}, []
     for k, id in enumerate(results["id"].tolist()):

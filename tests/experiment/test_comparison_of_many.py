@@ -1,4 +1,4 @@
-"""Runs over several scenes compared: as each of their runs alone, put together."""
+"""A comparison over several scenes equals the comparisons of the single scenes together."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _shares_belong_to_their_scene(first: Campaign, second: Campaign, folder: Path) -> None:
-    """The runs have grasps of the same ids, as the objects are the same."""
+    """The runs of different scenes have the same objects, and so grasps with the same ids."""
     ids = first.run("here").candidates.id
     assert ids == first.run("there").candidates.id
     shares = np.linspace(0.1, 0.4, len(ids))

@@ -49,14 +49,14 @@ Told = Mapping[str, Sequence[tuple[str, str]]]
 def tried(
     folder: Path, told: Told, population: Mapping[str, int] | None = None, *, mode: Mode = "hand"
 ) -> tuple[Run, Path]:
-    """A run and trials of all of its grasps.
+    """A run, and trials of all its grasps.
 
     Args:
-        folder: for both.
+        folder: folder of both.
         told: simulated and real outcome of each grasp, by object.
         population: grasps of an object that predicted successes, `success`, and `failure` were
             chosen from; as many as there are trials if None.
-        mode: of the run.
+        mode: mode of the run.
     """
     scene = known_runs.make_scene(folder)
     verdicts = {o: [known_runs.ended(simulated) for simulated, _ in told[o]] for o in told}
@@ -306,7 +306,7 @@ def test_holms_correction_is_that_of_statsmodels() -> None:
 
 
 def test_mid_p_is_fair_where_the_exact_test_is_not() -> None:
-    """Averaged over all tables with the same totals a mid-p is one half."""
+    """The mean mid-p over all tables with the same totals is one half."""
     from scipy.stats import hypergeom
 
     of = hypergeom(20, 6, 8)

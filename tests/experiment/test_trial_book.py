@@ -1,4 +1,4 @@
-"""A trials file with several writers: nothing is lost, and nobody's text is touched."""
+"""A trials file with several writers: no entry is lost, and other text stays as it was."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str)
 
 
 def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
-    """Two writers by two names lose nothing, and what an editor overwrites is restored by both."""
+    """Writers through a link and through the file lose nothing; both restore overwritten text."""
     (tmp_path / "real").mkdir()
     path = write_sheet(tmp_path / "real", 24)
     path.chmod(0o640)
@@ -152,7 +152,7 @@ def test_a_file_system_without_locks_is_named(
 
 
 def no_locks(file: int, kind: int) -> None:
-    """What the system says on some network drives."""
+    """Raises the error of a network drive without locks."""
     raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
 
@@ -283,7 +283,7 @@ def test_an_old_buffer_loses_nothing_and_an_edit_is_kept(tmp_path: Path) -> None
     ],
 )
 def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path, old: str, new: str) -> None:
-    """They are of a trial of the same number, grasp and content; one of these differs."""
+    """An entry belongs to a trial with its number, grasp and content; here one of them differs."""
     path = write_sheet(tmp_path)
     before = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
@@ -299,13 +299,13 @@ def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path, old: str, ne
 def test_each_step_is_on_the_disk_before_the_next_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the power supply's end leaves is what has been synchronised, and in this order."""
+    """After a power failure only synchronised writes are left, so their order matters."""
     book = TrialBook(write_sheet(tmp_path))
     steps: list[str] = []
     real = {name: getattr(os, name) for name in ("write", "fsync", "replace")}
 
     def name_of(file: int) -> str:
-        """Of an open file; the one that is not renamed yet is the new one."""
+        """Name of an open file; `new file` if it is not yet renamed to its final name."""
         status = os.fstat(file)
         if os.path.samestat(status, tmp_path.stat()):
             return "folder"
@@ -394,7 +394,7 @@ PIECES = (
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_what_is_read_of_a_changed_text_is_what_is_read_of_all_of_it(data: st.DataObject) -> None:
-    """Whatever an editor does to the text, also where trials are no list of mappings any more."""
+    """For any edit of the text, even if trials are no list of mappings any more."""
     text = dump_document(make_sheet(5))
     known = SheetText.read(text, "text")
     for _ in range(data.draw(st.integers(1, 3))):
@@ -424,7 +424,7 @@ def _sheet_or_error(read: Callable[[str], SheetText], text: str) -> TrialSheet |
 def test_an_entry_is_read_and_written_by_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Neither what this program has written nor what another one writes is read all over."""
+    """After an entry of this or another program, only the lines of its trial are parsed."""
     path = write_sheet(tmp_path, 60)
     path.write_text(f"{path.read_text()}notes: [a word on the choice]\n")
     book, other = TrialBook(path), TrialBook(path)

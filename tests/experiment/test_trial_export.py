@@ -1,4 +1,4 @@
-"""Motions of trials: a file for each that the arm can execute, under its number."""
+"""Motions of trials: a file, named by number, for each trial that the arm can execute."""
 
 from __future__ import annotations
 

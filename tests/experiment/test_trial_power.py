@@ -1,4 +1,4 @@
-"""What so many trials will tell, against other ways to compute it."""
+"""Interval widths and detectable differences, compared with other ways to compute them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two runs as two opinions: real runs by two engines, and made-up ones whose figures are known."""
+"""Comparison of two runs: real runs by two engines, and invented runs with known figures."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def made_up(folder: Path, *outcomes: list[Verdict | None], **fields: object) -> 
 
 
 def test_disagreement_at_small_margins_is_seen_there(tmp_path: Path) -> None:
-    """Of forty grasps the ten with the least pad force are dropped by the second run."""
+    """The second run drops the ten of forty grasps with the least pad force."""
     force = np.random.default_rng(1).permutation(np.arange(1.0, 41.0))
     first = [known_runs.ended("lifted", pad_force=f, slip=0.001) for f in force]
     second = [
@@ -296,7 +296,7 @@ USUAL = GraspMotion()
 
 
 def recorded(motion: GraspMotion = USUAL, **changes: float) -> dict[str, float]:
-    """What a run of today records of its trials."""
+    """Settings of trials that a present run records."""
     return settings_numbers(TrialSettings(motion=motion, **changes))  # type: ignore[arg-type]
 
 
@@ -374,7 +374,7 @@ def test_all_that_differs_is_named_at_once(
 
 
 def test_what_was_not_recorded_is_what_it_was(tmp_path: Path) -> None:
-    """Runs of before there were limits, and directions of another length."""
+    """Runs from before limits were recorded, and lift directions that are not normalized."""
     first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(**NO_GRIP_LIMITS))
     assert first.document.trial == {}
     assert compare(first, second).coverage.compared == 2
@@ -437,7 +437,7 @@ def test_how_others_were_watched_is_told(tmp_path: Path) -> None:
 
 
 def test_against_trials_phases_may_differ(tmp_path: Path) -> None:
-    """There reality says what is right, and one run may lift higher than the other."""
+    """Against trials the robot is the reference, so one run may lift higher than the other."""
     first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(GraspMotion(lift_height=0.2)))
     sheet = burg.trials.plan_trials(first, out=tmp_path / "trials.yaml")
     for trial in sheet.trials:

@@ -1,4 +1,4 @@
-"""Sheets of trials without runs behind them."""
+"""Trials files without runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from burg_drake.experiment import RealTrial, Selection, SourceRun, Stratum, Tria
 
 
 def make_sheet(count: int = 4) -> TrialSheet:
-    """Trials of one run, of mugs by turns held and lost in simulation."""
+    """Trials of one run on a mug; in simulation it is lifted and slips by turns."""
     document = Input(name="two", path="two.yaml", content="0" * 64)
     run = SourceRun(
         path="run", hash="abc", scene=document, station=document, mode="hand", engine="standard"

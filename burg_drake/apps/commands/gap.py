@@ -79,14 +79,14 @@ def run_gap(arguments: argparse.Namespace) -> int:
         )
     run = evaluation.load_run(arguments.source) if of_run else None
     if sheet is not None and run is not None:
-        experiment.tried_grasps(
+        experiment.trials_of_run(
             sheet, arguments.trials, run
         )  # refuses unsuitable grasps before any work
     with options.cluster_from_options(arguments) as cluster:
         measured = _measure_gap(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
     tried = (
-        [] if sheet is None else experiment.tried_grasps(sheet, arguments.trials, measured.first)
+        [] if sheet is None else experiment.trials_of_run(sheet, arguments.trials, measured.first)
     )
     agreement = (
         experiment.agreement_by_step(measured, sheet, tried, success) if sheet and tried else ()

@@ -60,7 +60,7 @@ def run_trials_serve(arguments: argparse.Namespace) -> int:
             camera,
             host=arguments.host,
             port=arguments.port,
-            secret=_load_or_create_secret(lab.plan),
+            secret=_load_or_create_secret(lab.plan_hash),
         )
         server.on_admitted = lambda peer: print_remark(
             f"{peer} opened the page; for another browser: {server.url}"

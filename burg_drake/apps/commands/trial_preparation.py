@@ -58,16 +58,16 @@ def run_trials_plan(arguments: argparse.Namespace) -> int:
 def _print_choice(sheet: experiment.TrialSheet) -> None:
     """Prints the number of chosen grasps by object and stratum, summed over the runs."""
     chosen: Counter[tuple[str, str]] = Counter()
-    there: Counter[tuple[str, str]] = Counter()
+    available: Counter[tuple[str, str]] = Counter()
     for stratum in sheet.strata.values():
         chosen[stratum.object, stratum.label] += stratum.selected
-        there[stratum.object, stratum.label] += stratum.population
+        available[stratum.object, stratum.label] += stratum.population
     table = core.TextTable("Chosen for the robot").names("object").texts("stratum")
     table.numbers("chosen", "there are")
-    for held, label in sorted(there):
-        counts = (chosen[held, label], there[held, label])
-        table.row(held, label, *map(str, counts))
-    table.row("all", "", str(chosen.total()), str(there.total()), bold=True)
+    for object_name, label in sorted(available):
+        counts = (chosen[object_name, label], available[object_name, label])
+        table.row(object_name, label, *map(str, counts))
+    table.row("all", "", str(chosen.total()), str(available.total()), bold=True)
     table.show()
 
 
@@ -90,13 +90,15 @@ def add_trials_sheet_options(parser: options.Parser) -> None:
 
 
 def run_trials_sheet(arguments: argparse.Namespace) -> int:
-    """Writes the page, and the printed boards."""
+    """Writes the protocol, and the printed boards."""
     core.require_writable(arguments.output)
     runs = experiment.TriedRuns(arguments.trials, dict(arguments.moved))
     page = Path(arguments.output)
     printouts = {} if arguments.no_printouts else _write_printouts(runs, page)
-    layout = experiment.SheetOptions(show_simulated=arguments.show_simulated, printouts=printouts)
-    core.atomic_write(page, experiment.sheet_page(runs, experiment.TrialPictures(runs), layout))
+    layout = experiment.ProtocolOptions(
+        show_simulated=arguments.show_simulated, printouts=printouts
+    )
+    core.atomic_write(page, experiment.protocol_page(runs, experiment.TrialPictures(runs), layout))
     print(f"wrote {page}: {len(runs.sheet.trials)} trials")
     return 0
 

@@ -37,7 +37,7 @@ class PartedGrasp:
         scene, object, grasp: names of scene and object, and id of the grasp.
         first, second: outcome in each run.
         confidence: confidence of the first run's verdict; None if it has none.
-        replays: commands that show it in the first run, and in the second.
+        replays: commands that show the grasp in the first run, and in the second.
     """
 
     scene: str
@@ -55,13 +55,13 @@ def parted_grasps(
     scenes: Mapping[str, str],
     folders: Sequence[Mapping[str, str]],
 ) -> tuple[PartedGrasp, ...]:
-    """Names grasps in the order of the first run.
+    """Lists grasps that only one of two runs holds, in the order of the first run.
 
     Args:
         pairs: N grasps with the verdicts of the first run and the outcomes of the second.
         parted: (N,) which grasps to list.
         scenes: names of the scenes by their content.
-        folders: of the two runs, by content of the scene.
+        folders: folders of the two runs, by content hash of the scene.
     """
     found = []
     for row in np.flatnonzero(parted).tolist():
@@ -92,14 +92,14 @@ CONFIDENCE_GROUPS = (
 
 @dataclass(frozen=True, kw_only=True)
 class MarginDifference:
-    """Differences of a margin between two runs, of grasps that both executed.
+    """Differences of a margin between two runs, for grasps that both executed.
 
     All values are in the unit of the margin's column.
 
     Attributes:
         name: name of the margin.
         grasps: number of grasps that both executed and measured.
-        median: median of second minus first run.
+        median: median of the margin in the second run minus that in the first.
         median_size: median of the absolute differences.
         within: 90 % quantile of the absolute differences.
     """
@@ -120,18 +120,18 @@ class RunAgreement:
 
     Attributes:
         alike: share of grasps that both runs hold or both do not, with Wilson's interval.
-        kappa: Cohen's kappa of the same.
+        kappa: Cohen's kappa of holding in both runs.
         same_rows: number of grasps with exactly the same outcome, stage, engine, confidence and
             margins in both runs, as in a copy.
         objects: agreement by object; its accuracy is the share of alike grasps.
-        stages: grasps by the stage that decided in the first run, and in the second.
-        apart: the same for grasps that are not alike.
-        parted: grasps that are not alike.
+        stages: number of grasps by the stage that decided in the first run, and in the second.
+        apart: as `stages`, for the grasps that only one run holds.
+        parted: grasps that only one run holds.
         confidence: as `objects`, by confidence of the first run's verdicts, if they have one; see
             `CONFIDENCE_GROUPS`.
         margins: share of alike grasps in quantile bins of the first run's margins, for grasps
-            measured by both runs; successes are the alike ones.
-        differences: differences of the margins, if both executed.
+            measured by both runs. Alike grasps count as successes.
+        differences: differences of the margins of grasps that both runs executed.
     """
 
     alike: Estimate
@@ -160,8 +160,8 @@ def assess_run_agreement(
         pairs: N grasps with the verdicts of the first run and the outcomes of the second.
         second: the N rows of the second run, with the columns `REFERENCE_COLUMNS`.
         scenes: names of the scenes by their content.
-        folders: of the two runs, by content of the scene.
-        seed: of the intervals' resampling.
+        folders: folders of the two runs, by content hash of the scene.
+        seed: seed of the intervals' resampling.
     """
     held = replace(
         pairs,
@@ -210,29 +210,29 @@ def _identical_rows(pairs: VerdictPairs, second: ResultTable) -> Flags:
 
 
 def _equal_texts(first: TextFactor, second: TextFactor) -> Flags:
-    place = {name: k for k, name in enumerate(second.names)}
-    codes = np.array([place.get(name, -1) for name in first.names], dtype=np.intp)
+    code_in_second = {name: k for k, name in enumerate(second.names)}
+    codes = np.array([code_in_second.get(name, -1) for name in first.names], dtype=np.intp)
     same: Flags = codes[first.index] == second.index
     return same
 
 
 def margin_differences(pairs: VerdictPairs, second: ResultTable) -> tuple[MarginDifference, ...]:
-    """Differences of the margins of grasps that both runs executed, without margins that they never
-    have in common.
+    """Differences of the margins of grasps that both runs executed. A margin that no grasp has in
+    both runs is left out.
     """
     covered_share = 0.9  # Share of the differences covered by `MarginDifference.within`.
     executed = both_executed(pairs.stage, second.texts["stage"])
     found = []
     for name in MEASURED_MARGINS:
-        apart = second.numbers[name][executed] - pairs.margins[name][executed]
-        apart = apart[np.isfinite(apart)]
-        if len(apart):
-            size = np.abs(apart)
+        difference = second.numbers[name][executed] - pairs.margins[name][executed]
+        difference = difference[np.isfinite(difference)]
+        if len(difference):
+            size = np.abs(difference)
             found.append(
                 MarginDifference(
                     name=name,
-                    grasps=len(apart),
-                    median=float(np.median(apart)),
+                    grasps=len(difference),
+                    median=float(np.median(difference)),
                     median_size=float(np.median(size)),
                     within=float(np.quantile(size, covered_share)),
                 )
@@ -254,7 +254,7 @@ def _agreement_by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup
 
 
 def _count_stage_pairs(first: TextFactor, second: TextFactor) -> dict[str, dict[str, int]]:
-    """Counts of grasps by the stages of both runs, in their order, without zeros."""
+    """Counts of grasps by the stages of both runs, in the order of the stages, without zeros."""
     counts, order = cross_tabulate(first, second), [stage.value for stage in Stage]
     return {
         row: {column: counts[row][column] for column in order if column in counts[row]}

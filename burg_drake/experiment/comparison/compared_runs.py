@@ -34,7 +34,7 @@ from burg_drake.experiment.trials.trial_sheet import TrialSheet
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One side of a comparison.
+    """Description of one side of a comparison.
 
     Attributes:
         kind: `run`, or `trials` on the robot.
@@ -66,69 +66,68 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedRuns:
-    """Runs in a folder.
+class ComparedRuns:
+    """The runs in a folder, which are compared with others or with trials.
 
     Attributes:
-        found: a run of one scene or of many.
+        opened: a run of one scene, or a campaign of many scenes.
     """
 
-    found: Run | Campaign
+    opened: Run | Campaign
 
     @classmethod
-    def load(cls, path: str | Path | Run | Campaign) -> JudgedRuns:
+    def load(cls, path: str | Path | Run | Campaign) -> ComparedRuns:
         """The runs in a folder; see `open_results`."""
         return cls(path if isinstance(path, (Run, Campaign)) else open_results(path))
 
     @property
     def path(self) -> Path:
         """The folder."""
-        return self.found.path
+        return self.opened.path
 
     @cached_property
     def scenes(self) -> dict[str, str]:
         """Names of the scenes by content hash, as in tables."""
-        if isinstance(self.found, Run):
-            scene = self.found.document.scene
+        if isinstance(self.opened, Run):
+            scene = self.opened.document.scene
             return {scene.content[:HASH_DIGITS]: scene.name}
-        return {e.content[:HASH_DIGITS]: e.name for e in self.found.document.assigned_scenes}
+        return {e.content[:HASH_DIGITS]: e.name for e in self.opened.document.assigned_scenes}
 
     @cached_property
     def folders(self) -> dict[str, str]:
-        """Folders of the runs by content of the scene."""
-        if isinstance(self.found, Run):
+        """Folders of the runs by content hash of the scene."""
+        if isinstance(self.opened, Run):
             return dict.fromkeys(self.scenes, str(self.path))
-        return {content: str(self.found.folder(name)) for content, name in self.scenes.items()}
+        return {content: str(self.opened.folder(name)) for content, name in self.scenes.items()}
 
     def runs_of(self, contents: Collection[str]) -> list[Run]:
-        """Opens the runs of some scenes; returns them by content of the scene."""
-        if isinstance(self.found, Run):
-            return [self.found]
+        """Opens the runs of some scenes, given by content hash."""
+        if isinstance(self.opened, Run):
+            return [self.opened]
         wanted = {content[:HASH_DIGITS] for content in contents}
         folders = [Path(self.folders[content]) for content in self.scenes if content in wanted]
         return [load_run(folder) for folder in folders if (folder / RUN_FILE).exists()]
 
     def instances_of(self, contents: Collection[str]) -> dict[str, tuple[str, ...]]:
-        """Names of the free instances of some scenes by their content."""
+        """Names of the free instances of some scenes, by content hash of the scene."""
         return {run.document.scene.content: run.instances for run in self.runs_of(contents)}
 
     def table(self, names: Sequence[str]) -> ResultTable:
-        """Columns of all judged grasps; `evaluation.results_table` says which there are."""
-        if isinstance(self.found, Campaign):
-            return ResultTable.of_rows(self.found.rows(names), names)
+        """Columns of all judged grasps; `evaluation.results_table` lists their names."""
+        if isinstance(self.opened, Campaign):
+            return ResultTable.of_rows(self.opened.rows(names), names)
         return ResultTable.of_columns(read_results(self.path, names), names)
 
     @property
     def grasp_folders_text(self) -> str:
         """Description of the folders from which `evaluate` takes the runs' grasps."""
-        if isinstance(self.found, Run):
+        if isinstance(self.opened, Run):
             return f"folder {self.path}"
-        return f"of each scene folder {self.found.folder('SCENE')}"
+        return f"of each scene folder {self.opened.folder('SCENE')}"
 
-    @property
-    def side(self) -> Side:
-        """The side of the comparison with these runs."""
-        document = self.found.document
+    def described(self) -> Side:
+        """Description of these runs as a side of a comparison."""
+        document = self.opened.document
         engine = engine_label(document.engine)
         return Side(
             kind="run",
@@ -143,10 +142,10 @@ class JudgedRuns:
 
 
 def add_rejudging_engines(side: Side, judged_again: TextFactor) -> Side:
-    """A side with the engines that have judged its grasps again.
+    """A copy of a side with the engines that have judged its grasps again.
 
     Args:
-        side: a run.
+        side: description of runs.
         judged_again: (N,) engines of the compared grasps; empty if not judged again.
     """
     counts = np.bincount(judged_again.index, minlength=len(judged_again.names)).tolist()
@@ -154,8 +153,8 @@ def add_rejudging_engines(side: Side, judged_again: TextFactor) -> Side:
     return replace(side, judged_again={name: n for name, n in named if name and n})
 
 
-def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
-    """The side of the comparison with real trials."""
+def describe_trials(sheet: TrialSheet, path: Path) -> Side:
+    """Description of real trials as a side of a comparison."""
     sources = sheet.runs.values()
     return Side(
         kind="trials",
@@ -169,13 +168,13 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
     )
 
 
-def differing_settings(first: JudgedRuns, second: JudgedRuns) -> tuple[str, ...]:
+def differing_settings(first: ComparedRuns, second: ComparedRuns) -> tuple[str, ...]:
     """Descriptions of the differing settings of the runs in two folders."""
     sides = ("in the first", "in the second")
-    return tuple(request_differences(first.found.document, second.found.document, sides))
+    return tuple(request_differences(first.opened.document, second.opened.document, sides))
 
 
-def require_common_scene(first: JudgedRuns, second: JudgedRuns) -> None:
+def require_common_scene(first: ComparedRuns, second: ComparedRuns) -> None:
     """Refuses runs of different scenes.
 
     Raises:
@@ -210,12 +209,12 @@ Value = float | bool | tuple[float, ...] | None
 
 
 def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutcome]:
-    """Real outcomes that no verdict of a mode can predict: of the hand alone those of an arm, and
-    a collision on the approach that its trials leave out.
+    """Real outcomes that no verdict of a mode can predict. In mode `hand` these are the outcomes of
+    an arm and, if the trials leave out the approach, a collision on the approach.
 
     Args:
         mode: mode of the run.
-        approach: whether its trials include the approach.
+        approach: whether the trials of the run include the approach.
     """
     if mode != "hand":
         return frozenset()
@@ -223,14 +222,14 @@ def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutco
     return frozenset(of_arm if approach else [*of_arm, RealOutcome.HAND_COLLISION_APPROACH])
 
 
-def outcomes_unpredictable_for(judged: JudgedRuns) -> frozenset[RealOutcome]:
+def outcomes_unpredictable_for_runs(runs: ComparedRuns) -> frozenset[RealOutcome]:
     """Real outcomes that no verdict of these runs can predict."""
-    document = judged.found.document
-    settings = read_trial_settings(document.trial, str(judged.path))
+    document = runs.opened.document
+    settings = read_trial_settings(document.trial, str(runs.path))
     return unpredictable_outcomes(document.mode, approach=settings.approach)
 
 
-def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
+def require_same_phases(first: ComparedRuns, second: ComparedRuns) -> None:
     """Refuses runs whose trials differ in phases, in limits of success or in the station, so that
     differences are not due to the engine.
 
@@ -241,7 +240,7 @@ def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
     phases = differing_phases(first, second)
     if phases:
         causes.append(f"with different phases: {'; '.join(phases)}")
-    stations = [judged.found.document.station for judged in (first, second)]
+    stations = [runs.opened.document.station for runs in (first, second)]
     if stations[0].content != stations[1].content:
         one, other = (f"{s.name} ({s.content[:HASH_DIGITS]})" for s in stations)
         causes.append(f"on different stations: {one} and {other}")
@@ -252,24 +251,24 @@ def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
         )
 
 
-def approach_note(first: JudgedRuns, second: JudgedRuns) -> str:
-    """A note if only one of the runs, that of the whole arm, approached; else empty."""
-    approached = [_phase_settings(judged)["approach"] for judged in (first, second)]
+def approach_note(first: ComparedRuns, second: ComparedRuns) -> str:
+    """A note if only one of two runs approached, the run of the whole arm; else empty."""
+    approached = [_phase_settings(runs)["approach"] for runs in (first, second)]
     if approached[0] == approached[1]:
         return ""
     still, moved = ("second", "first") if approached[0] else ("first", "second")
     return f"the hand alone did not approach in the {still} run; the whole arm did in the {moved}"
 
 
-def differing_phases(first: JudgedRuns, second: JudgedRuns) -> list[str]:
+def differing_phases(first: ComparedRuns, second: ComparedRuns) -> list[str]:
     """Settings of trials in which the runs of two folders differ, with both values.
 
-    Settings that a run did not record have the defaults of their time. That the hand alone does not
-    approach, and the whole arm does, is not listed; see `approach_note`.
+    Settings that a run did not record have the defaults of their time. If one run is of the whole
+    arm, the approach is left out; see `approach_note`.
     """
     titles = {"lift_height": "lift"}
-    one, other = (_phase_settings(judged) for judged in (first, second))
-    if "arm" in (first.found.document.mode, second.found.document.mode):
+    one, other = (_phase_settings(runs) for runs in (first, second))
+    if "arm" in (first.opened.document.mode, second.opened.document.mode):
         del one["approach"]
     return [
         f"{titles.get(name, name.replace('_', ' '))} {_value_text(name, one[name])}"
@@ -279,11 +278,11 @@ def differing_phases(first: JudgedRuns, second: JudgedRuns) -> list[str]:
     ]
 
 
-def _phase_settings(judged: JudgedRuns) -> dict[str, Value]:
-    """Resolved settings of a run's trials by name; those of the motion first."""
+def _phase_settings(runs: ComparedRuns) -> dict[str, Value]:
+    """Resolved settings of a run's trials by name; settings of the motion first."""
     from burg_drake.simulation import NO_GRIP_LIMITS
 
-    settings = read_trial_settings(judged.found.document.trial, str(judged.path))
+    settings = read_trial_settings(runs.opened.document.trial, str(runs.path))
     motion = settings.motion
     assert motion is not None  # unrecorded settings have their defaults
     values: dict[str, Value] = {f.name: getattr(motion, f.name) for f in fields(motion)}
@@ -291,8 +290,8 @@ def _phase_settings(judged: JudgedRuns) -> dict[str, Value]:
     values["lift_direction"] = tuple(motion.direction_W.tolist())
     if motion.shortest == motion.lift_height:
         values["least_lift"] = None
+    values["approach"] = settings.approach or runs.opened.document.mode == "arm"
     unlimited: Mapping[str, float] = NO_GRIP_LIMITS
-    values["approach"] = settings.approach or judged.found.document.mode == "arm"
     return {k: None if k in unlimited and v == unlimited[k] else v for k, v in values.items()}
 
 

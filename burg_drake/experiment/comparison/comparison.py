@@ -53,7 +53,7 @@ class Coverage:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A comparison with all its figures; intervals are those of 95 %.
+    """A comparison with all its figures; all intervals are 95 % intervals.
 
     Attributes:
         kind: `trials`, a run against the robot; `runs`, a run against another one; `simulators`,
@@ -65,13 +65,13 @@ class Comparison:
         coverage: which grasps were compared.
         judgement: figures of the first run.
         other: figures of the second run of `simulators`.
-        difference: how often either of them was right about the same trial.
-        difference_of_all: share of all grasps that the trials stand for about which the first is
-            right, less that of the second; None if nothing says what they were chosen from.
-        agreement: of the two `runs`, where neither is taken for the truth.
+        difference: counts of trials by which of the two `simulators` was right.
+        difference_of_all: share of right verdicts of the first run minus that of the second, for
+            all grasps that the trials stand for; None if the strata are unknown.
+        agreement: agreement of the two `runs`, where neither is taken for the truth.
         settings: differing settings of two runs, in words.
         notes: caveats about the figures.
-        seed: of the intervals' resampling.
+        seed: random seed of the intervals' resampling.
     """
 
     version: int = 1
@@ -102,8 +102,8 @@ def comparison_json(comparison: Comparison, more: Mapping[str, Any] | None = Non
 
 
 def json_values(value: Any) -> Any:
-    """Dataclasses as mappings of all their fields, sequences as lists; numbers that are not finite
-    are None."""
+    """Value for JSON: dataclasses become mappings of all fields, sequences lists, and numbers that
+    are not finite None."""
     if dataclasses.is_dataclass(value):
         return {f.name: json_values(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
@@ -122,7 +122,7 @@ PERCENT_MEASURES = frozenset(
 
 
 def selection_suffix(comparison: Comparison) -> str:
-    """Suffix of titles that names the trials behind the figures; empty if all count alike."""
+    """Suffix of titles of figures that hold for the selected trials; empty for two runs."""
     return "" if comparison.kind == "runs" else ", selected trials"
 
 
@@ -160,18 +160,18 @@ def success_description(comparison: Comparison) -> str:
     return "success in the second run" if comparison.kind == "runs" else "actual success"
 
 
-def estimate_text(found: Estimate, *, percent: bool) -> str:
+def estimate_text(estimate: Estimate, *, percent: bool) -> str:
     """Displayed value of an estimate."""
-    if found.value is None:
+    if estimate.value is None:
         return MISSING_NUMBER
-    return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
+    return f"{100 * estimate.value:.2f} %" if percent else f"{estimate.value + 0.0:.3f}"
 
 
-def bracketed_interval(found: Estimate, *, percent: bool) -> str:
+def bracketed_interval(estimate: Estimate, *, percent: bool) -> str:
     """The interval of a figure in brackets; empty if there is none."""
-    if found.low is None or found.high is None:
+    if estimate.low is None or estimate.high is None:
         return ""
-    bounds, decimals = [found.low, found.high], 2
+    bounds, decimals = [estimate.low, estimate.high], 2
     if percent:
         bounds = [100 * bound for bound in bounds]
         decimals = 0 if bounds[1] - bounds[0] >= 2.0 else 1
@@ -179,11 +179,11 @@ def bracketed_interval(found: Estimate, *, percent: bool) -> str:
     return f"[{low}, {high}]"
 
 
-def brief_share_text(found: Estimate) -> str:
+def brief_share_text(estimate: Estimate) -> str:
     """A share in whole per cents with its interval."""
-    if found.value is None:
-        return f"undefined ({found.reason})"
-    return f"{100 * found.value:.0f} % {bracketed_interval(found, percent=True)}"
+    if estimate.value is None:
+        return f"undefined ({estimate.reason})"
+    return f"{100 * estimate.value:.0f} % {bracketed_interval(estimate, percent=True)}"
 
 
 def headline_sentence(comparison: Comparison) -> str:
@@ -224,18 +224,18 @@ def headline_sentence(comparison: Comparison) -> str:
     )
 
 
-def headline_agreement(judged: Judgement) -> Agreement:
-    """Figures for sentences: of all grasps that the trials represent, if known, as figures of the
-    trials themselves depend on the selection.
+def headline_agreement(judgement: Judgement) -> Agreement:
+    """Figures for sentences: if known, of all grasps that the trials represent, else of the trials
+    themselves, whose figures depend on the selection.
     """
-    return population_agreement(judged) or judged.selected
+    return population_agreement(judgement) or judgement.selected
 
 
-def population_agreement(judged: Judgement) -> Agreement | None:
+def population_agreement(judgement: Judgement) -> Agreement | None:
     """Figures of all grasps that the trials represent; None if unknown, or if each trial represents
     itself only.
     """
-    found = judged.all_grasps
+    found = judgement.all_grasps
     return None if found is None or round(sum(found.cells)) <= found.trials else found
 
 
@@ -287,74 +287,77 @@ def population_difference_sentence(comparison: Comparison) -> str:
     )
 
 
-def bias_sentence(comparison: Comparison, judged: Judgement | None = None) -> str:
+def bias_sentence(comparison: Comparison, judgement: Judgement | None = None) -> str:
     """Sentence on the bias of a simulator: on all represented grasps, if known, and on the trials,
-    whose selection may reverse it.
+    whose selection may reverse the bias.
     """
-    judged = judged or comparison.judgement
-    b = judged.bias
+    judgement = judgement or comparison.judgement
+    b = judgement.bias
     if b.difference.value is None:
         return "no trials"
     parted = (
         f"{b.only_first:,} failed that it expected to succeed, {b.only_second:,} succeeded that it"
         " expected to fail"
     )
-    who, other = "simulator promises", "the robot achieved"
+    claim, other = "simulator promises", "the robot achieved"
     if comparison.kind == "runs":
-        who, other = "first run sees", "the second"
+        claim, other = "first run sees", "the second"
         parted = (
             f"{b.only_first:,} succeeded in the first alone, {b.only_second:,} in the second alone"
         )
     elif comparison.other is not None:
-        which = "second" if judged is comparison.other else "first"
-        who = f"{which} simulator promises"
-    every = population_agreement(judged)
-    if every is not None and every.excess.value is not None:
-        points = _percentage_points_text(every.excess.value, "success than")
+        which = "second" if judgement is comparison.other else "first"
+        claim = f"{which} simulator promises"
+    population = population_agreement(judgement)
+    if population is not None and population.excess.value is not None:
+        points = _percentage_points_text(population.excess.value, "success than")
         of_trials = _percentage_points_text(b.difference.value, "than")
+        interval = bracketed_interval(population.excess, percent=True)
         return (
-            f"Over all these grasps the {who} {points} {other}"
-            f" {bracketed_interval(every.excess, percent=True)}. In the selected trials alone, each"
+            f"Over all these grasps the {claim} {points} {other}"
+            f" {interval}. In the selected trials alone, each"
             f" counted once, it promises {of_trials} {other}: of {b.trials:,} grasps, {parted}."
         )
     points = _percentage_points_text(b.difference.value, "success than")
     return (
-        f"The {who} {points} {other}"
+        f"The {claim} {points} {other}"
         f" {bracketed_interval(b.difference, percent=True)}: of {b.trials:,} grasps, {parted}"
         f" (McNemar's exact test: p = {format_number(b.p_value)})."
     )
 
 
-def _percentage_points_text(difference: float, of: str) -> str:
-    """A difference in percentage points, as words."""
+def _percentage_points_text(difference: float, ending: str) -> str:
+    """A difference in percentage points in words, with an ending such as `success than`."""
     if difference == 0:
-        return f"just as much {of.replace('than', 'as')}"
+        return f"just as much {ending.replace('than', 'as')}"
     more = "more" if difference > 0 else "less"
-    return f"{100 * abs(difference):.1f} percentage points {more} {of}"
+    return f"{100 * abs(difference):.1f} percentage points {more} {ending}"
 
 
-def unpredictable_sentence(judged: Judgement) -> str:
+def unpredictable_sentence(judgement: Judgement) -> str:
     """Sentence on failures that a run of the hand alone does not predict, and on precision without
     them; empty if there are none.
     """
-    found = judged.unpredictable
+    found = judgement.unpredictable
     if found is None:
         return ""
     count = sum(found.outcomes.values())
-    every = None if population_agreement(judged) is None else found.all_grasps
-    without = every or found.selected
+    of_population = None if population_agreement(judgement) is None else found.all_grasps
+    without = of_population or found.selected
     return (
         f"{count_with_noun(count, 'trial')} failed for reasons that a run of the hand"
         f" alone cannot predict ({outcome_counts_text(found.outcomes)}),"
         f" {found.predicted_successes:,} of them after a predicted success. They count as"
         f" failures; without them precision is {brief_share_text(without.precision)}"
-        f" instead of {brief_share_text(headline_agreement(judged).precision)}."
+        f" instead of {brief_share_text(headline_agreement(judgement).precision)}."
     )
 
 
-def too_few_trials_sentence(comparison: Comparison, judged: Judgement) -> str:
-    """Sentence on why margins are not assessed; empty if they are, or if there are none."""
-    found = judged.calibration
+def too_few_trials_sentence(comparison: Comparison, judgement: Judgement) -> str:
+    """Sentence on too few trials to assess margins; empty if margins are assessed, or if there are
+    none.
+    """
+    found = judgement.calibration
     if not found or any(c.auroc.value is not None for c in found):
         return ""
     most = max(found, key=lambda c: min(c.successes, c.trials - c.successes))
@@ -371,27 +374,27 @@ def outcome_counts_text(outcomes: Mapping[str, int]) -> str:
     return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
 
 
-def outlier_name(one: OutlierGroup) -> str:
+def outlier_name(group: OutlierGroup) -> str:
     """Displayed name of an outlier group."""
-    return outcome_label(one.name) if one.kind == "verdict" else one.name
+    return outcome_label(group.name) if group.kind == "verdict" else group.name
 
 
-def outlier_sentence(judged: Judgement) -> str:
+def outlier_sentence(judgement: Judgement) -> str:
     """A sentence on the outlier groups; empty if there are none."""
     parts = [
-        f"{outlier_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
-        f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
-        f" {one.other_wrong} of {one.other_trials})"
-        for one in judged.standing_out
+        f"{outlier_name(group)} ({group.kind}; {group.wrong} of {group.trials} predicted"
+        f" {'successes failed' if group.predicted else 'failures succeeded'}, of all others"
+        f" {group.other_wrong} of {group.other_trials})"
+        for group in judgement.standing_out
     ]
     return f"What stands out: {', '.join(parts)}." if parts else ""
 
 
-def no_outliers_sentence(judged: Judgement) -> str:
+def no_outliers_sentence(judgement: Judgement) -> str:
     """A sentence for judgements without outlier groups."""
-    if not judged.tested_groups:
+    if not judgement.tested_groups:
         return "Too few trials to tell whether verdicts of an object or a cause stand out."
-    groups = f"{judged.tested_groups} groups" if judged.tested_groups > 1 else "group"
+    groups = f"{judgement.tested_groups} groups" if judgement.tested_groups > 1 else "group"
     return (
         f"No object, verdict or body in the way stands out among the {groups} that were tested"
         " (Fisher's exact test with Holm's correction)."
@@ -399,7 +402,7 @@ def no_outliers_sentence(judged: Judgement) -> str:
 
 
 def margin_title(name: str) -> tuple[str, str, float]:
-    """Displayed name of a margin, its displayed unit, and the factor from its column's unit."""
+    """Displayed name and unit of a margin, and the factor from the column's to this unit."""
     if name == PROBABILITY_MARGIN:
         return "predicted probability", "", 1.0
     if name.endswith("_mm"):

@@ -1,4 +1,4 @@
-"""Findings of a comparison for a terminal and for a page, and their order in a terminal."""
+"""Tables of the findings of a comparison, for a terminal and for a page."""
 
 from __future__ import annotations
 
@@ -70,57 +70,59 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     yield from (f"note: {text}" for text in c.notes)
 
 
-def _agreement_tables(found: RunAgreement) -> Iterator[TextTable | str]:
+def _agreement_tables(agreement: RunAgreement) -> Iterator[TextTable | str]:
     """Tables of agreement by object, disagreements by stage, and differences of margins; without
     empty tables.
     """
-    if len(found.objects) > 1:
-        yield run_agreement_finding("object", found.objects).text_table()
-    if found.apart:
-        yield _stage_table(found.apart)
-    if found.parted:
-        yield parted_finding(found.parted).text_table()
-    if found.confidence:
-        yield confidence_finding(found.confidence).text_table()
-    if found.margins:
-        yield _margin_bin_table(found.margins)
-    if found.differences:
-        yield margin_difference_finding(found.differences).text_table()
+    if len(agreement.objects) > 1:
+        yield run_agreement_finding("object", agreement.objects).text_table()
+    if agreement.apart:
+        yield _stage_table(agreement.apart)
+    if agreement.parted:
+        yield parted_finding(agreement.parted).text_table()
+    if agreement.confidence:
+        yield confidence_finding(agreement.confidence).text_table()
+    if agreement.margins:
+        yield _margin_bin_table(agreement.margins)
+    if agreement.differences:
+        yield margin_difference_finding(agreement.differences).text_table()
 
 
-def _judgement_tables(c: Comparison, judged: Judgement, name: str) -> Iterator[TextTable | str]:
+def _judgement_tables(c: Comparison, judgement: Judgement, name: str) -> Iterator[TextTable | str]:
     """Tables and sentences about one run, whose name is added to titles."""
-    yield _matrix_table(c, judged, name)
-    yield measure_finding(c, [("", judged)]).text_table(name)
-    yield bias_sentence(c, judged)
-    if judged.unpredictable is not None:
-        yield unpredictable_sentence(judged)
-        yield unpredictable_finding(judged).text_table(name)
+    yield _matrix_table(c, judgement, name)
+    yield measure_finding(c, [("", judgement)]).text_table(name)
+    yield bias_sentence(c, judgement)
+    if judgement.unpredictable is not None:
+        yield unpredictable_sentence(judgement)
+        yield unpredictable_finding(judgement).text_table(name)
     if c.kind != "runs":
-        outliers = bool(judged.standing_out)
-        yield outlier_finding(judged).text_table(name) if outliers else no_outliers_sentence(judged)
-    for kind, groups in (("object", judged.objects), ("scene", judged.scenes)):
+        if judgement.standing_out:
+            yield outlier_finding(judgement).text_table(name)
+        else:
+            yield no_outliers_sentence(judgement)
+    for kind, groups in (("object", judgement.objects), ("scene", judgement.scenes)):
         if len(groups) > 1:
             yield group_finding(c, kind, groups).text_table(name)
-    yield verdict_finding(c, judged).text_table(name)
-    telling = [m for m in judged.calibration if m.auroc.value is not None]
+    yield verdict_finding(c, judgement).text_table(name)
+    telling = [m for m in judgement.calibration if m.auroc.value is not None]
     if telling:
         yield margin_finding(c, telling).text_table(name)
-    elif words := too_few_trials_sentence(c, judged):
+    elif words := too_few_trials_sentence(c, judgement):
         yield words
-    placement = placement_finding(c, judged)
+    placement = placement_finding(c, judgement)
     if placement is not None:
         yield placement.text_table(name)
 
 
-def _matrix_table(comparison: Comparison, judged: Judgement, name: str) -> TextTable:
+def _matrix_table(comparison: Comparison, judgement: Judgement, name: str) -> TextTable:
     """The confusion matrix."""
     runs = comparison.kind == "runs"
     title = "Verdicts of both runs" if runs else f"Verdicts and outcomes, selected trials{name}"
     other = "in the second" if runs else "on the robot"
     table = TextTable(title).texts("in the first" if runs else "predicted")
     table.numbers(f"success {other}", f"failure {other}")
-    found = judged.selected
+    found = judgement.selected
     table.row("success", format_count(int(found.tp)), format_count(int(found.fp)))
     table.row("failure", format_count(int(found.fn)), format_count(int(found.tn)))
     return table
@@ -139,20 +141,20 @@ def coverage_sentences(comparison: Comparison) -> str:
     return "; ".join(parts)
 
 
-Named = Sequence[tuple[str, Judgement]]
-"""The judgement of each run; the name is empty if there is only one."""
+NamedJudgements = Sequence[tuple[str, Judgement]]
+"""Name and judgement of each run; the name is empty if there is only one run."""
 
 
-def measure_finding(comparison: Comparison, judged: Named) -> FindingTable:
-    """All measures of the selected trials and of all grasps, with their intervals."""
+def measure_finding(comparison: Comparison, judgements: NamedJudgements) -> FindingTable:
+    """Table of all measures of the selected trials and of all grasps, with their intervals."""
     captions = []
     text = "Intervals are 95 % intervals: Wilson's for shares, a Bayesian bootstrap for all others."
-    for _, one in judged:
-        if one.all_grasps is not None:
-            grasps = format_count(round(sum(one.all_grasps.cells)))
+    for _, judgement in judgements:
+        if judgement.all_grasps is not None:
+            grasps = format_count(round(sum(judgement.all_grasps.cells)))
             captions.append(
-                f"selected trials: the {one.selected.trials} that were compared; all grasps: the"
-                f" {grasps} that they stand for, each for its share of those that it was chosen"
+                f"selected trials: the {judgement.selected.trials} that were compared; all grasps:"
+                f" the {grasps} that they stand for, each for its share of those that it was chosen"
                 " from"
             )
             text = (
@@ -162,7 +164,7 @@ def measure_finding(comparison: Comparison, judged: Named) -> FindingTable:
                 " intervals: Wilson's for shares of the selected trials; a Bayesian"
                 " bootstrap within strata for all others."
             )
-    columns = _named_agreements(judged)
+    columns = _named_agreements(judgements)
     reasons = {a.figure(key).reason for key in AGREEMENT_MEASURES for _, a in columns} - {""}
     if reasons:
         captions.append(f"-: cannot be calculated ({'; '.join(sorted(reasons))})")
@@ -174,10 +176,10 @@ def measure_finding(comparison: Comparison, judged: Named) -> FindingTable:
     return found
 
 
-def _named_agreements(judged: Named) -> list[tuple[str, Agreement]]:
+def _named_agreements(judgements: NamedJudgements) -> list[tuple[str, Agreement]]:
     """Agreement of the selected trials, and of all grasps where that is known."""
     found = []
-    for name, judgement in judged:
+    for name, judgement in judgements:
         suffix = f", {name}" if name else ""
         found.append((f"selected trials{suffix}", judgement.selected))
         if judgement.all_grasps is not None:
@@ -185,18 +187,18 @@ def _named_agreements(judged: Named) -> list[tuple[str, Agreement]]:
     return found if len(found) > 1 else [("value", found[0][1])]
 
 
-def unpredictable_finding(judged: Judgement) -> FindingTable:
+def unpredictable_finding(judgement: Judgement) -> FindingTable:
     """Table of figures with and without failures that the hand alone does not predict."""
     measures = ("precision", "recall", "accuracy")
-    assert judged.unpredictable is not None
-    pairs = [("trials", judged.selected, judged.unpredictable.selected)]
-    if judged.all_grasps is not None and judged.unpredictable.all_grasps is not None:
+    assert judgement.unpredictable is not None
+    pairs = [("trials", judgement.selected, judgement.unpredictable.selected)]
+    if judgement.all_grasps is not None and judgement.unpredictable.all_grasps is not None:
         pairs = [("selected trials", *pairs[0][1:])]
-        pairs.append(("all grasps", judged.all_grasps, judged.unpredictable.all_grasps))
+        pairs.append(("all grasps", judgement.all_grasps, judgement.unpredictable.all_grasps))
     found = FindingTable(
         title="With and without outcomes that the hand alone cannot predict",
         page_title="What the hand alone cannot predict",
-        text=unpredictable_sentence(judged),
+        text=unpredictable_sentence(judgement),
         style="figures",
     )
     found.texts("of").figures(*measures)
@@ -207,48 +209,48 @@ def unpredictable_finding(judged: Judgement) -> FindingTable:
     return found
 
 
-def outlier_finding(judged: Judgement) -> FindingTable:
-    """Objects and causes whose verdicts are wrong more often than those of others."""
+def outlier_finding(judgement: Judgement) -> FindingTable:
+    """Table of objects and causes whose verdicts are wrong more often than those of others."""
     caption = (
         "wrong more often than others with the same prediction: Fisher's exact test, one-sided"
-        f" mid-p, corrected by Holm's method for {judged.tested_groups} groups"
+        f" mid-p, corrected by Holm's method for {judgement.tested_groups} groups"
     )
     text = (
         "Objects, verdicts and bodies in the way for which predictions were wrong more"
         " often than for others with the same prediction. p: one-sided mid-p of Fisher's"
-        f" exact test with Holm's correction for the {judged.tested_groups} tested"
+        f" exact test with Holm's correction for the {judgement.tested_groups} tested"
         " groups: if nothing differs, nothing is named in 19 of 20 experiments."
     )
-    if judged.unpredictable is not None:
+    if judgement.unpredictable is not None:
         caption += "; without what the hand alone cannot predict"
         text += " Failures that the hand alone cannot predict are left out."
     found = FindingTable(title="What stands out", caption=caption, text=text)
     found.names("what", "").texts("predicted").numbers("wrong", "others wrong")
     found.texts("ended").numbers("p corrected")
-    for one in judged.standing_out:
+    for group in judgement.standing_out:
         found.row(
-            one.kind,
-            outlier_name(one),
-            "success" if one.predicted else "failure",
-            f"{one.wrong} of {one.trials}",
-            f"{one.other_wrong} of {one.other_trials}",
-            outcome_counts_text(one.ended),
-            format_number(one.corrected),
+            group.kind,
+            outlier_name(group),
+            "success" if group.predicted else "failure",
+            f"{group.wrong} of {group.trials}",
+            f"{group.other_wrong} of {group.other_trials}",
+            outcome_counts_text(group.ended),
+            format_number(group.corrected),
         )
     return found
 
 
 def group_finding(comparison: Comparison, kind: str, groups: Sequence[FactorGroup]) -> FindingTable:
-    """Counts and shares by object or scene."""
+    """Table of counts and shares by object or scene."""
     right = "same verdict in both runs" if comparison.kind == "runs" else "right verdicts"
     title = f"By {kind}{selection_suffix(comparison)}"
     text = f"Share of {right}, precision and recall, with 95 % intervals."
-    return _group_finding(title, text, kind, groups)
+    return _group_table(title, text, kind, groups)
 
 
-def placement_finding(comparison: Comparison, judged: Judgement) -> FindingTable | None:
-    """Agreement by placement; None if no placement was measured."""
-    p = judged.placement
+def placement_finding(comparison: Comparison, judgement: Judgement) -> FindingTable | None:
+    """Table of agreement by placement; None if no placement was measured."""
+    p = judgement.placement
     if p is None or not p.within.trials + p.beyond.trials:
         return None
     groups = (
@@ -262,14 +264,14 @@ def placement_finding(comparison: Comparison, judged: Judgement) -> FindingTable
         " cause is placement and not physics."
     )
     title = f"By placement of the objects{selection_suffix(comparison)}"
-    found = _group_finding(title, text, "placement", groups)
+    found = _group_table(title, text, "placement", groups)
     area = Figure(p.largest.auroc, percent=False)
     if area.estimate.value is not None:
         found.caption = f"AUROC of the largest offset for right verdicts: {' '.join(area.texts)}"
     return found
 
 
-def _group_finding(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> FindingTable:
+def _group_table(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> FindingTable:
     """Table of counts and shares with intervals by group of trials."""
     found = FindingTable(title=title, text=text, style="groups", max_rows=20, max_page_rows=60)
     found.names(head).numbers("trials", "TP", "FP", "FN", "TN")
@@ -281,8 +283,8 @@ def _group_finding(title: str, text: str, head: str, groups: Sequence[FactorGrou
     return found
 
 
-def verdict_finding(comparison: Comparison, judged: Judgement) -> FindingTable:
-    """Successes on the robot, or in the second run, by verdict and body in the way."""
+def verdict_finding(comparison: Comparison, judgement: Judgement) -> FindingTable:
+    """Table of successes on the robot, or in the second run, by verdict and body in the way."""
     first, second, suffix = "simulated", "succeeded", selection_suffix(comparison)
     text = "For each simulated outcome: how many of these grasps succeeded"
     if comparison.kind == "runs":
@@ -297,7 +299,7 @@ def verdict_finding(comparison: Comparison, judged: Judgement) -> FindingTable:
         max_page_rows=30,
     )
     found.texts(first).names("body in the way").elements("stage").numbers("trials").shares(second)
-    for row in judged.stopped:
+    for row in judgement.stopped:
         name = outcome_label(row.outcome)
         found.row(name, row.blocker, row.stage, row.trials, Figure(row.successes))
     return found
@@ -306,7 +308,7 @@ def verdict_finding(comparison: Comparison, judged: Judgement) -> FindingTable:
 def margin_finding(
     comparison: Comparison, calibrations: Sequence[MarginCalibration]
 ) -> FindingTable:
-    """How well each margin ranks success above failure, of margins with an AUROC."""
+    """Table of how well each margin with an AUROC ranks success above failure."""
     weighted = any(c.auroc_weighted is not None for c in calibrations)
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     success = success_description(comparison)
@@ -341,7 +343,7 @@ def margin_finding(
 def run_agreement_finding(
     head: str, groups: Sequence[FactorGroup], page_title: str = "", text: str = ""
 ) -> FindingTable:
-    """Agreement of two runs on what is held, by object or confidence."""
+    """Table of the agreement of two runs on holding, by object or confidence."""
     found = FindingTable(
         title=f"Agreement on holding, by {head}",
         page_title=page_title,
@@ -359,7 +361,7 @@ def run_agreement_finding(
 
 
 def confidence_finding(groups: Sequence[FactorGroup]) -> FindingTable:
-    """Agreement by the confidence of the first run's verdicts."""
+    """Table of agreement by the confidence of the first run's verdicts."""
     text = (
         "Share of grasps on which the runs agree (both hold the object, or neither"
         f" does), by the confidence of the first run's verdict. Below {CONTESTED_CONFIDENCE:g} a"
@@ -370,12 +372,12 @@ def confidence_finding(groups: Sequence[FactorGroup]) -> FindingTable:
 
 
 def deciding_stages(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
-    """The stages of the second run that occur, in their order."""
+    """Names of the stages that decided in the second run, in the order of the stages."""
     return [stage.value for stage in Stage if any(stage.value in row for row in counts.values())]
 
 
 def _stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
-    """Grasps that only one run holds, by the stages that decided; the page has all grasps."""
+    """Table of grasps that only one run holds by deciding stage; the page counts all grasps."""
     columns = deciding_stages(apart)
     table = TextTable("Stages that decided the grasps which only one of the runs holds")
     table.texts("first run").numbers(*(f"{name} in the second" for name in columns))

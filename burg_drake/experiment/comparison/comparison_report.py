@@ -33,7 +33,7 @@ from burg_drake.experiment.comparison.comparison import (
     unpredictable_sentence,
 )
 from burg_drake.experiment.comparison.comparison_findings import (
-    Named,
+    NamedJudgements,
     confidence_finding,
     deciding_stages,
     group_finding,
@@ -69,7 +69,7 @@ def comparison_page(
 
     Args:
         comparison: the comparison.
-        path: path of the page, to which links to photos are relative.
+        path: path of the page; links to photos are relative to its folder.
         line: command that repeats the comparison; left out if empty.
         more: further sections.
     """
@@ -148,10 +148,10 @@ def _lead_paragraph(c: Comparison) -> Html:
 
 def _further_sentences(c: Comparison) -> list[str]:
     """The sentences after the first one; empty ones are left out."""
-    judged = c.judgement
+    judgement = c.judgement
     if c.kind == "simulators":
         return [population_difference_sentence(c)]
-    return [bias_sentence(c), unpredictable_sentence(judged), outlier_sentence(judged)]
+    return [bias_sentence(c), unpredictable_sentence(judgement), outlier_sentence(judgement)]
 
 
 def _keep_percent_signs(text: str) -> str:
@@ -159,46 +159,50 @@ def _keep_percent_signs(text: str) -> str:
     return text.replace(" %", "\u00a0%")
 
 
-def _figure_tile(name: str, found: Estimate, key: str) -> tuple[str, Child, str]:
+def _figure_tile(name: str, estimate: Estimate, key: str) -> tuple[str, Child, str]:
     percent = key in PERCENT_MEASURES
-    if found.value is None:
-        return name, "-", found.reason
+    if estimate.value is None:
+        return name, "-", estimate.reason
     if percent:
-        return name, f"{100 * found.value:.0f} %", f"{bracketed_interval(found, percent=True)} %"
-    return name, estimate_text(found, percent=False), bracketed_interval(found, percent=False)
+        return (
+            name,
+            f"{100 * estimate.value:.0f} %",
+            f"{bracketed_interval(estimate, percent=True)} %",
+        )
+    return name, estimate_text(estimate, percent=False), bracketed_interval(estimate, percent=False)
 
 
 def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
-    judged = [("", c.judgement)]
+    judgements = [("", c.judgement)]
     if c.other is not None:
-        judged = [("first", c.judgement), ("second", c.other)]
+        judgements = [("first", c.judgement), ("second", c.other)]
     if have_identical_rows(c):
         return []
     parts = [] if c.agreement is None else _agreement_sections(c, c.agreement)
-    parts += [_matrix_section(c, judged), measure_finding(c, judged).section()]
-    for name, judgement in judged:
+    parts += [_matrix_section(c, judgements), measure_finding(c, judgements).section()]
+    for name, judgement in judgements:
         parts += [_name_simulator(part, name) for part in _judge_sections(c, judgement, photos)]
     return parts
 
 
-def _judge_sections(c: Comparison, judged: Judgement, photos: Path | None) -> list[Html | None]:
+def _judge_sections(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
     parts: list[Html | None] = []
-    if judged.unpredictable is not None:
-        parts.append(unpredictable_finding(judged).section())
-    if judged.standing_out:
-        parts.append(outlier_finding(judged).section())
+    if judgement.unpredictable is not None:
+        parts.append(unpredictable_finding(judgement).section())
+    if judgement.standing_out:
+        parts.append(outlier_finding(judgement).section())
     elif c.kind != "runs":
-        parts.append(section("What stands out", no_outliers_sentence(judged)))
-    parts.append(group_finding(c, "object", judged.objects).section())
-    if len(judged.scenes) > 1:
-        parts.append(group_finding(c, "scene", judged.scenes).section())
+        parts.append(section("What stands out", no_outliers_sentence(judgement)))
+    parts.append(group_finding(c, "object", judgement.objects).section())
+    if len(judgement.scenes) > 1:
+        parts.append(group_finding(c, "scene", judgement.scenes).section())
     return [
         *parts,
-        _placement_section(c, judged),
-        _margin_section(c, judged),
-        verdict_finding(c, judged).section(),
-        _case_section(c, judged, photos),
-        _outcome_section(c, judged),
+        _placement_section(c, judgement),
+        _margin_section(c, judgement),
+        verdict_finding(c, judgement).section(),
+        _case_section(c, judgement, photos),
+        _outcome_section(c, judgement),
     ]
 
 
@@ -243,44 +247,44 @@ def _describe_side(side: Side) -> str:
 
 
 def _photo_folder(c: Comparison, path: Path) -> Path | None:
-    """Folder of the trials file relative to the page's."""
+    """Folder of the trials file, relative to the folder of the page; None without trials."""
     if c.reference.kind != "trials":
         return None
     folder = Path(c.reference.path).absolute().parent
     return Path(os.path.relpath(folder, path.absolute().parent))
 
 
-def _case_section(comparison: Comparison, judged: Judgement, photos: Path | None) -> Html | None:
+def _case_section(comparison: Comparison, judgement: Judgement, photos: Path | None) -> Html | None:
     """Section of the wrong verdicts with the commands that show them; None if there are none.
 
     Args:
         comparison: the comparison.
-        judged: assessment of one judge.
-        photos: folder of the trials file relative to the page's; None without trials.
+        judgement: assessment of one judge.
+        photos: folder of the trials file, relative to the folder of the page; None without trials.
     """
     max_rows = 50  # Maximum number of wrong verdicts in the table.
-    if not judged.disagreements:
+    if not judgement.disagreements:
         return None
     tables: list[Html] = []
-    apart = judged.unpredictable
-    beyond = {} if apart is None else apart.outcomes
-    promised = 0 if apart is None else apart.predicted_successes
-    false_successes = [d for d in judged.disagreements if d.kind == "fp"]
+    unpredictable = judgement.unpredictable
+    outcomes = {} if unpredictable is None else unpredictable.outcomes
+    predicted_successes = 0 if unpredictable is None else unpredictable.predicted_successes
+    false_successes = [d for d in judgement.disagreements if d.kind == "fp"]
     groups = [
         (
             cell_name(comparison, "fp"),
-            [d for d in false_successes if d.ended not in beyond],
-            round(judged.selected.fp) - promised,
+            [d for d in false_successes if d.ended not in outcomes],
+            round(judgement.selected.fp) - predicted_successes,
         ),
         (
             "success predicted, failed for reasons that the hand alone cannot predict",
-            [d for d in false_successes if d.ended in beyond],
-            promised,
+            [d for d in false_successes if d.ended in outcomes],
+            predicted_successes,
         ),
         (
             cell_name(comparison, "fn"),
-            [d for d in judged.disagreements if d.kind == "fn"],
-            round(judged.selected.fn),
+            [d for d in judgement.disagreements if d.kind == "fn"],
+            round(judgement.selected.fn),
         ),
     ]
     for name, cases, total in groups:
@@ -323,12 +327,12 @@ def _note_and_photo(case: Disagreement, photos: Path | None) -> str:
     return join(case.note, " " if case.note else "", link)
 
 
-def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
-    """Section of simulated by actual outcomes."""
-    happened = sorted({name for row in judged.outcomes.values() for name in row})
+def _outcome_section(comparison: Comparison, judgement: Judgement) -> Html:
+    """Section that counts grasps by simulated and actual outcome."""
+    happened = sorted({name for row in judgement.outcomes.values() for name in row})
     rows = [
         (outcome_label(simulated), [row.get(name, "·") for name in happened])
-        for simulated, row in judged.outcomes.items()
+        for simulated, row in judgement.outcomes.items()
     ]
     head, judge, other = "simulated", "in simulation", "on the robot"
     if comparison.kind == "runs":
@@ -341,36 +345,36 @@ def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
     )
 
 
-def _agreement_sections(comparison: Comparison, found: RunAgreement) -> list[Html | None]:
+def _agreement_sections(comparison: Comparison, agreement: RunAgreement) -> list[Html | None]:
     """Sections on the agreement of two runs."""
     title, text = "Agreement on holding", agreement_sentence(comparison)
     parts: list[Html | None] = [
-        run_agreement_finding("object", found.objects, title, text).section(),
-        _stage_section(found),
+        run_agreement_finding("object", agreement.objects, title, text).section(),
+        _stage_section(agreement),
     ]
-    if found.parted:
-        parts.append(parted_finding(found.parted).section())
-    if found.confidence:
-        parts.append(confidence_finding(found.confidence).section())
-    if found.margins:
-        parts.append(_margin_bin_section(found.margins))
-    if found.differences:
-        parts.append(margin_difference_finding(found.differences).section())
+    if agreement.parted:
+        parts.append(parted_finding(agreement.parted).section())
+    if agreement.confidence:
+        parts.append(confidence_finding(agreement.confidence).section())
+    if agreement.margins:
+        parts.append(_margin_bin_section(agreement.margins))
+    if agreement.differences:
+        parts.append(margin_difference_finding(agreement.differences).section())
     return parts
 
 
-def _stage_section(found: RunAgreement) -> Html:
-    """Section of all grasps by the stages of both runs, with those that only one run holds in
-    brackets.
+def _stage_section(agreement: RunAgreement) -> Html:
+    """Section that counts all grasps by the deciding stages of both runs, and in brackets the
+    grasps that only one run holds.
     """
-    columns = deciding_stages(found.stages)
+    columns = deciding_stages(agreement.stages)
 
     def cell(stage: str, other: str) -> Child:
-        count = found.stages[stage].get(other, 0)
-        parted = found.apart.get(stage, {}).get(other, 0)
+        count = agreement.stages[stage].get(other, 0)
+        parted = agreement.apart.get(stage, {}).get(other, 0)
         return f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
 
-    rows = [(stage, [cell(stage, other) for other in columns]) for stage in found.stages]
+    rows = [(stage, [cell(stage, other) for other in columns]) for stage in agreement.stages]
     text = (
         "Rows: the stage that decided in the first run. Columns: in the second run. In"
         " brackets: grasps that only one of the runs holds."
@@ -391,46 +395,46 @@ def _margin_bin_section(margins: Sequence[MarginCalibration]) -> Html:
     return section("Do the runs disagree at small margins?", text, plots)
 
 
-def _plots(found: Sequence[MarginCalibration], vertical: str) -> Html:
-    plots = (reliability_plot(c, vertical) for c in found)
+def _plots(calibrations: Sequence[MarginCalibration], vertical: str) -> Html:
+    plots = (reliability_plot(c, vertical) for c in calibrations)
     return element("div", *plots, class_="charts plots")
 
 
-def _margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
+def _margin_section(comparison: Comparison, judgement: Judgement) -> Html | None:
     """Section on margins and success, most informative first; None without margins."""
     max_plots = 4  # Maximum number of margins with a plot.
-    defined = [c for c in judged.calibration if c.auroc.value is not None]
+    defined = [c for c in judgement.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_distance_from_chance, reverse=True)
     if found:
         plots = _plots(found[:max_plots], success_description(comparison))
         return margin_finding(comparison, found).section(plots)
-    words = too_few_trials_sentence(comparison, judged)
+    words = too_few_trials_sentence(comparison, judgement)
     title = f"Do margins predict {success_description(comparison)}?"
     return section(title, words) if words else None
 
 
-def _distance_from_chance(found: MarginCalibration) -> float:
-    """Distance of the AUROC's interval from chance, which selects the margins to plot."""
-    area = found.auroc_weighted or found.auroc
+def _distance_from_chance(calibration: MarginCalibration) -> float:
+    """Distance of the AUROC's interval from chance, by which the margins to plot are selected."""
+    area = calibration.auroc_weighted or calibration.auroc
     low, high = area.low, area.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
 
 
-def _placement_section(comparison: Comparison, judged: Judgement) -> Html | None:
+def _placement_section(comparison: Comparison, judgement: Judgement) -> Html | None:
     """Section of agreement by placement; None without real trials."""
-    found, p = placement_finding(comparison, judged), judged.placement
+    found, p = placement_finding(comparison, judgement), judgement.placement
     if found is None or p is None:
         return None
     plots = _plots([c for c in (p.largest, p.target) if c.trials], "right verdicts")
     return element("div", found.section(), plots)
 
 
-def _matrix_section(comparison: Comparison, judged: Named) -> Html:
+def _matrix_section(comparison: Comparison, judgements: NamedJudgements) -> Html:
     """Section with confusion matrices of the trials, and of all grasps that they represent."""
     runs = comparison.kind == "runs"
     title = "Verdicts of both runs" if runs else "Verdicts and outcomes"
     blocks = []
-    for name, judgement in judged:
+    for name, judgement in judgements:
         suffix = f", {name}" if name else ""
         kind = "grasps" if runs else "selected trials"
         blocks.append(_matrix_table(comparison, f"{kind}{suffix}", judgement.selected))
@@ -439,7 +443,7 @@ def _matrix_section(comparison: Comparison, judged: Named) -> Html:
     text = "Rows: what the simulation predicted. Columns: what happened."
     if runs:
         text = "Rows: the first run. Columns: the second run."
-    if any(j.all_grasps is not None for _, j in judged):
+    if any(judgement.all_grasps is not None for _, judgement in judgements):
         text += (
             " Each selected trial counts once; for all grasps it counts for all the"
             " grasps that it was chosen from."
@@ -447,12 +451,12 @@ def _matrix_section(comparison: Comparison, judged: Named) -> Html:
     return section(title, text, element("div", *blocks, class_="beside"))
 
 
-def _matrix_table(comparison: Comparison, title: str, found: Agreement) -> Html:
+def _matrix_table(comparison: Comparison, title: str, agreement: Agreement) -> Html:
     runs = comparison.kind == "runs"
     judge, other = ("in the first", "in the second") if runs else ("predicted", "on the robot")
 
     def cell(name: str, style: str) -> Html:
-        value = format_count(round(getattr(found, name)))
+        value = format_count(round(getattr(agreement, name)))
         tip = cell_name(comparison, name)
         return element(
             "td", element("b", value), element("small", name.upper()), class_=style, title=tip

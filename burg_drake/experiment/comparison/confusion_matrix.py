@@ -43,7 +43,7 @@ class Estimate:
     Attributes:
         value: None if it is undefined.
         low, high: bounds; None if there is no interval.
-        reason: why it is undefined; empty otherwise.
+        reason: reason for an undefined value; empty otherwise.
     """
 
     value: float | None
@@ -53,24 +53,21 @@ class Estimate:
 
     @classmethod
     def undefined(cls, reason: str) -> Estimate:
-        """No number, and why."""
+        """An undefined number with the reason."""
         return cls(None, reason=reason)
 
     @classmethod
     def between(cls, value: float, low: float, high: float) -> Estimate:
-        """A number within its interval, which is stretched to it where it has to be."""
+        """A number with its interval, which is widened to contain the number."""
         return cls(value, min(value, low), max(value, high))
 
 
-def estimate_share(successes: float, trials: float, reason: str = "no trials") -> Estimate:
-    """A proportion with Wilson's interval; counts may be effective ones, and then no integers.
-
-    Args:
-        successes, trials: counts.
-        reason: why it is undefined if there are no trials.
+def estimate_share(successes: float, trials: float) -> Estimate:
+    """A proportion with Wilson's interval; undefined without trials. Effective counts need not be
+    integers.
     """
     if trials <= 0:
-        return Estimate.undefined(reason)
+        return Estimate.undefined("no trials")
     successes, trials = float(successes), float(trials)
     value = min(1.0, successes / trials)
     low, high = wilson_interval(successes, trials)
@@ -84,13 +81,14 @@ class Measure:
     Attributes:
         name: displayed name.
         part, whole: cells whose sums are numerator and denominator; empty if it is no share.
-        of: computes values from cells, arrays of one shape; NaN or infinite if undefined.
-        low, high: its range.
-        reason: why it may be undefined.
+        compute: computes values from the four cells, arrays of one shape; NaN or infinite where
+            undefined.
+        low, high: range of possible values.
+        reason: reason for an undefined value.
     """
 
     name: str
-    of: Callable[[Array, Array, Array, Array], Array]
+    compute: Callable[[Array, Array, Array, Array], Array]
     reason: str
     part: tuple[int, ...] = ()
     whole: tuple[int, ...] = ()
@@ -99,18 +97,19 @@ class Measure:
 
     @property
     def is_share(self) -> bool:
-        """Whether it is a proportion of trials."""
+        """Whether the measure is a proportion of trials."""
         return bool(self.whole)
 
 
 def _share_measure(
     name: str, part: tuple[int, ...], whole: tuple[int, ...], reason: str
 ) -> Measure:
-    def of(*cells: Array) -> Array:
-        added: list[Array] = [np.sum([cells[k] for k in of], axis=0) for of in (part, whole)]
-        return added[0] / added[1]
+    def compute(*cells: Array) -> Array:
+        numerator: Array = np.sum([cells[k] for k in part], axis=0)
+        denominator: Array = np.sum([cells[k] for k in whole], axis=0)
+        return numerator / denominator
 
-    return Measure(name, of, reason, part, whole)
+    return Measure(name, compute, reason, part, whole)
 
 
 def _f1(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
@@ -160,33 +159,30 @@ CELL_PRIOR = 0.5
 """Prior number of trials in each cell, over all strata."""
 
 
-def draw_cells(
-    counts: Values, population: Array, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
-) -> Array:
+def draw_cells(counts: Values, population: Array, rng: np.random.Generator) -> Array:
     """Draws confusion matrices from the posterior distribution given the observed one.
 
     Args:
         counts: (S, 4) trials by stratum and cell.
         population: (S,) population of each stratum; strata without trials are left out.
         rng: random generator.
-        draws: number of draws.
 
     Returns:
-        (draws, 4) cells of all strata together, in units of `population`.
+        (`RESAMPLING_DRAWS`, 4) cells of all strata together, in units of `population`.
     """
     seen = counts.sum(axis=1) > 0
     counts, population = counts[seen].astype(float), population[seen]
     size = counts.sum(axis=1, keepdims=True)
     alpha = counts * np.maximum(size - 2, size / 3) / size + distribute_prior(counts, population)
-    drawn = rng.standard_gamma(alpha, (draws, *alpha.shape))
+    drawn = rng.standard_gamma(alpha, (RESAMPLING_DRAWS, *alpha.shape))
     proportions = drawn / drawn.sum(axis=2, keepdims=True)
     expected: Array = np.einsum("dsc,s->dc", proportions, population)
     return expected
 
 
 def distribute_prior(counts: Array, population: Array) -> Array:
-    """Prior of half a trial for each cell, divided by population among the strata with such
-    verdicts, or among all strata if none has such verdicts.
+    """Prior of half a trial for each cell, divided by population among the strata with the same
+    predicted success as the cell, or among all strata if there are none.
 
     Args:
         counts: (S, 4) trials by stratum and cell, at least one in each stratum.
@@ -197,17 +193,15 @@ def distribute_prior(counts: Array, population: Array) -> Array:
     """
     shares = np.empty_like(counts)
     for cells in ((0, 1), (2, 3)):  # success predicted, failure predicted
-        of = counts[:, cells].sum(axis=1) / counts.sum(axis=1) * population
-        if not of.any():
-            of = population
-        shares[:, cells] = (of / of.sum())[:, None]
+        weight = counts[:, cells].sum(axis=1) / counts.sum(axis=1) * population
+        if not weight.any():
+            weight = population
+        shares[:, cells] = (weight / weight.sum())[:, None]
     return CELL_PRIOR * shares
 
 
-def draw_unstratified_cells(
-    counts: Values, rng: np.random.Generator, draws: int = RESAMPLING_DRAWS
-) -> Array:
-    """As `draw_cells` for many independent matrices.
+def draw_unstratified_cells(counts: Values, rng: np.random.Generator, draws: int) -> Array:
+    """Draws as `draw_cells`, for many independent matrices.
 
     Args:
         counts: (G, 4) trials by matrix and cell.
@@ -252,9 +246,9 @@ class Agreement:
     """A confusion matrix of predicted and actual success, and its figures (`AGREEMENT_MEASURES`).
 
     Attributes:
-        trials: number of trials behind it.
-        tp, fp, fn, tn: trials, or the grasps that they stand for: predicted successes that came
-            true and that failed, failures that succeeded after all and that failed.
+        trials: number of trials.
+        tp, fp, fn, tn: number of trials, or of the grasps that they stand for: predicted successes
+            that succeeded and that failed, predicted failures that succeeded and that failed.
         precision: share of the predicted successes that succeeded.
         recall: share of the successes that were predicted.
         specificity: share of the failures that were predicted.
@@ -321,27 +315,28 @@ def count_cells_by_group(predicted: Flags, actual: Flags, group: Rows, count: in
 def estimate_agreement(
     counts: Values, *, population: Array | None = None, seed: int = 0
 ) -> Agreement:
-    """Figures of one matrix. Its shares have Wilson's intervals, all others those of
-    `draw_cells`.
+    """Figures of one matrix. Shares have Wilson's intervals; all other intervals are by resampling,
+    see `draw_cells`.
 
     Args:
-        counts: (4,) trials by cell, or (S, 4) by the stratum that they were chosen from.
+        counts: (4,) trials by cell, or (S, 4) trials by stratum and cell.
         population: (S,) population of each stratum. The figures then hold for the whole population,
-            and all intervals are by resampling within strata. None: for the trials themselves.
-        seed: of the resampling.
+            and all intervals are by resampling within strata. If None, the figures hold for the
+            trials themselves.
+        seed: seed of the resampling.
     """
     counts = np.atleast_2d(np.asarray(counts))
     size = counts.sum(axis=1)
-    stands_for = size.astype(float) if population is None else np.asarray(population, dtype=float)
+    represented = size.astype(float) if population is None else np.asarray(population, dtype=float)
     if not size.any():
         return _make_agreement([0, 0, 0, 0], 0, np.full(len(AGREEMENT_MEASURES), np.nan), None)
-    drawn = draw_cells(counts, stands_for, np.random.default_rng(seed))
+    drawn = draw_cells(counts, represented, np.random.default_rng(seed))
     interval = interval_bounds(_compute_measures(drawn))
     trials = int(size.sum())
     if population is None:
         cells = counts.sum(axis=0)
         return _make_agreement(cells.tolist(), trials, _compute_measures(cells), interval)
-    weight = np.divide(stands_for, size, out=np.zeros(len(size)), where=size > 0)
+    weight = np.divide(represented, size, out=np.zeros(len(size)), where=size > 0)
     cells = weight @ counts
     return _make_agreement(
         cells.tolist(), trials, _compute_measures(cells), interval, weighted=True
@@ -353,7 +348,7 @@ def estimate_agreements(counts: Values, *, seed: int = 0) -> list[Agreement]:
 
     Args:
         counts: (G, 4) trials by group and cell.
-        seed: of the resampling.
+        seed: seed of the resampling.
     """
     max_matrices = 500_000  # Matrices drawn at once, which bounds the memory.
     min_draws = 400  # Minimum number for each group.
@@ -383,7 +378,8 @@ def _compute_measures(cells: Values) -> Array:
     """Measures (..., M) from cells (..., 4); undefined ones are not finite."""
     parts = [cells[..., k].astype(float) for k in range(4)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.stack([measure.of(*parts) for measure in AGREEMENT_MEASURES.values()], axis=-1)
+        values = [measure.compute(*parts) for measure in AGREEMENT_MEASURES.values()]
+        return np.stack(values, axis=-1)
 
 
 def _make_agreement(
@@ -394,13 +390,13 @@ def _make_agreement(
     *,
     weighted: bool = False,
 ) -> Agreement:
-    """An agreement from its cells, and (M,) values of its measures with their bounds."""
+    """An agreement from cells, and from (M,) values of the measures with their bounds."""
     figures = {}
     for k, (name, measure) in enumerate(AGREEMENT_MEASURES.items()):
         if interval is None or not np.isfinite(values[k]):
             figures[name] = Estimate.undefined(measure.reason if trials else "no trials")
         elif measure.is_share and not weighted:
-            part, whole = (sum(cells[c] for c in of) for of in (measure.part, measure.whole))
+            part, whole = sum(cells[c] for c in measure.part), sum(cells[c] for c in measure.whole)
             figures[name] = estimate_share(part, whole)
         else:
             low, high = float(interval[0][k]), float(interval[1][k])
@@ -425,8 +421,9 @@ class Paired:
 
     Attributes:
         trials: number of trials.
-        both, only_first, only_second, neither: number of trials by which answers are yes.
-        difference: share of yes of the first minus the second.
+        both, only_first, only_second, neither: number of trials in which both answers are yes, only
+            one, or neither.
+        difference: share of yes among the first answers minus the share among the second.
         p_value: two-sided exact p-value of equal shares; None without trials.
     """
 
@@ -440,14 +437,13 @@ class Paired:
 
 
 def compare_paired(first: Flags, second: Flags, *, seed: int = 0) -> Paired:
-    """Compares answers.
+    """Compares two yes-or-no answers about each trial.
 
     Args:
         first, second: (N,) truth values.
-        seed: of the interval's resampling.
+        seed: seed of the interval's resampling.
     """
-    both, one, other, neither = count_cells(first, second).tolist()
-    return compare_paired_counts(both, one, other, neither, seed=seed)
+    return compare_paired_counts(*count_cells(first, second).tolist(), seed=seed)
 
 
 def compare_paired_counts(
@@ -465,9 +461,9 @@ def compare_paired_counts(
         value = (only_first - only_second) / trials
         difference = Estimate.between(value, float(low), float(high))
         p_value = 1.0
-        apart = only_first + only_second
-        if apart:  # either tail of the binomial distribution with one half, which is symmetric
-            p_value = min(1.0, 2.0 * float(bdtr(min(only_first, only_second), apart, 0.5)))
+        differing = only_first + only_second
+        if differing:  # both tails of the binomial distribution with one half, which is symmetric
+            p_value = min(1.0, 2.0 * float(bdtr(min(only_first, only_second), differing, 0.5)))
     return Paired(
         trials=trials,
         both=both,

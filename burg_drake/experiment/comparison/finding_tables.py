@@ -45,8 +45,8 @@ Cell = str | float | Figure | Html | tuple[str, Html]
 
 @dataclass(frozen=True)
 class _Column:
-    """A column; `kind` is the method that adds it, `interval` whether a terminal shows intervals of
-    estimates.
+    """A column. `kind` names the method of `FindingTable` that adds it; `interval` says whether a
+    terminal shows the intervals of estimates.
     """
 
     head: str
@@ -199,11 +199,13 @@ def figure_cell(figure: Figure) -> Html:
     return element("td", figure.texts[0], " ", bounds, class_="number")
 
 
-def share_with_interval(found: Estimate) -> Child:
+def share_with_interval(estimate: Estimate) -> Child:
     """A share as a dot with its interval, and as text."""
-    if found.value is None or found.low is None or found.high is None:
-        return element("span", found.reason, class_="faint")
-    return join(interval_mark(found.value, found.low, found.high), f" {100 * found.value:.0f} %")
+    if estimate.value is None or estimate.low is None or estimate.high is None:
+        return element("span", estimate.reason, class_="faint")
+    return join(
+        interval_mark(estimate.value, estimate.low, estimate.high), f" {100 * estimate.value:.0f} %"
+    )
 
 
 PLOT_SIZE = 330, 210  # width and height of a reliability plot in SVG units
@@ -211,24 +213,24 @@ PLOT_LEFT, PLOT_RIGHT = 38, 320  # x of the axes' ends
 PLOT_TOP, PLOT_BOTTOM = 24, 172  # y of the shares 1 and 0
 
 
-def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
+def reliability_plot(calibration: MarginCalibration, vertical: str) -> Html:
     """Reliability plot: a dot with its interval for each bin, the isotonic fit as a line, and the
     overall share dashed.
 
     Args:
-        found: bins and fit; weighted shares are drawn if known.
+        calibration: bins and fit; weighted shares are drawn if known.
         vertical: label of the share.
     """
-    title, unit, size = margin_title(found.name)
-    ends = [size * found.bins[0].low, size * found.bins[-1].high]
-    size_of_all = max(abs(end) for end in ends)
+    title, unit, factor = margin_title(calibration.name)
+    ends = [factor * calibration.bins[0].low, factor * calibration.bins[-1].high]
+    largest = max(abs(end) for end in ends)
     spread = ends[1] - ends[0]
-    step = nice_step((spread if spread > 1e-6 * size_of_all else size_of_all or 1.0) / 5)
+    step = nice_step((spread if spread > 1e-6 * largest else largest or 1.0) / 5)
     low, high = math.floor(ends[0] / step + 1e-9), math.ceil(ends[1] / step - 1e-9)
     low, high = (low, high) if low < high else (low - 1, high + 1)
 
     def x(value: float) -> float:
-        along = (size * value - low * step) / ((high - low) * step)
+        along = (factor * value - low * step) / ((high - low) * step)
         return PLOT_LEFT + (PLOT_RIGHT - PLOT_LEFT) * along
 
     named = f"{title} [{unit}]" if unit else title
@@ -236,7 +238,7 @@ def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
         element(
             "text",
             f"{k * step:.6g}",
-            x=f"{x(k * step / size):.1f}",
+            x=f"{x(k * step / factor):.1f}",
             y=PLOT_BOTTOM + 15,
         )
         for k in range(low, high + 1)
@@ -247,9 +249,9 @@ def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
         element("text", named, x=PLOT_RIGHT, y=PLOT_SIZE[1] - 5, class_="title end"),
         *_grid_lines(),
         element("g", *axis, class_="middle"),
-        _mean_line((found.weighted or found.share).value),
-        _isotonic_line(found, x),
-        *(part for row in found.bins for part in _bin_marks(row, x, size, unit)),
+        _mean_line((calibration.weighted or calibration.share).value),
+        _isotonic_line(calibration, x),
+        *(part for row in calibration.bins for part in _bin_marks(row, x, factor, unit)),
         viewBox=f"0 0 {PLOT_SIZE[0]} {PLOT_SIZE[1]}",
         class_="plot",
         role="img",
@@ -284,9 +286,9 @@ def _mean_line(share: float | None) -> Html | None:
     )
 
 
-def _isotonic_line(found: MarginCalibration, x: Callable[[float], float]) -> Html | None:
+def _isotonic_line(calibration: MarginCalibration, x: Callable[[float], float]) -> Html | None:
     """Line of the isotonic fit, which jumps half way between its steps."""
-    points, steps = [], found.isotonic
+    points, steps = [], calibration.isotonic
     for k, step in enumerate(steps):
         start = (steps[k - 1].high + step.low) / 2 if k else step.low
         end = (step.high + steps[k + 1].low) / 2 if k + 1 < len(steps) else step.high
@@ -294,14 +296,15 @@ def _isotonic_line(found: MarginCalibration, x: Callable[[float], float]) -> Htm
     return element("path", d="M" + " L".join(points), class_="fit") if points else None
 
 
-def _bin_marks(row: Bin, x: Callable[[float], float], size: float, unit: str) -> list[Html]:
-    at = row.share if row.weighted is None else row.weighted
+def _bin_marks(row: Bin, x: Callable[[float], float], factor: float, unit: str) -> list[Html]:
+    share = row.share if row.weighted is None else row.weighted
     place = f"{x(row.mean):.1f}"
     tip = (
-        f"{row.successes} of {row.trials} trials, {format_number(size * row.low)} to"
-        f" {format_number(size * row.high)} {unit}".rstrip()
+        f"{row.successes} of {row.trials} trials, {format_number(factor * row.low)} to"
+        f" {format_number(factor * row.high)} {unit}".rstrip()
     )
-    value, low, high = (f"{_share_height(v or 0.0):.1f}" for v in (at.value, at.low, at.high))
+    shares = (share.value, share.low, share.high)
+    value, low, high = (f"{_share_height(v or 0.0):.1f}" for v in shares)
     return [
         element(
             "line", element("title", tip), x1=place, x2=place, y1=low, y2=high, class_="whisker"

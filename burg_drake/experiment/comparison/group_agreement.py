@@ -70,9 +70,9 @@ def agreement_by_factor(
     Args:
         pairs: the trials.
         factor: (N,) the column.
-        names: displayed names of its values, in the order of the groups; the values themselves if
-            None.
-        seed: of the intervals' resampling.
+        names: displayed names of the column's values, in the order of the groups; the values
+            themselves if None.
+        seed: seed of the intervals' resampling.
     """
     counts = count_cells_by_group(pairs.predicted, pairs.actual, factor.index, len(factor.names))
     seen = np.flatnonzero(counts.sum(axis=1)).tolist()
@@ -88,7 +88,8 @@ def agreement_by_factor(
 
 
 def outcomes_by_verdict(pairs: VerdictPairs) -> tuple[Stopped, ...]:
-    """Outcomes of the grasps by verdict (including success), by stage, most frequent first."""
+    """Outcomes of the grasps by verdict, in the order of the stages; within a stage the most
+    frequent verdict first."""
     stage_order = [stage.value for stage in Stage]
     stages, outcomes, blockers = pairs.stage, pairs.simulated, pairs.blocker
     width = (len(outcomes.names), len(blockers.names))
@@ -134,10 +135,10 @@ class OutlierGroup:
         name: the object, simulated outcome, or body in the way.
         predicted: whether their success was predicted.
         wrong, trials: number of wrong verdicts and of trials in the group.
-        other_wrong, other_trials: the same for all other trials with this prediction.
-        ended: counts of the wrong ones by actual outcome, most frequent first.
+        other_wrong, other_trials: these numbers for all other trials with this prediction.
+        ended: counts of the wrong verdicts by actual outcome, most frequent first.
         p_value: one-sided mid-p of Fisher's exact test.
-        corrected: the same by Holm's method, for all tested groups.
+        corrected: p-value corrected by Holm's method for all tested groups.
     """
 
     kind: GroupKind
@@ -156,7 +157,7 @@ def find_outlier_groups(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], 
     """Looks for groups whose verdicts are wrong more often than those of others.
 
     Args:
-        pairs: N trials that the verdicts can predict.
+        pairs: verdicts and outcomes, without unpredictable outcomes.
 
     Returns:
         Groups with a corrected p-value below `OUTLIER_SIGNIFICANCE_LEVEL`, the smallest first, and
@@ -201,14 +202,14 @@ def find_outlier_groups(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], 
 
 
 def _count_errors(wrong: Flags, rows: Flags, others: Flags) -> tuple[int, int, int, int]:
-    """Wrong verdicts and trials of a group, and of the others."""
-    parts = (rows & wrong, rows, others & wrong, others)
-    return int(parts[0].sum()), int(parts[1].sum()), int(parts[2].sum()), int(parts[3].sum())
+    """Number of wrong verdicts and of trials in a group, and among the others."""
+    own, other = (rows & wrong).sum(), (others & wrong).sum()
+    return int(own), int(rows.sum()), int(other), int(others.sum())
 
 
 def _can_be_outlier(wrong: int, trials: int, other_wrong: int, other_trials: int) -> bool:
-    """Whether a group could be significant, uncorrected, if it had as many of all wrong verdicts as
-    possible. This depends on totals alone, so groups that could not need no correction.
+    """Whether a group would be significant, uncorrected, with as many of all wrong verdicts as
+    possible. This depends on totals alone, so other groups need not be tested.
     """
     total = wrong + other_wrong
     most = min(total, trials)
@@ -234,9 +235,9 @@ def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: in
 
 
 def holm_correction(p_values: Sequence[float]) -> list[float]:
-    """P-values corrected for multiple tests (S. Holm, Scandinavian Journal of Statistics 6, 1979):
-    the probability of any false positive below a level is at most that level, provided that this
-    holds for each single p-value.
+    """P-values corrected for multiple tests (S. Holm, Scandinavian Journal of Statistics 6, 1979).
+    The probability of any false positive below a level is at most the level, if this holds for each
+    single p-value.
     """
     order = np.argsort(p_values, kind="stable")
     factors = np.arange(len(p_values), 0, -1)

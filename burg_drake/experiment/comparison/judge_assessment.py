@@ -51,7 +51,7 @@ class Disagreement:
         ended: actual outcome.
         replays: commands that show the trials in simulation.
         trial: number of the real trial; None if there is none.
-        note, photo: note and photo of the real trial; the photo as the sheet names it.
+        note, photo: note and photo of the real trial; the photo as the trials file names it.
         offset_mm: largest offset of any object [mm]; None where unknown.
     """
 
@@ -82,10 +82,10 @@ def list_wrong_verdicts(
     Args:
         pairs: N grasps.
         scenes: names of the scenes by their content.
-        folders: folders of the runs by content of the scene; one mapping for each run to be
-            replayed.
+        folders: folders of the runs by content hash of the scene; one mapping for each side to
+            be replayed.
         trials: (N,) the real trials, if the outcomes are real.
-        offset_mm: (N,) largest offset of any object in them; NaN where unknown.
+        offset_mm: (N,) largest offset of any object before each trial [mm]; NaN where unknown.
     """
     max_cases = 200  # Maximum number of each kind; the confusion matrix counts all.
     found = []
@@ -123,8 +123,8 @@ def replay_commands(
     """Commands that show a grasp in each run that has its scene.
 
     Args:
-        folders: folders of the runs by content of the scene; one mapping for each run.
-        scene: content of the scene.
+        folders: folders of the runs by content hash of the scene; one mapping for each side.
+        scene: content hash of the scene.
         grasp: id of the grasp.
     """
     return tuple(
@@ -146,8 +146,8 @@ class PlacementAgreement:
         within: trials with all errors within the limit.
         beyond: trials with an error beyond the limit.
         unmeasured: other trials in which an object was not measured.
-        largest: share of right verdicts over the largest offset of any object [mm].
-        target: the same over the offset of the target [mm].
+        largest: share of right verdicts by the largest offset of any object [mm].
+        target: share of right verdicts by the offset of the target [mm].
     """
 
     limit_mm: float
@@ -174,23 +174,23 @@ def placement_agreement(
             other is beyond the limit.
         target: (N,) offset of the target [mm]; NaN if it was not measured.
         limit_mm: see `PlacementAgreement`.
-        seed: of the intervals' resampling.
+        seed: seed of the intervals' resampling.
     """
     group = np.where(np.isnan(largest), 2, (largest > limit_mm).astype(int))
     counts = count_cells_by_group(pairs.predicted, pairs.actual, group, 3)
     within, beyond, unmeasured = estimate_agreements(counts, seed=seed)
     right = pairs.predicted == pairs.actual
 
-    def over(name: str, values: Array) -> MarginCalibration:
-        return calibrate_margin(name, values, right, smaller_is_better=True)
+    def calibrate(name: str, offsets: Array) -> MarginCalibration:
+        return calibrate_margin(name, offsets, right, smaller_is_better=True)
 
     return PlacementAgreement(
         limit_mm=limit_mm,
         within=within,
         beyond=beyond,
         unmeasured=unmeasured,
-        largest=over("largest_offset_mm", largest),
-        target=over("target_offset_mm", target),
+        largest=calibrate("largest_offset_mm", largest),
+        target=calibrate("target_offset_mm", target),
     )
 
 
@@ -203,15 +203,15 @@ def placement_errors_mm(
 
     Args:
         trials: N trials.
-        instances: the free instances of the scene of each.
+        instances: free instances of the scene of each trial.
         limit_mm: see `placement_agreement`.
 
     Returns:
-        (N,) the largest of any object, and (N,) that of the target; NaN where unknown.
+        (N,) the largest offset of any object, and (N,) the offset of the target; NaN where unknown.
     """
     pairs = zip(trials, instances, strict=True)
     largest = np.array(
-        [_largest_error(trial, there, limit_mm) for trial, there in pairs], dtype=float
+        [_largest_error(trial, names, limit_mm) for trial, names in pairs], dtype=float
     )
     target = np.array([_measured_errors(trial).get(trial.instance, math.nan) for trial in trials])
     return largest, target.astype(float)
@@ -222,8 +222,8 @@ def _largest_error(trial: RealTrial, instances: Collection[str], limit_mm: float
     limit.
     """
     measured = _measured_errors(trial)
-    most = max(measured.values(), default=math.nan)
-    return most if set(instances) <= set(measured) or most > limit_mm else math.nan
+    largest = max(measured.values(), default=math.nan)
+    return largest if set(instances) <= set(measured) or largest > limit_mm else math.nan
 
 
 def _measured_errors(trial: RealTrial) -> dict[str, float]:
@@ -248,16 +248,20 @@ class Strata:
     population: Array
 
     @property
+    def trials(self) -> NDArray[np.intp]:
+        """(S,) number of trials in each stratum."""
+        return np.bincount(self.index, minlength=len(self.population))
+
+    @property
     def weight(self) -> Array:
         """(N,) number of grasps that each trial represents."""
-        size = np.bincount(self.index, minlength=len(self.population))
-        return (self.population / np.maximum(size, 1))[self.index]
+        return (self.population / np.maximum(self.trials, 1))[self.index]
 
     def select_trials(self, rows: Flags) -> Strata:
         """The strata of selected trials, which keep their weights."""
-        every = np.bincount(self.index, minlength=len(self.population))
-        kept = np.bincount(self.index[rows], minlength=len(self.population))
-        return Strata(self.index[rows], self.population * kept / np.maximum(every, 1))
+        selected = Strata(self.index[rows], self.population)
+        population = self.population * selected.trials / np.maximum(self.trials, 1)
+        return Strata(selected.index, population)
 
     def agreement(self, first: Flags, second: Flags, *, seed: int = 0) -> Agreement:
         """Figures of all grasps from two answers (N,) about each trial."""
@@ -265,10 +269,9 @@ class Strata:
         return estimate_agreement(counts, population=self.population, seed=seed)
 
     @property
-    def missing(self) -> int:
+    def not_represented(self) -> int:
         """Number of grasps that no trial represents."""
-        size = np.bincount(self.index, minlength=len(self.population))
-        return int(self.population[size == 0].sum())
+        return int(self.population[self.trials == 0].sum())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,10 +279,10 @@ class Unpredictable:
     """Failures that a run of the hand alone does not predict, and figures without them.
 
     Attributes:
-        outcomes: counts of these trials by outcome, most frequent first.
-        predicted_successes: number of these trials that were predicted to succeed.
-        selected, all_grasps: figures of the other trials, and of the grasps that they stand for;
-            see `Judgement`.
+        outcomes: counts of the trials with such a failure by outcome, most frequent first.
+        predicted_successes: number of such trials that were predicted to succeed.
+        selected, all_grasps: figures of the other trials, and of the grasps that the other trials
+            stand for; see `Judgement`.
     """
 
     outcomes: dict[str, int]
@@ -299,11 +302,11 @@ class Judgement:
         not_represented: number of grasps in strata without trials.
         unpredictable: failures that a run of the hand alone does not predict; all other figures
             count them as failures. None if there are none, and in other modes.
-        bias: predicted against actual success of the trials themselves; `all_grasps.excess` says
-            whether it is biased on all grasps.
+        bias: predicted against actual success of the trials themselves; `all_grasps.excess` is the
+            bias on all grasps.
         standing_out: objects and causes whose verdicts are wrong more often than those of others,
-            without unpredictable failures. Of real trials alone.
-        tested_groups: number of groups tested for that.
+            without unpredictable failures. Empty without real trials.
+        tested_groups: number of groups tested for `standing_out`.
         objects, scenes, stages: figures by object, by scene, and by deciding stage.
         stopped: outcomes of the grasps by verdict and blocker.
         outcomes: counts of trials by verdict and outcome.
@@ -349,19 +352,21 @@ def assess_judge(
         placement, disagreements: results for the judgement.
         unpredictable: outcomes that no verdict can predict.
         real: whether the outcomes are real trials.
-        seed: of the intervals' resampling.
+        seed: seed of the intervals' resampling.
     """
     weight = None if strata is None else strata.weight
     selected, represented = _estimate_agreements(pairs, strata, seed)
     names = {outcome.value for outcome in unpredictable}
-    apart = pairs.ended.where([name in names for name in pairs.ended.names])
-    found, tested_groups = find_outlier_groups(pairs.take(~apart)) if real else ((), 0)
+    excluded = pairs.ended.where([name in names for name in pairs.ended.names])
+    outliers, tested_groups = find_outlier_groups(pairs.take(~excluded)) if real else ((), 0)
     return Judgement(
         selected=selected,
         all_grasps=represented,
-        not_represented=0 if strata is None else strata.missing,
-        unpredictable=_without_unpredictable(pairs, strata, apart, seed) if apart.any() else None,
-        standing_out=found,
+        not_represented=0 if strata is None else strata.not_represented,
+        unpredictable=(
+            _estimate_without(pairs, strata, excluded, seed) if excluded.any() else None
+        ),
+        standing_out=outliers,
         tested_groups=tested_groups,
         bias=replace(
             compare_paired(pairs.predicted, pairs.actual, seed=seed), difference=selected.excess
@@ -390,15 +395,15 @@ def _estimate_agreements(
     return estimate_agreement(counts, seed=seed), represented
 
 
-def _without_unpredictable(
-    pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int
+def _estimate_without(
+    pairs: VerdictPairs, strata: Strata | None, excluded: Flags, seed: int
 ) -> Unpredictable:
-    """Counts of the unpredictable trials (`apart`), and the figures without them."""
-    kept = None if strata is None else strata.select_trials(~apart)
-    selected, represented = _estimate_agreements(pairs.take(~apart), kept, seed)
+    """Counts of the excluded, unpredictable trials, and the figures without them."""
+    kept = None if strata is None else strata.select_trials(~excluded)
+    selected, represented = _estimate_agreements(pairs.take(~excluded), kept, seed)
     return Unpredictable(
-        outcomes=pairs.ended.count(apart),
-        predicted_successes=int(pairs.predicted[apart].sum()),
+        outcomes=pairs.ended.count(excluded),
+        predicted_successes=int(pairs.predicted[excluded].sum()),
         selected=selected,
         all_grasps=represented,
     )

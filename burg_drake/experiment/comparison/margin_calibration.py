@@ -36,10 +36,10 @@ class OrderedTrials:
 
     Attributes:
         value: (G,) smallest value of each row, increasing.
-        last: (G,) its largest value, which is the same unless there were too many rows.
+        last: (G,) largest value of each row; equal to `value` unless rows were combined.
         count, good: (G,) number of trials and of successes.
-        weight, good_weight: (G,) sums of the weights of both.
-        squares, good_squares: (G,) sums of the squared weights of both.
+        weight, good_weight: (G,) sums of the weights of the trials and of the successes.
+        squares, good_squares: (G,) sums of their squared weights.
     """
 
     value: Array
@@ -61,12 +61,12 @@ class OrderedTrials:
             weight: (N,) weight of each; 1 if None.
         """
         if weight is None:
-            ordered, best = np.sort(values), np.sort(values[good])
+            ordered, of_successes = np.sort(values), np.sort(values[good])
             first = _row_starts(ordered)
             edges = np.r_[first, len(ordered)]
-            below = np.r_[np.searchsorted(best, ordered[first]), len(best)]
-            count, well = np.diff(edges).astype(float), np.diff(below).astype(float)
-            return cls(ordered[first], ordered[edges[1:] - 1], *(count, well) * 3)
+            good_edges = np.r_[np.searchsorted(of_successes, ordered[first]), len(of_successes)]
+            counts = np.diff(edges).astype(float), np.diff(good_edges).astype(float)
+            return cls(ordered[first], ordered[edges[1:] - 1], *counts * 3)
         order = np.argsort(values)
         ordered, w, g = values[order], weight[order], good[order]
         first = _row_starts(ordered)
@@ -79,9 +79,9 @@ class OrderedTrials:
         count = np.diff(edges).astype(float)
         return cls(*ends, count, sums(g), sums(w), sums(w * g), sums(w * w), sums(w * w * g))
 
-    def parts(self, number: int) -> Rows:
-        """Index of the first row of each of `number` parts with about equally many trials; fewer
-        parts with many ties, as equal values are never separated.
+    def part_starts(self, number: int) -> Rows:
+        """Divides the rows into `number` parts with about equally many trials; returns the index of
+        the first row of each part. Equal values are never separated, so ties may give fewer parts.
         """
         if not len(self.value):
             return np.zeros(0, dtype=np.intp)
@@ -109,23 +109,21 @@ def estimate_auroc(trials: OrderedTrials, *, weighted: bool = False) -> Estimate
     """Probability that a success has a larger value than a failure; ties count half (Mann-Whitney
     statistic).
 
-    The interval is DeLong's on the log-odds scale. With perfect separation the variance is zero,
-    and it is Wilson's for the number of trials of the rarer kind. Undefined with fewer than
-    `MIN_TRIALS_PER_OUTCOME` of either kind.
+    The interval is DeLong's on the log-odds scale. With perfect separation DeLong's variance is
+    zero; the interval is then Wilson's for the number of trials with the rarer outcome. Undefined
+    with fewer than `MIN_TRIALS_PER_OUTCOME` successes or failures.
 
     Args:
         trials: sorted trials.
         weighted: use the weights of the trials.
     """
-    # Reason of an undefined estimate.
-    too_few = f"fewer than {MIN_TRIALS_PER_OUTCOME} successes or failures"
     good, bad = trials.good, trials.count - trials.good
     if not good.sum() or not bad.sum():
         return Estimate.undefined(
             "all ended alike" if trials.count.sum() else "no trials with this number"
         )
     if min(good.sum(), bad.sum()) < MIN_TRIALS_PER_OUTCOME:
-        return Estimate.undefined(too_few)
+        return Estimate.undefined(f"fewer than {MIN_TRIALS_PER_OUTCOME} successes or failures")
     if weighted:
         up, down = trials.good_weight, trials.weight - trials.good_weight
         up2, down2 = trials.good_squares, trials.squares - trials.good_squares
@@ -139,16 +137,16 @@ def estimate_auroc(trials: OrderedTrials, *, weighted: bool = False) -> Estimate
     )
     if not 1e-12 < area < 1 - 1e-12:
         rarer = float(min(good.sum(), bad.sum()))
-        at = estimate_share(round(area * rarer, 9), rarer)
-        return Estimate.between(area, at.low or 0.0, 1.0 if at.high is None else at.high)
+        share = estimate_share(round(area * rarer, 9), rarer)
+        return Estimate.between(area, share.low or 0.0, 1.0 if share.high is None else share.high)
     odds = math.log(area / (1 - area))
     half = Z_95 * math.sqrt(variance) / (area * (1 - area))
     return Estimate.between(area, _logistic(odds - half), _logistic(odds + half))
 
 
 def _placement_variance(weight: Array, squares: Array, placed: Array, count: Array) -> float:
-    """Variance of the mean placement of one kind of trials."""
-    # Variance of the placements by an uninformative value; two such trials are added.
+    """Variance of the mean placement of the successes or of the failures."""
+    # Variance of the placements by an uninformative margin; two such trials are added.
     uninformative_variance = 1 / 12
     number, total = count.sum(), weight.sum()
     mean = weight @ placed / total
@@ -210,7 +208,7 @@ class MarginCalibration:
         name: name of the margin; `probability`.
         smaller_is_better: whether small values should mean success.
         trials, successes: counts of trials with a value.
-        share: their share of successes.
+        share: share of successes among them.
         weighted: weighted share; None without weights.
         without: number of trials without a value, such as when the simulation ended before the
             measurement.
@@ -294,7 +292,7 @@ def _make_bins(trials: OrderedTrials, sign: float, weighted: bool) -> list[Bin]:
     max_bins = 10  # Maximum number of bins.
     trials_per_bin = 10  # Minimum per bin, if there are enough trials.
     total = trials.count.sum()
-    first = trials.parts(int(np.clip(total // trials_per_bin, 1, max_bins)))
+    first = trials.part_starts(int(np.clip(total // trials_per_bin, 1, max_bins)))
     bins = []
     for start, end in zip(first, [*first[1:], len(trials.value)][: len(first)], strict=True):
         part = slice(start, end)
@@ -331,7 +329,9 @@ def _fit_isotonic(trials: OrderedTrials, sign: float) -> list[IsotonicStep]:
 
     if not len(trials.value):
         return []
-    first = trials.parts(max_rows) if len(trials.value) > max_rows else np.arange(len(trials.value))
+    first = np.arange(len(trials.value))
+    if len(first) > max_rows:
+        first = trials.part_starts(max_rows)
     weight = np.add.reduceat(trials.weight, first)
     shares = np.add.reduceat(trials.good_weight, first) / weight
     fit = isotonic_regression(shares, weights=weight)

@@ -14,7 +14,7 @@ from burg_drake.evaluation import TEXT_COLUMNS, Columns, StoredRows
 from burg_drake.experiment.comparison.confusion_matrix import Flags, Rows, Values
 
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 1 << 63, 4096).astype(np.uint64) | np.uint64(1)
-"""Odd random factors of the words of a text."""
+"""Odd random factors by which the eight-byte words of a text are multiplied."""
 _BYTE_MASKS = np.array([(1 << 8 * k) - 1 for k in range(9)], dtype=np.uint64)
 """Masks of the first 0 to 8 bytes of a word."""
 
@@ -36,8 +36,8 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
 
 
 def stored_keys(column: Any) -> NDArray[np.uint64]:
-    """As `text_keys`, for an Arrow column of texts without nulls, without conversion to Python
-    objects.
+    """Hashes as by `text_keys` for an Arrow column of texts without nulls, without conversion to
+    Python objects.
     """
     found = [np.zeros(0, dtype=np.uint64), *(_chunk_keys(chunk) for chunk in column.chunks)]
     return np.concatenate(found)
@@ -66,7 +66,7 @@ def _chunk_keys(chunk: Any) -> NDArray[np.uint64]:
 
 @dataclass(frozen=True, eq=False)
 class IdColumn:
-    """A column of N different texts, which become Python objects on access only.
+    """A column of N different texts; a text becomes a Python object when it is accessed.
 
     Attributes:
         column: array or Arrow column of texts.
@@ -85,14 +85,14 @@ class IdColumn:
 
     @property
     def keys(self) -> NDArray[np.uint64]:
-        """(N,) numbers; see `text_keys`."""
+        """(N,) hashes of the texts; see `text_keys`."""
         stored = not isinstance(self.column, np.ndarray)
         keys = stored_keys(self.column) if stored else text_keys(self.column)
         return keys if self.rows is None else keys[self.rows]
 
     def same(self, other: IdColumn) -> bool:
-        """Whether both columns are known to have the same texts in the same order; False also if
-        they are stored differently.
+        """Whether both columns are known to have the same texts in the same order. False if they
+        are stored differently, whatever their texts.
         """
         if self.rows is not None or other.rows is not None:
             return False
@@ -182,7 +182,7 @@ class StoredNumbers(dict[str, Values]):
         return self[name]
 
     def same(self, other: StoredNumbers, name: str) -> bool:
-        """Whether a column is known to be the same in both, without reading it."""
+        """Whether a column is known to be equal in both stores, without reading it."""
         return bool(self._rows.table.column(name).equals(other._rows.table.column(name)))
 
 
@@ -205,7 +205,7 @@ class ResultTable:
 
     @classmethod
     def of_columns(cls, columns: Columns, names: Sequence[str]) -> ResultTable:
-        """From columns in memory."""
+        """Builds a table from columns in memory."""
         others = [name for name in names if name != "id"]
         return cls(
             IdColumn(columns["id"]),
@@ -215,7 +215,7 @@ class ResultTable:
 
     @classmethod
     def of_rows(cls, rows: StoredRows, names: Sequence[str]) -> ResultTable:
-        """Builds a table from the columnar store, which has texts as codes already."""
+        """Builds a table from the columnar store, which stores texts as codes."""
         others = [name for name in names if name != "id"]
         return cls(
             IdColumn(rows.table.column("id")),
@@ -224,7 +224,7 @@ class ResultTable:
         )
 
     def same(self, other: ResultTable, name: str) -> bool:
-        """Whether a column of numbers is known to be the same in both."""
+        """Whether a column of numbers is known to be equal in both tables."""
         one, two = self.numbers, other.numbers
         return (
             isinstance(one, StoredNumbers)
@@ -233,8 +233,8 @@ class ResultTable:
         )
 
     def take(self, rows: Rows, numbers: Sequence[str]) -> ResultTable:
-        """The selected rows and columns of numbers; the table itself if these are all rows in
-        order.
+        """The selected rows with the given columns of numbers; the table itself if all rows are
+        selected in order.
         """
         if len(rows) == len(self) and np.array_equal(rows, np.arange(len(self))):
             return self
@@ -252,10 +252,10 @@ GRASP_CONTENT_COLUMNS: tuple[str, ...] = ("x", "y", "z", "qw", "qx", "qy", "qz",
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Rows of the same grasps in two tables.
+    """Rows of the grasps that two tables have in common.
 
     Attributes:
-        first, second: (N,) rows.
+        first, second: (N,) rows in each table.
         other_content: number of grasps that share only their id.
         only_first, only_second: number of grasps in one table alone.
     """
@@ -278,9 +278,9 @@ def match_rows(first: ResultTable, second: ResultTable) -> Match:
         order = np.argsort(one)
         one, other = one[order], other[order]
     same = np.ones(len(one), dtype=bool)
-    whole = one is other
+    same_rows = one is other
     for name in GRASP_CONTENT_COLUMNS:
-        if whole and first.same(second, name):
+        if same_rows and first.same(second, name):
             continue
         a, b = first.numbers[name][one], second.numbers[name][other]
         same &= (np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b))

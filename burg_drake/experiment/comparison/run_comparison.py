@@ -16,14 +16,14 @@ from burg_drake.experiment.comparison.agreement_between_runs import (
     both_executed,
 )
 from burg_drake.experiment.comparison.compared_runs import (
-    JudgedRuns,
+    ComparedRuns,
     add_rejudging_engines,
     approach_note,
+    describe_trials,
     differing_settings,
-    outcomes_unpredictable_for,
+    outcomes_unpredictable_for_runs,
     require_common_scene,
     require_same_phases,
-    side_of_trials,
 )
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.confusion_matrix import Flags, compare_paired
@@ -44,7 +44,7 @@ from burg_drake.experiment.comparison.verdict_pairs import (
     PREDICTION_NUMBERS,
     REFERENCE_COLUMNS,
     VerdictPairs,
-    find_tried,
+    find_result_rows,
     is_success_verdict,
     make_pairs,
     predicted_probability,
@@ -83,11 +83,11 @@ def compare(
         first: run whose verdicts are taken as predictions, or its folder.
         second: a trials file, or a run of the same grasps, which then serves as reference.
         trials: a trials file; both runs are then compared with it, and with each other.
-        success: criterion of success; if None that of the trials' plan, or `lifted`.
+        success: criterion of success; if None the criterion in the trials file, or `lifted`.
         placement_limit_mm: maximum offset of every object in trials with good placement [mm].
-        robustness: table of robustness whose shares of success are a predicted probability;
-            `robustness.csv` in the folder of the first run if None and it is there.
-        seed: of the intervals' resampling.
+        robustness: table of robustness, whose shares of success serve as predicted probability; if
+            None, `robustness.csv` in the folder of the first run, if it exists.
+        seed: seed of the intervals' resampling.
 
     Raises:
         InvalidInputError: there are no common grasps to compare.
@@ -103,10 +103,10 @@ def compare(
         return compare_runs(
             first, second, success=success or "lifted", robustness=robustness, seed=seed
         )
-    sheet = second if trials is None else trials
+    trials_path = second if trials is None else trials
     return compare_trials(
         [first] if trials is None else [first, second],
-        Path(str(sheet)),
+        Path(str(trials_path)),
         success=success,
         placement_limit_mm=placement_limit_mm,
         robustness=robustness,
@@ -120,7 +120,7 @@ def is_trials_file(path: Run | Campaign | str | Path) -> bool:
 
 
 def compare_trials(
-    runs: Sequence[Run | Campaign | str | Path],
+    given: Sequence[Run | Campaign | str | Path],
     path: Path,
     *,
     success: Success | None,
@@ -128,11 +128,11 @@ def compare_trials(
     robustness: str | Path | None = None,
     seed: int = 0,
 ) -> Comparison:
-    """Compares one or two runs with the trials of a sheet; see `compare`."""
+    """Compares one or two runs with the trials in a file; see `compare`."""
     sheet = load_trials(path)
     success = success or sheet.selection.success
-    sides = [JudgedRuns.load(run) for run in runs]
-    found_rows = [find_tried(sheet, path, side) for side in sides]
+    sides = [ComparedRuns.load(run) for run in given]
+    found_rows = [find_result_rows(sheet, path, runs) for runs in sides]
     tables = [columns for columns, _ in found_rows]
     left_out = _count_missing([missing for _, missing in found_rows])
     indices = set.intersection(*(set(t["trial"].tolist()) for t in tables))
@@ -142,50 +142,52 @@ def compare_trials(
         reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
         raise InvalidInputError(f"{path}: no trial can be compared yet ({reasons})")
     trials = [sheet.trials[k] for k in chosen]
-    found = []
-    for side, columns in zip(sides, tables, strict=True):
+    pairs_by_side = []
+    for runs, columns in zip(sides, tables, strict=True):
         pairs = _pair_trials(trials, columns, chosen, success)
-        probability = predicted_probability(side, pairs, robustness if side is sides[0] else None)
-        found.append(
+        probability = predicted_probability(runs, pairs, robustness if runs is sides[0] else None)
+        pairs_by_side.append(
             pairs if probability is None else pairs.with_margin(PROBABILITY_MARGIN, probability)
         )
     scenes = [sheet.runs[trial.run].scene.content for trial in trials]
     instances = sides[0].instances_of(set(scenes))
-    there = placement_errors_mm(trials, [instances[scene] for scene in scenes], placement_limit_mm)
-    judged = [
-        _assess_run(pairs, side, sheet, trials, there, placement_limit_mm, seed)
-        for pairs, side in zip(found, sides, strict=True)
+    offsets_mm = placement_errors_mm(
+        trials, [instances[scene] for scene in scenes], placement_limit_mm
+    )
+    judgements = [
+        _assess_run(pairs, runs, sheet, trials, offsets_mm, placement_limit_mm, seed)
+        for pairs, runs in zip(pairs_by_side, sides, strict=True)
     ]
     two = len(sides) == 2
-    asked = [
-        add_rejudging_engines(side.side, pairs.judged_again)
-        for pairs, side in zip(found, sides, strict=True)
+    described = [
+        add_rejudging_engines(runs.described(), pairs.judged_again)
+        for pairs, runs in zip(pairs_by_side, sides, strict=True)
     ]
-    right = [pairs.predicted == pairs.actual for pairs in found]
+    right = [pairs.predicted == pairs.actual for pairs in pairs_by_side]
     strata = selection_strata(sheet, trials)
     return Comparison(
         kind="simulators" if two else "trials",
         success=success,
-        first=asked[0],
-        second=asked[1] if two else None,
-        reference=side_of_trials(sheet, path),
+        first=described[0],
+        second=described[1] if two else None,
+        reference=describe_trials(sheet, path),
         coverage=Coverage(compared=len(trials), left_out=dict(left_out)),
-        judgement=judged[0],
-        other=judged[1] if two else None,
+        judgement=judgements[0],
+        other=judgements[1] if two else None,
         difference=compare_paired(*right, seed=seed) if two else None,
         difference_of_all=strata.agreement(*right, seed=seed).excess if two and strata else None,
         settings=differing_settings(*sides) if two else (),
         notes=(
-            *_comparison_notes(sheet, trials, sides, tables, judged[0]),
-            *(f"{side.path}: {side.engines}" for side in asked if side.judged_again),
+            *_comparison_notes(sheet, trials, sides, tables, judgements[0]),
+            *(f"{side.path}: {side.engines}" for side in described if side.judged_again),
         ),
         seed=seed,
     )
 
 
 def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
-    """Counts of trials without a verdict of a run, by reason; trials without a verdict of either
-    run count once.
+    """Counts of trials without a verdict of a run, by reason. A trial that lacks the verdicts of
+    both runs counts once.
     """
     left_out: Counter[str] = Counter()
     for k in sorted(set[int]().union(*by_side)):
@@ -201,12 +203,13 @@ def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
 def _select_informative(
     sheet: TrialSheet, tables: Sequence[Columns], indices: Sequence[int]
 ) -> tuple[list[int], Counter[str]]:
-    """Selects informative trials; also returns the reasons against the others."""
+    """Selects informative trials; also returns counts of the other trials by reason."""
     left_out: Counter[str] = Counter()
-    silent: dict[int, str] = {}
+    without_prediction: dict[int, str] = {}
     for columns in tables:
         for verdict, rows in rows_without_prediction(TextFactor.of(columns["outcome"])).items():
-            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {verdict}")
+            indices_of_rows = columns["trial"][rows].tolist()
+            without_prediction |= dict.fromkeys(indices_of_rows, f"simulated {verdict}")
     chosen = []
     for k in indices:
         outcome = sheet.trials[k].outcome
@@ -214,8 +217,8 @@ def _select_informative(
             left_out["not carried out yet"] += 1
         elif not outcome.attempted:
             left_out[outcome.value] += 1
-        elif k in silent:
-            left_out[silent[k]] += 1
+        elif k in without_prediction:
+            left_out[without_prediction[k]] += 1
         else:
             chosen.append(k)
     return chosen, left_out
@@ -236,7 +239,7 @@ def _pair_trials(
 
 def _assess_run(
     pairs: VerdictPairs,
-    side: JudgedRuns,
+    runs: ComparedRuns,
     sheet: TrialSheet,
     trials: Sequence[RealTrial],
     offsets_mm: tuple[Array, Array],
@@ -246,13 +249,13 @@ def _assess_run(
     placement = placement_agreement(pairs, *offsets_mm, limit_mm=limit_mm, seed=seed)
     return assess_judge(
         pairs,
-        scenes=side.scenes,
+        scenes=runs.scenes,
         strata=selection_strata(sheet, trials),
         placement=placement,
-        unpredictable=outcomes_unpredictable_for(side),
+        unpredictable=outcomes_unpredictable_for_runs(runs),
         real=True,
         disagreements=list_wrong_verdicts(
-            pairs, side.scenes, [side.folders], trials, offsets_mm[0]
+            pairs, runs.scenes, [runs.folders], trials, offsets_mm[0]
         ),
         seed=seed,
     )
@@ -270,44 +273,44 @@ def selection_strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata |
 def _comparison_notes(
     sheet: TrialSheet,
     trials: Sequence[RealTrial],
-    sides: Sequence[JudgedRuns],
+    sides: Sequence[ComparedRuns],
     tables: Sequence[Columns],
-    judged: Judgement,
+    judgement: Judgement,
 ) -> tuple[str, ...]:
     """Caveats about the figures."""
     notes = []
     hashes = {source.hash for source in sheet.runs.values()}
-    for side, columns in zip(sides, tables, strict=True):
-        own = set(columns["run"].tolist()) & hashes
-        if not own:
+    for runs, columns in zip(sides, tables, strict=True):
+        is_source = not hashes.isdisjoint(columns["run"].tolist())
+        if not is_source:
             notes.append(
-                f"the grasps were not chosen from {side.path}, but from another run of"
+                f"the grasps were not chosen from {runs.path}, but from another run of"
                 " the same grasps"
             )
         changed = [
             sheet.trials[k].number
             for k, outcome in zip(columns["trial"].tolist(), columns["outcome"], strict=True)
-            if own and sheet.trials[k].simulated != outcome
+            if is_source and sheet.trials[k].simulated != outcome
         ]
         if changed:
             notes.append(
-                f"verdicts in {side.path} differ from those in the trials file for "
+                f"verdicts in {runs.path} differ from those in the trials file for "
                 f"{len(changed)} trials, such as trial {changed[0]}; those of the run are"
                 " used"
             )
-    if judged.not_represented:
+    if judgement.not_represented:
         tried = {trial.stratum for trial in trials}
         without = [s for key, s in sheet.strata.items() if s.population and key not in tried]
         kinds = list_names([f"{s.object} ({s.label})" for s in without])
-        every = sum(s.population for s in sheet.strata.values())
+        population = sum(s.population for s in sheet.strata.values())
         notes.append(
-            f"figures for all grasps leave out {judged.not_represented} of the {every}"
+            f"figures for all grasps leave out {judgement.not_represented} of the {population}"
             f" grasps from which the trials were chosen, as no trial of {kinds} was"
             " compared"
         )
-    twice = len(trials) - len({(t.run, t.grasp) for t in trials})
-    if twice:
-        notes.append(f"{twice} trials repeat a grasp; intervals take them as independent")
+    repeated = len(trials) - len({(t.run, t.grasp) for t in trials})
+    if repeated:
+        notes.append(f"{repeated} trials repeat a grasp; intervals take them as independent")
     return tuple(notes)
 
 
@@ -321,20 +324,19 @@ def compare_runs(
 ) -> Comparison:
     """Compares the verdicts of two runs; see `compare`.
 
-    Of runs in different modes only grasps count that both executed, as their other verdicts answer
+    If the runs have different modes, only grasps that both executed count: other verdicts answer
     different questions.
     """
-    sides = JudgedRuns.load(first), JudgedRuns.load(second)
+    sides = ComparedRuns.load(first), ComparedRuns.load(second)
     require_common_scene(*sides)
     require_same_phases(*sides)
     with ThreadPoolExecutor() as pool:  # reading and unpacking release the GIL
-        one, other = pool.map(JudgedRuns.table, sides, (PREDICTION_COLUMNS, REFERENCE_COLUMNS))
-    tables = one, other
-    found = match_rows(one, other)
-    if not len(found.first):
-        raise InvalidInputError(_no_common_grasps_message(sides, found))
-    modes = [side.found.document.mode for side in sides]
-    pairs, others, left_out = pair_runs(tables, found, success, modes[0] == modes[1])
+        one, other = pool.map(ComparedRuns.table, sides, (PREDICTION_COLUMNS, REFERENCE_COLUMNS))
+    match = match_rows(one, other)
+    if not len(match.first):
+        raise InvalidInputError(_no_common_grasps_message(sides, match))
+    modes = [runs.opened.document.mode for runs in sides]
+    pairs, second_rows, left_out = pair_runs((one, other), match, success, modes[0] == modes[1])
     if not len(pairs) and modes[0] != modes[1]:
         raise InvalidInputError(
             f"{sides[0].path} and {sides[1].path} were made in different modes ({modes[0]}"
@@ -345,25 +347,25 @@ def compare_runs(
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY_MARGIN, probability)
     scenes = sides[0].scenes
-    folders = [side.folders for side in sides]
+    folders = [runs.folders for runs in sides]
     wrong = list_wrong_verdicts(pairs, scenes, folders)
-    apart, note = differing_settings(*sides), approach_note(*sides)
-    notes = () if apart else ("the runs have the same settings",)
+    settings, note = differing_settings(*sides), approach_note(*sides)
+    notes = () if settings else ("the runs have the same settings",)
     return Comparison(
         kind="runs",
         success=success,
-        first=add_rejudging_engines(sides[0].side, pairs.judged_again),
-        reference=add_rejudging_engines(sides[1].side, others.texts["judged_again"]),
+        first=add_rejudging_engines(sides[0].described(), pairs.judged_again),
+        reference=add_rejudging_engines(sides[1].described(), second_rows.texts["judged_again"]),
         coverage=Coverage(
             compared=len(pairs),
-            only_first=found.only_first,
-            only_second=found.only_second,
-            other_content=found.other_content,
+            only_first=match.only_first,
+            only_second=match.only_second,
+            other_content=match.other_content,
             left_out=left_out,
         ),
         judgement=assess_judge(pairs, scenes=scenes, disagreements=wrong, seed=seed),
-        agreement=assess_run_agreement(pairs, others, scenes, folders, seed=seed),
-        settings=apart,
+        agreement=assess_run_agreement(pairs, second_rows, scenes, folders, seed=seed),
+        settings=settings,
         notes=(*notes, note) if note else notes,
         seed=seed,
     )
@@ -371,18 +373,22 @@ def compare_runs(
 
 def pair_runs(
     tables: tuple[ResultTable, ResultTable],
-    found: Match,
+    match: Match,
     success: Success,
     same_mode: bool = True,
 ) -> tuple[VerdictPairs, ResultTable, dict[str, int]]:
-    """Pairs of verdicts of the common grasps, their rows of the second run, and counts of omitted
-    grasps by reason. In different modes, grasps that not both executed are omitted.
+    """Pairs the verdicts of two runs. In different modes, grasps that only one run executed, or
+    neither, are omitted.
+
+    Returns:
+        Pairs of verdicts on the common grasps, rows of the second run for these grasps, and counts
+        of omitted grasps by reason.
     """
     numbers = (*MEASURED_MARGINS, "confidence")
-    second = tables[1].take(found.second, numbers)
+    second = tables[1].take(match.second, numbers)
     ended = second.texts["outcome"]
     pairs = make_pairs(
-        tables[0].take(found.first, PREDICTION_NUMBERS),
+        tables[0].take(match.first, PREDICTION_NUMBERS),
         ended,
         is_success_verdict(ended, success),
         success,
@@ -406,14 +412,14 @@ def pair_runs(
     return pairs.take(keep), second.take(np.flatnonzero(keep), numbers), left_out
 
 
-def _no_common_grasps_message(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:
+def _no_common_grasps_message(sides: tuple[ComparedRuns, ComparedRuns], match: Match) -> str:
     paths, place = f"{sides[0].path} and {sides[1].path}", sides[0].grasp_folders_text
-    if found.other_content:
+    if match.other_content:
         return (
-            f"{paths} have {found.other_content} grasps with the same ids, but none with the same"
+            f"{paths} have {match.other_content} grasps with the same ids, but none with the same"
             f" pose and width; evaluate the second run with the grasps of the first ({place})"
         )
     return (
-        f"{paths} have no grasp in common ({found.only_first} and {found.only_second} are judged);"
+        f"{paths} have no grasp in common ({match.only_first} and {match.only_second} are judged);"
         f" evaluate the second run with the grasps of the first ({place})"
     )

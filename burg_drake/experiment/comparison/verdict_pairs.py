@@ -19,7 +19,7 @@ from burg_drake.evaluation import (
     find_robustness_table,
     lifted_shares,
 )
-from burg_drake.experiment.comparison.compared_runs import JudgedRuns, list_scene_names
+from burg_drake.experiment.comparison.compared_runs import ComparedRuns, list_scene_names
 from burg_drake.experiment.comparison.confusion_matrix import Flags, Values
 from burg_drake.experiment.comparison.margin_calibration import PREDICTOR_COLUMNS
 from burg_drake.experiment.comparison.result_table import (
@@ -59,7 +59,7 @@ class VerdictPairs:
         simulated, stage, blocker: the verdict.
         judged_again: engine of the verdict; empty for the run's own engine.
         confidence: (N,) confidences of the verdicts; NaN if there is none.
-        ended: actual outcome: of a trial, or of the other run.
+        ended: actual outcome, of the real trial or of the other run.
         predicted, actual: (N,) whether verdict and outcome are success.
         margins: (N,) margins of the verdicts by name.
     """
@@ -139,14 +139,14 @@ def rows_without_prediction(simulated: TextFactor) -> dict[str, Flags]:
 
 
 def predicted_probability(
-    judged: JudgedRuns, pairs: VerdictPairs, table: str | Path | None = None
+    runs: ComparedRuns, pairs: VerdictPairs, table: str | Path | None = None
 ) -> Array | None:
-    """Share of lifted perturbed repeats.
+    """Share of a grasp's perturbed repeats that were lifted.
 
     Args:
-        judged: the run of the grasps.
-        pairs: N verdicts of the run.
-        table: table of robustness; those in the folders of its runs if None.
+        runs: the runs of the verdicts.
+        pairs: N verdicts.
+        table: table of robustness; tables in the folders of the runs if None.
 
     Returns:
         (N,) probabilities, NaN for untested grasps; None without a table.
@@ -154,90 +154,92 @@ def predicted_probability(
     Raises:
         InvalidInputError: a table cannot be read, or belongs to another run.
     """
-    found = judged.found
-    known: dict[tuple[str, str], float] = {}
-    places = _find_tables(found, None if table is None else Path(table))
-    for runs, path in places:
-        known |= lifted_shares(
-            path, runs, None if isinstance(found, Campaign) else found.candidates.id
+    opened = runs.opened
+    shares: dict[tuple[str, str], float] = {}
+    tables = _find_tables(opened, None if table is None else Path(table))
+    for hashes, path in tables:
+        shares |= lifted_shares(
+            path, hashes, None if isinstance(opened, Campaign) else opened.candidates.id
         )
-    if not places:
+    if not tables:
         return None
     values = np.full(len(pairs), np.nan)
-    tested = {hash for hash, _ in known}
+    tested = {hash for hash, _ in shares}
     rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
     for row in rows.tolist():
-        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
+        values[row] = shares.get((pairs.run[row], pairs.id[row]), np.nan)
     return values
 
 
-def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
-    """Tables, with the runs that they may belong to."""
-    folders = {found.document.hash: found.path}
-    if isinstance(found, Campaign):
-        folders = {state.run: found.folder(n) for n, state in found.states.items() if state.run}
+def _find_tables(opened: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
+    """Tables of robustness, with the hashes of the runs that each may belong to."""
+    folders = {opened.document.hash: opened.path}
+    if isinstance(opened, Campaign):
+        folders = {state.run: opened.folder(n) for n, state in opened.states.items() if state.run}
     if table is not None:
         return [(set(folders), table)]
-    own = {run: find_robustness_table(folder) for run, folder in folders.items()}
-    return [({run}, path) for run, path in own.items() if path is not None]
+    tables = {hash: find_robustness_table(folder) for hash, folder in folders.items()}
+    return [({hash}, path) for hash, path in tables.items() if path is not None]
 
 
 @dataclass(frozen=True, eq=False)
 class _TriedTable:
-    """A run with the content of its tried grasps by id."""
+    """A run with the content hashes of its tried grasps by id."""
 
     run: Run
     contents: dict[str, str]
 
     @cached_property
     def rows(self) -> dict[str, int]:
-        """Indices of its result rows by grasp."""
+        """Indices of the run's result rows by grasp id."""
         return {id: row for row, id in enumerate(self.run.results["id"].tolist())}
 
 
-def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns, dict[int, str]]:
-    """Result rows of the tried grasps.
+def find_result_rows(
+    sheet: TrialSheet, path: Path, runs: ComparedRuns
+) -> tuple[Columns, dict[int, str]]:
+    """Finds the result rows of the tried grasps.
 
     Args:
         sheet: contents of the trials file.
         path: the trials file, for messages.
-        side: the run, of one scene or of many.
+        runs: runs of one scene or of many.
 
     Returns:
-        Columns `PREDICTION_COLUMNS` for the trials that have a row, with their index in the sheet
-        as `trial`; and reasons why other trials have none, by index.
+        Columns `PREDICTION_COLUMNS` for the trials that have a row, and column `trial` with the
+        index of the trial in the file; reasons why other trials have no row, by index.
 
     Raises:
         InvalidInputError: no trial has a row, or a grasp differs from the planned one.
     """
     tables: dict[str, list[_TriedTable]] = {}
     tried = {trial.grasp for trial in sheet.trials}
-    for run in side.runs_of({source.scene.content for source in sheet.runs.values()}):
+    for run in runs.runs_of({source.scene.content for source in sheet.runs.values()}):
         table = _TriedTable(run, grasp_contents(run, tried))
         tables.setdefault(run.document.scene.content, []).append(table)
     found: list[tuple[int, _TriedTable, int]] = []
     missing: dict[int, str] = {}
     for k, trial in enumerate(sheet.trials):
         source = sheet.runs[trial.run]
-        there = tables.get(source.scene.content, [])
-        holds = [t for t in there if t.contents.get(trial.grasp) == trial.content]
-        judged = [t for t in holds if trial.grasp in t.rows]
-        if judged:
-            judged.sort(key=lambda t: t.run.document.hash != source.hash)
-            found.append((k, judged[0], judged[0].rows[trial.grasp]))
+        of_scene = tables.get(source.scene.content, [])
+        with_grasp = [t for t in of_scene if t.contents.get(trial.grasp) == trial.content]
+        with_verdict = [t for t in with_grasp if trial.grasp in t.rows]
+        if with_verdict:
+            with_verdict.sort(key=lambda t: t.run.document.hash != source.hash)
+            found.append((k, with_verdict[0], with_verdict[0].rows[trial.grasp]))
         else:
-            own = [t for t in there if t.run.document.hash == source.hash]
-            _reject_changed_grasp(trial, own, path)
-            elsewhere = "is not there" if there else "is of another scene"
-            missing[k] = "is not judged" if holds else elsewhere
+            sources = [t for t in of_scene if t.run.document.hash == source.hash]
+            _reject_changed_grasp(trial, sources, path)
+            elsewhere = "is not there" if of_scene else "is of another scene"
+            missing[k] = "is not judged" if with_grasp else elsewhere
     if not found:
-        raise InvalidInputError(_no_common_grasps_message(sheet, path, side, missing))
+        raise InvalidInputError(_no_tried_grasps_message(sheet, path, runs, missing))
     return _result_columns(found), missing
 
 
-def _reject_changed_grasp(trial: RealTrial, own: Sequence[_TriedTable], path: Path) -> None:
-    """Refuses a trial whose own run has a different grasp with its id, or none."""
-    for table in own:
+def _reject_changed_grasp(trial: RealTrial, sources: Sequence[_TriedTable], path: Path) -> None:
+    """Refuses a trial if the run that its grasp was chosen from has another grasp with this id."""
+    for table in sources:
         content = table.contents.get(trial.grasp)
         if content and content != trial.content:
             raise InvalidInputError(
@@ -247,8 +249,8 @@ def _reject_changed_grasp(trial: RealTrial, own: Sequence[_TriedTable], path: Pa
             )
 
 
-def _no_common_grasps_message(
-    sheet: TrialSheet, path: Path, side: JudgedRuns, missing: Mapping[int, str]
+def _no_tried_grasps_message(
+    sheet: TrialSheet, path: Path, runs: ComparedRuns, missing: Mapping[int, str]
 ) -> str:
     if not sheet.trials:
         return f"{path} has no trials; burg-drake trials plan chooses some"
@@ -256,11 +258,11 @@ def _no_common_grasps_message(
     if set(missing.values()) == {"is of another scene"}:
         theirs = {s.scene.content[:HASH_DIGITS]: s.scene.name for s in sources}
         what = (
-            f"{path} is about scene {list_scene_names(theirs)}, but {side.path} holds"
-            f" {list_scene_names(side.scenes)}"
+            f"{path} is about scene {list_scene_names(theirs)}, but {runs.path} holds"
+            f" {list_scene_names(runs.scenes)}"
         )
     else:
-        what = f"no grasp of {path} is judged in {side.path}, which is on the same scene"
+        what = f"no grasp of {path} is judged in {runs.path}, which is on the same scene"
     meant = list_names([f"{source.path} ({source.hash})" for source in sources])
     return (
         f"{what}; give the run from which the trials were chosen, {meant}, or one of the same"

@@ -1,7 +1,7 @@
 """Scenes with objects away from their planned poses, by random errors or as measured.
 
-The robot moves to the planned grasp, so X_WG stays. A displaced object is grasped at X_O'G =
-inv(X_WO') X_WO X_OG.
+The robot moves to the planned grasp, so X_WG stays. With O the frame of an object as planned and D
+its frame as displaced, the object is grasped at X_DG = inv(X_WD) X_WO X_OG.
 
 Random placement errors follow from the seed, the object's name and the number of the scene. Errors
 that make objects overlap or leave the board are redrawn. Measured poses are corrected where
@@ -40,8 +40,8 @@ def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
 
     Args:
         scene: as planned.
-        X_SO: (4, 4) poses in the scene frame by name of an instance. A pose that equals the planned
-            one bit for bit changes nothing, so the scene keeps its content if all do.
+        X_SO: (4, 4) poses in the scene frame by name of an instance. Poses that equal the planned
+            ones bit for bit change nothing; if all do, the scene itself is returned.
     """
     instances = tuple(
         replace(instance, X_SO=Pose.from_matrix(X_SO[name], quaternion=True))
@@ -66,36 +66,36 @@ def save_displaced_scene(scene: Scene, path: Path) -> None:
     save_scene(replace(scene.document, library=library), path)
 
 
-def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) -> Array:
+def grasps_as_commanded(planned: Scene, displaced: Scene, instance: str, X_OG: Array) -> Array:
     """(N, 4, 4) or (4, 4) grasps in the frame of the displaced object, for a hand that moves to the
     planned poses.
 
     Args:
-        planned, now: the scene as planned and as displaced.
+        planned, displaced: the scene as planned and as displaced.
         instance: the target.
         X_OG: (N, 4, 4) or (4, 4) grasps as planned; returned unchanged if the object is not
             displaced.
     """
-    there, here = planned.X_SO(instance), now.X_SO(instance)
-    if np.array_equal(there, here):
+    X_SO, X_SD = planned.X_SO(instance), displaced.X_SO(instance)
+    if np.array_equal(X_SO, X_SD):
         return X_OG
-    X_OO = inverse(here) @ there
-    moved: Array = X_OO @ X_OG
+    X_DO = inverse(X_SD) @ X_SO
+    moved: Array = X_DO @ X_OG
     moved[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
     return moved
 
 
-def candidates_as_commanded(planned: Scene, now: Scene, candidates: Candidates) -> Candidates:
+def candidates_as_commanded(planned: Scene, displaced: Scene, candidates: Candidates) -> Candidates:
     """Applies `grasps_as_commanded` to all grasps of a run; ids stay the same."""
     X_OG = candidates.grasps.X_OG.copy()
     for name in np.unique(candidates.instance).tolist():
-        of = candidates.instance == name
-        X_OG[of] = grasps_as_commanded(planned, now, name, X_OG[of])
+        rows = candidates.instance == name
+        X_OG[rows] = grasps_as_commanded(planned, displaced, name, X_OG[rows])
     return Candidates(replace(candidates.grasps, X_OG=X_OG), candidates.instance)
 
 
 MAX_PLACEMENT_DRAWS = 200
-"""Maximum number of draws for one object; then it stays as planned."""
+"""Maximum number of draws for one object. If all are rejected, the object stays as planned."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +105,7 @@ class PlacementNoise:
     Attributes:
         place: standard deviation along x and along y of the scene frame [m].
         turn: standard deviation of the turn about z [rad].
-        seed: of the errors.
+        seed: random seed of the errors.
     """
 
     place: float = setting(
@@ -161,14 +161,14 @@ def noisy_scene(
     """Displaces every free object.
 
     Args:
-        scene: as planned; sound.
+        scene: as planned, without errors.
         noise: placement errors.
-        number: number of the scene among those with this noise.
+        number: number of the displaced scene, from which the errors follow, as from the seed.
         issues: finds the issues of a scene, such as `SceneCheck.issues`. Issues of the planned
             scene are ignored.
 
     Returns:
-        A scene without errors; objects involved in one are redrawn until there is none.
+        A scene without errors: objects involved in an error are drawn again.
     """
     if noise.place == noise.turn == 0.0:
         return NoisyScene(scene, dict.fromkeys(scene.instances, 0))
@@ -180,11 +180,11 @@ def noisy_scene(
             if draws[name] < MAX_PLACEMENT_DRAWS
         }
         drawn = displaced_scene(scene, X_SO)
-        wrong = _objects_to_redraw(issues(drawn), X_SO)
-        if not wrong:
+        rejected = _objects_to_redraw(issues(drawn), X_SO)
+        if not rejected:
             kept = tuple(name for name in draws if name not in X_SO)
             return NoisyScene(drawn, draws, kept)
-        for name in wrong:
+        for name in rejected:
             draws[name] += 1
 
 
@@ -213,16 +213,16 @@ def move_on_board(scene: Scene, name: str, p_S: Array, angle: float) -> Array:
 
 
 def _objects_to_redraw(issues: Iterable[SceneIssue], movable: Iterable[str]) -> set[str]:
-    """Movable objects involved in errors; both of two that overlap."""
+    """Movable objects involved in errors; of an overlap both objects."""
     pairs = ((issue.instance, issue.other) for issue in issues if issue.is_error)
     return {name for pair in pairs for name in pair}.intersection(movable)
 
 
-MAX_HEIGHT_ERROR = 0.005  # metres; larger differences in height are no measuring errors
+MAX_HEIGHT_ERROR = 0.005  # metres; a larger difference in height is real
 MAX_TILT_ERROR = math.radians(5.0)  # an object with a larger tilt has fallen over
 
-
 Issues = Callable[[Scene], Iterable[SceneIssue]]
+"""Finds the issues of a scene, such as `SceneCheck.issues`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,9 +230,9 @@ class MeasuredScene:
     """A scene built from measured poses.
 
     Attributes:
-        scene: the scene; None if it is impossible, with the `reason`.
+        scene: the scene; None if it is impossible.
         notes: deviations from the measurements, one clause each.
-        reason: one line; empty if there is a scene.
+        reason: reason for an impossible scene, one line; empty if there is a scene.
     """
 
     scene: Scene | None
@@ -259,8 +259,8 @@ def measured_scene(
     for name in scene.instances:
         place = placement.get(name)
         if place is None or place.status != "measured" or place.X_SO is None:
-            why = "not measured" if place is None else place.status.replace("_", " ")
-            notes.append(f"{name} as planned ({why if why != 'measured' else 'no pose'})")
+            reason = "not measured" if place is None else place.status.replace("_", " ")
+            notes.append(f"{name} as planned ({reason if reason != 'measured' else 'no pose'})")
             continue
         X_SO[name], note = correct_height_and_tilt(scene.X_SO(name), place.X_SO.matrix())
         notes += [f"{name} {note}"] if note else []
@@ -270,28 +270,28 @@ def measured_scene(
         return MeasuredScene(None, tuple(notes), " ".join(str(error).split()))
 
 
-def correct_height_and_tilt(target: Array, measured: Array) -> tuple[Array, str]:
+def correct_height_and_tilt(planned: Array, measured: Array) -> tuple[Array, str]:
     """Replaces height and tilt of a measured pose by the planned ones, if they differ by measuring
     errors only.
 
-    As an object stands in one of its stable poses, a measurement only tells its position and its
+    An object stands in one of its stable poses, so a measurement only tells its position and its
     turn about the vertical.
 
     Args:
-        target, measured: (4, 4) poses in the scene frame.
+        planned, measured: (4, 4) poses in the scene frame.
 
     Returns:
         The pose, and a description of the correction; empty below 0.1 mm and 0.1 degrees.
     """
-    if np.array_equal(target, measured):
-        return target, ""
-    R_turned = _rotation_about_z(measured[:3, :3] @ target[:3, :3].T) @ target[:3, :3]
+    if np.array_equal(planned, measured):
+        return planned, ""
+    R_turned = _rotation_about_z(measured[:3, :3] @ planned[:3, :3].T) @ planned[:3, :3]
     tilt = float(rotation_angle(R_turned.T @ measured[:3, :3]))
-    height = float(measured[2, 3] - target[2, 3])
+    height = float(measured[2, 3] - planned[2, 3])
     if tilt > MAX_TILT_ERROR or abs(height) > MAX_HEIGHT_ERROR:
         return measured, ""
     X = measured.copy()
-    X[:3, :3], X[2, 3] = R_turned, target[2, 3]
+    X[:3, :3], X[2, 3] = R_turned, planned[2, 3]
     parts = []
     if abs(height) > 1e-4:
         parts.append(f"{1e3 * abs(height):.1f} mm {'lower' if height > 0 else 'higher'}")
@@ -314,33 +314,35 @@ def _separate_objects(
     max_iterations = 20
     max_shift = 0.005  # metres
     start = displaced_scene(scene, X_SO)
-    now, shift = start, {name: np.zeros(3) for name in scene.instances}
+    separated, shift = start, {name: np.zeros(3) for name in scene.instances}
     for _ in range(max_iterations):
-        errors = [issue for issue in issues(now) if _is_significant(issue)]
+        errors = [issue for issue in issues(separated) if _is_significant(issue)]
         if not errors:
             break
         for issue in errors:
             if issue.kind != "overlap" or issue.other not in scene.instances:
                 return MeasuredScene(None, tuple(notes), issue.message)
-            half = _half_overlap(now, issue)
+            half = _half_overlap(separated, issue)
             shift[issue.instance] += half
             shift[issue.other] -= half
         if any(np.linalg.norm(p) > max_shift for p in shift.values()):
             return MeasuredScene(None, tuple(notes), errors[0].message)
         moved = {*X_SO, *_shifted_objects(shift)}
-        now = displaced_scene(scene, {n: move_on_board(start, n, shift[n], 0.0) for n in moved})
+        poses = {name: move_on_board(start, name, shift[name], 0.0) for name in moved}
+        separated = displaced_scene(scene, poses)
     else:
         return MeasuredScene(None, tuple(notes), errors[0].message)
     notes += [
         f"{name} moved by {1e3 * np.linalg.norm(shift[name]):.1f} mm, out of another object"
         for name in _shifted_objects(shift)
     ]
-    return MeasuredScene(now, tuple(notes))
+    return MeasuredScene(separated, tuple(notes))
 
 
 def _is_significant(issue: SceneIssue) -> bool:
-    """Whether an issue makes the trial differ from that of the measured scene. The board is paper,
-    and a hovering object falls, which matters only if it falls far.
+    """Whether an issue makes a trial in the measured scene differ from the real trial. The board is
+    paper, so objects may stand beside it; a hovering object falls, which matters only if it falls
+    far.
     """
     if issue.kind == "out_of_bounds":
         return issue.amount > 0.05  # metres

@@ -11,9 +11,9 @@ tried_HASH/NNN/        further grasps, of real trials
 gap.yaml               the settings
 gap.html, gap.json     the results
 
-A run in mode `reach` has the same trials of the hand as a run in mode `hand`. So its verdicts are
-taken from there. Only the screens are repeated, and a trial is executed again only if the arm can
-lift less far than the hand.
+A run in mode `reach` has the same trials of the hand as a run in mode `hand`, so the step reuses
+the verdicts of the hand. Only the screens are repeated, and a trial is executed again only if the
+arm can lift less far than the hand.
 """
 
 from __future__ import annotations
@@ -108,15 +108,15 @@ def measure_gap(
     """Judges the same grasps step by step; a repeated call continues where an earlier one stopped.
 
     Args:
-        source: a scene; or a run, whose grasps are judged with its scene, station, engine and
-            motion, and which itself is the step of its mode.
+        source: a scene, or a complete run. The grasps of a run are judged with its scene, station,
+            engine and motion, and the run itself is the step of its mode.
         out: folder; created if necessary.
-        station: station for a scene.
-        grasps: grasps for `evaluate`, with a scene; sampled if None.
-        evaluation: settings for `evaluate`, with a scene: engine, motion and sampling. The step
-            sets the mode.
-        settings: steps; if None all that the station allows, and five displaced scenes.
-        tried: ids of grasps of real trials, which are judged in displaced scenes even if they fail
+        station: station, if `source` is a scene.
+        grasps: grasps for `evaluate`, if `source` is a scene; sampled if None.
+        evaluation: settings for `evaluate`, if `source` is a scene: engine, motion and sampling.
+            Each step sets the mode.
+        settings: steps; if None all steps that the station allows, and five displaced scenes.
+        tried: ids of grasps of real trials. They are judged in displaced scenes even if they fail
             in the last mode.
         executor: executor; if None as many processes as there are processors.
         progress: as for `evaluate`.
@@ -146,11 +146,11 @@ def measure_gap(
     document = _make_document(run, scene, station, last, settings)
     _start_folder(path, document)
     options = {"executor": executor, "progress": progress}
-    begin = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
+    first = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
     steps: list[GapStep] = []
     for mode in MODES[: MODES.index(last) + 1]:
-        made = _judge_in_mode(mode, run, steps, scene, station, path, options, begin)
-        steps.append(GapStep(mode, (made,)))
+        run_in_mode = _judge_in_mode(mode, run, steps, scene, station, path, options, first)
+        steps.append(GapStep(mode, (run_in_mode,)))
     extra: tuple[Run, ...] = ()
     if samples:
         run = steps[-1].runs[0]
@@ -158,15 +158,15 @@ def measure_gap(
         scenes = [noisy_scene(scene, noise, k, issues) for k in range(1, samples + 1)]
         held = [id for id, v in run.verdicts.items() if v.outcome.held]
         others = sorted({*tried}.intersection(run.candidates.id).difference(held))
-        placing = _DisplacedJudging(
-            run, scene, station, path, [one.scene for one in scenes], options
+        judging = _DisplacedJudging(
+            run, scene, station, path, [noisy.scene for noisy in scenes], options
         )
-        steps.append(GapStep("placed", placing.judge(held, "placed")))
-        extra = placing.judge(others, f"tried_{content_hash(others)[:8]}")
+        steps.append(GapStep("placed", judging.judge(held, "placed")))
+        extra = judging.judge(others, f"tried_{content_hash(others)[:8]}")
         document = replace(
             document,
-            redrawn=tuple(one.redrawn for one in scenes),
-            kept={f"{k:03d}": one.kept for k, one in enumerate(scenes, 1) if one.kept},
+            redrawn=tuple(noisy.redrawn for noisy in scenes),
+            kept={f"{k:03d}": noisy.kept for k, noisy in enumerate(scenes, 1) if noisy.kept},
         )
     save_document(document, path / GAP_DOCUMENT_FILE, GAP_DOCUMENT_HEADER)
     return GapSteps(path, document, tuple(steps), extra)
@@ -204,10 +204,10 @@ def _start_folder(path: Path, document: GapDocument) -> None:
             save_document(document, file, GAP_DOCUMENT_HEADER)
 
 
-def _require_same_settings(path: Path, there: GapDocument, document: GapDocument) -> None:
+def _require_same_settings(path: Path, existing: GapDocument, document: GapDocument) -> None:
     """Refuses a folder with other steps; only the number of displaced scenes may grow."""
     for name in ("source", "scene", "station", "place_mm", "turn_deg", "seed"):
-        old, new = getattr(there, name), getattr(document, name)
+        old, new = getattr(existing, name), getattr(document, name)
         if old != new:
             raise InvalidInputError(
                 f"{path} has steps of another measurement ({name} is {_short_value(old)} there,"
@@ -227,23 +227,18 @@ def _judge_in_mode(
     station: Station,
     path: Path,
     options: dict[str, Any],
-    begin: dict[str, Any],
+    first: dict[str, Any],
 ) -> Run:
+    """Runs the step of a mode, unless the given run is this step. The arguments of `evaluate` are
+    those of an earlier run, or `first` if there is none.
+    """
     if run is not None and run.document.mode == mode:
         return run
-    if not steps and run is None:
-        return evaluate(scene, station, path / mode, **_arguments_in_mode(begin, mode), **options)
-    like = run if not steps else steps[0].runs[0]
-    assert like is not None
+    earlier = steps[0].runs[0] if steps else run
+    arguments = first if earlier is None else _recorded_arguments(earlier)
     if mode == "reach":
         _start_reach_run(steps[0].runs[0], scene, station, path / mode, options)
-    return evaluate(
-        scene,
-        station,
-        path / mode,
-        **_arguments_in_mode(_recorded_arguments(like), mode),
-        **options,
-    )
+    return evaluate(scene, station, path / mode, **_arguments_in_mode(arguments, mode), **options)
 
 
 def _recorded_arguments(run: Run) -> dict[str, Any]:
@@ -259,15 +254,17 @@ def _recorded_arguments(run: Run) -> dict[str, Any]:
     return {"grasps": group_candidates_by_instance(run.candidates), "settings": settings}
 
 
-def _arguments_in_mode(asked: dict[str, Any], mode: Mode) -> dict[str, Any]:
-    """The arguments of `evaluate` in another mode; the whole arm approaches anyway."""
-    settings = asked["settings"]
+def _arguments_in_mode(arguments: dict[str, Any], mode: Mode) -> dict[str, Any]:
+    """The arguments of `evaluate` in another mode, without setting `approach` for the whole arm,
+    which always approaches.
+    """
+    settings = arguments["settings"]
     approach = settings.approach and mode != "arm"
-    return {**asked, "settings": replace(settings, mode=mode, approach=approach)}
+    return {**arguments, "settings": replace(settings, mode=mode, approach=approach)}
 
 
 def group_candidates_by_instance(candidates: Candidates) -> dict[str, GraspSet]:
-    """The grasps by name of their instance."""
+    """The grasps by name of the instance."""
     names = dict.fromkeys(candidates.instance.tolist())
     return {n: candidates.grasps.select(np.flatnonzero(candidates.instance == n)) for n in names}
 
@@ -318,24 +315,28 @@ class _DisplacedJudging:
     options: dict[str, Any]
 
     def judge(self, ids: Sequence[str], folder: str) -> tuple[Run, ...]:
-        """Judges grasps in each displaced scene; returns no runs without grasps."""
+        """Judges grasps in each displaced scene; returns no runs if there are no grasps."""
         if not ids:
             return ()
-        of, chosen = self.run.candidates, set(ids)
-        rows = np.flatnonzero([id in chosen for id in of.id])
-        candidates = Candidates(of.grasps.select(rows), of.instance[rows])
+        candidates, chosen = self.run.candidates, set(ids)
+        rows = np.flatnonzero([id in chosen for id in candidates.id])
+        selected = Candidates(candidates.grasps.select(rows), candidates.instance[rows])
         return tuple(
-            self._judge(candidates, scene, f"{number:03d}", folder)
+            self._judge_in_scene(selected, scene, f"{number:03d}", folder)
             for number, scene in enumerate(self.scenes, 1)
         )
 
-    def _judge(self, candidates: Candidates, scene: Scene, number: str, folder: str) -> Run:
+    def _judge_in_scene(
+        self, candidates: Candidates, scene: Scene, number: str, folder: str
+    ) -> Run:
         path = self.path / "scenes" / f"{number}.yaml"
         save_displaced_scene(scene, path)
-        now = load_scene(path)
-        moved = candidates_as_commanded(self.scene, now, candidates)
-        same = _recorded_arguments(self.run) | {"grasps": group_candidates_by_instance(moved)}
-        return evaluate(now, self.station, self.path / folder / number, **same, **self.options)
+        displaced = load_scene(path)
+        moved = candidates_as_commanded(self.scene, displaced, candidates)
+        arguments = _recorded_arguments(self.run)
+        arguments["grasps"] = group_candidates_by_instance(moved)
+        out = self.path / folder / number
+        return evaluate(displaced, self.station, out, **arguments, **self.options)
 
 
 @dataclass(frozen=True)
@@ -368,22 +369,21 @@ def reach_verdicts(
     hand: Run,
     known: Mapping[str, Verdict],
     *,
-    executor: Executor | None = None,
-    progress: bool | Listener = True,
+    executor: Executor,
+    progress: bool | Listener,
 ) -> Iterator[tuple[str, Verdict]]:
-    """Verdicts of mode `reach` on the grasps of a run of the hand, as `evaluate` gives them bit for
-    bit.
+    """Verdicts of mode `reach` on the grasps of a run of the hand, equal to those of `evaluate` bit
+    for bit.
 
     Args:
         hand: a complete run in mode `hand`.
-        known: existing verdicts.
+        known: existing verdicts by grasp id.
         executor: executor of the judgements.
         progress: see `evaluate`.
 
     Yields:
-        Ids and verdicts of the other grasps.
+        Ids and verdicts of the grasps without an existing verdict.
     """
-    executor = LocalExecutor.of_this_machine() if executor is None else executor
     origin = origin_of(hand.document)
     build = StationJudgeFactory(
         hand.scene(), hand.station(), origin.engine, "reach", origin.settings(f"{hand.path}: trial")
@@ -409,7 +409,7 @@ def _was_executed(verdict: Verdict) -> bool:
 
 
 def _add_trial_time(verdict: Verdict, trial: Verdict | None) -> Verdict:
-    """A copy of the verdict with the time of the original trial."""
+    """A copy of a verdict with the computing time of the hand's trial, if the verdict reuses it."""
     if trial is None or verdict.stage is not Stage.EXECUTED or Stage.EXECUTED not in trial.cpu:
         return verdict
     return replace(verdict, cpu={**verdict.cpu, Stage.EXECUTED: trial.cpu[Stage.EXECUTED]})

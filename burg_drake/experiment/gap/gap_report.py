@@ -85,7 +85,7 @@ def gap_page(
         objects_section(steps, success),
         *(change_section(change) for change in found),
         push_section(steps),
-        reality_table(agreement).section() if agreement and agreement[0].found.trials else None,
+        reality_table(agreement).section() if agreement and agreement[0].selected.trials else None,
         _reproduction_section(steps, command_line),
     )
 
@@ -97,13 +97,13 @@ def _subtitle(steps: GapSteps, success: Success) -> str:
     return f"{about}; success: {counts}"
 
 
-def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
-    whole = len(steps.first.candidates)
-    entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
-    first = found[0].successes if found else 0
-    if found and found[0].step != "placed":
+def _tiles(steps: GapSteps, changes: Sequence[Change]) -> list[tuple[str, Child, str]]:
+    grasps = len(steps.first.candidates)
+    entries: list[tuple[str, Child, str]] = [("Grasps", f"{grasps}", "the same in every step")]
+    first = changes[0].successes if changes else 0
+    if changes and changes[0].step != "placed":
         entries.append((GAP_STEP_TITLES["hand"].capitalize(), f"{first}", "succeed"))
-    for change in found:
+    for change in changes:
         left = change.successes - len(change.lost) + len(change.won)
         if change.step == "placed":
             share = format_percent(left / change.successes) if change.successes else "-"
@@ -154,9 +154,9 @@ GAP_STEP_DESCRIPTIONS = {
 """Description of each step."""
 
 
-def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
+def flow_section(steps: GapSteps, changes: Sequence[Change]) -> Html | None:
     """Section with the chart of all steps."""
-    if not found:
+    if not changes:
         return None
     columns = []
     for step in steps.steps:
@@ -170,17 +170,16 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
         "How grasps end in each step; the colour of a band is that of the outcome in the"
         " next step. In displaced scenes only grasps that succeeded in the step before"
         " are tried, each once a scene.",
-        element("div", flow_chart(columns, [c.flow for c in found], scale), class_="scroll"),
+        element("div", flow_chart(columns, [c.flow for c in changes], scale), class_="scroll"),
     )
 
 
 def objects_section(steps: GapSteps, success: Success) -> Html:
     """Section with the successes of each object in each step."""
     by_step = [successes_by_object(step, success) for step in steps.steps]
-    whole = by_step[0]
     head = ["grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
     rows = []
-    for name, (_, grasps) in whole.items():
+    for name, (_, grasps) in by_step[0].items():
         cells: list[Child] = [grasps]
         for step, counts in zip(steps.steps, by_step, strict=True):
             good, all = counts.get(name, (0, 0))
@@ -212,15 +211,15 @@ def change_section(change: Change) -> Html:
 
 
 def _flow_table(change: Change) -> Html:
-    """Table of outcomes that differ before and after."""
-    moved = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
+    """Table of outcomes that differ before and after the step."""
+    changed = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
     found = FindingTable().texts("before", "after").numbers("grasps").texts("in the way")
-    for (before, after), count in sorted(moved.items(), key=lambda item: -item[1]):
+    for (before, after), count in sorted(changed.items(), key=lambda item: -item[1]):
         blockers = Counter(
             m.blocker for m in change.moves if (m.before, m.after) == (before, after) and m.blocker
         )
-        by = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
-        found.row(outcome_label(before), outcome_label(after), count, by or "-")
+        names = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
+        found.row(outcome_label(before), outcome_label(after), count, names or "-")
     return found.page_table()
 
 
@@ -229,12 +228,12 @@ def _objects_table(change: Change) -> Html | None:
     lost = Counter(move.object for move in change.lost)
     if not lost:
         return None
-    had = Counter(m.object for m in change.moves if m.lost or m.before.held)
+    held_before = Counter(m.object for m in change.moves if m.lost or m.before.held)
     found = FindingTable().names("object").numbers("lost").texts("what they become")
     for name, count in lost.most_common():
         into = Counter(m.after for m in change.lost if m.object == name)
         outcomes = ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))
-        found.row(name, f"{count} of {had[name]}", outcomes)
+        found.row(name, f"{count} of {held_before[name]}", outcomes)
     return found.page_table()
 
 
@@ -247,8 +246,8 @@ def _change_list(change: Change) -> Html:
     for move in moves:
         before, after = outcome_label(move.before), outcome_label(move.after)
         line = shlex.join(replay_arguments(move.run, move.grasp))
-        words = element("code", move.grasp), element("code", line, class_="copy")
-        found.row(words[0], before, after, move.blocker or "-", words[1])
+        grasp, replay = element("code", move.grasp), element("code", line, class_="copy")
+        found.row(grasp, before, after, move.blocker or "-", replay)
     first = shlex.join(replay_arguments(moves[0].run, moves[0].grasp))
     more = f", the first {max_rows} of {len(moves)}" if len(moves) > max_rows else ""
     inside = join(
@@ -260,15 +259,15 @@ def _change_list(change: Change) -> Html:
 
 
 def push_section(steps: GapSteps) -> Html | None:
-    """Section on the push of objects by the hand before it closes."""
+    """Section on objects that the hand pushes before it closes."""
     arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
     columns = {} if arm is None else arm.results
     sentence = count_pushes(columns)
     if sentence is None:
         return None
-    went = np.isfinite(columns["pushed"])
-    missing = np.full(len(went), np.nan)
-    target = np.array(
+    measured = np.isfinite(columns["pushed"])
+    missing = np.full(len(measured), np.nan)
+    target_push = np.array(
         [
             columns.get(f"{PUSHED_PREFIX}{name}", missing)[k]
             for k, name in enumerate(columns["instance"])
@@ -276,19 +275,19 @@ def push_section(steps: GapSteps) -> Html | None:
     )
     rows = []
     for name in dict.fromkeys(columns["object"].tolist()):
-        of = went & (columns["object"] == name)
-        if not of.any():
+        of_object = measured & (columns["object"] == name)
+        if not of_object.any():
             continue
-        values = 1e3 * target[of]
-        moved = values > 1e3 * MIN_PUSH
-        held = np.array([Outcome(o).held for o in columns["outcome"][of]])
+        push_mm = 1e3 * target_push[of_object]
+        pushed = push_mm > 1e3 * MIN_PUSH
+        held = np.array([Outcome(o).held for o in columns["outcome"][of_object]])
         cells: list[Child] = [
-            int(of.sum()),
-            int(moved.sum()),
-            f"{np.median(values):.1f}",
-            f"{values.max():.1f}",
-            f"{int((held & moved).sum())} of {int(moved.sum())}",
-            f"{int((held & ~moved).sum())} of {int((~moved).sum())}",
+            int(of_object.sum()),
+            int(pushed.sum()),
+            f"{np.median(push_mm):.1f}",
+            f"{push_mm.max():.1f}",
+            f"{int((held & pushed).sum())} of {int(pushed.sum())}",
+            f"{int((held & ~pushed).sum())} of {int((~pushed).sum())}",
         ]
         rows.append((name, cells))
     limit = f"{1e3 * MIN_PUSH:g} mm"
@@ -319,7 +318,7 @@ Flow = Counter[tuple[Outcome, Outcome]]
 
 @dataclass(frozen=True)
 class FlowColumn:
-    """A step.
+    """A column of the flow chart: one step.
 
     Attributes:
         title: name of the step.
@@ -337,8 +336,9 @@ def flow_chart(
 
     Args:
         columns: one per step.
-        flows: counts between a column and the next; grasps in no flow end there.
-        scale: grasps per count of each column, such as 1/5 if each grasp was judged in five scenes.
+        flows: counts between each column and the next; grasps that are in no flow end in their
+            column.
+        scale: grasps per count in each column, such as 1/5 if each grasp was judged in five scenes.
     """
     whole = max((c.counts.total() * s for c, s in zip(columns, scale, strict=True)), default=1.0)
     rows = max(len(_count_by_group(column)) for column in columns)
@@ -388,7 +388,8 @@ def _draw_nodes(column: FlowColumn, places: dict[str, float], x: float, unit: fl
         y = places[name]
         parts.append(
             element(
-                *("rect", tip),
+                "rect",
+                tip,
                 x=f"{x:.1f}",
                 y=f"{y:.1f}",
                 width=NODE_WIDTH,

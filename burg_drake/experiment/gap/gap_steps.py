@@ -14,7 +14,10 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError, Mode, Outcome, setting, wilson_interval
 from burg_drake.evaluation import Run
-from burg_drake.experiment.comparison.compared_runs import JudgedRuns, outcomes_unpredictable_for
+from burg_drake.experiment.comparison.compared_runs import (
+    ComparedRuns,
+    outcomes_unpredictable_for_runs,
+)
 from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
     count_cells,
@@ -103,7 +106,7 @@ class GapSteps:
         path: folder.
         document: settings of the measurement.
         steps: the steps in order.
-        tried: runs of the last step on further grasps, those of real trials that fail in the last
+        tried: runs of the last step on further grasps: grasps of real trials that fail in the last
             mode.
     """
 
@@ -124,7 +127,7 @@ class OutcomeChange:
 
     Attributes:
         grasp, instance, object: id of the grasp, names of instance and object.
-        before, after: its outcomes.
+        before, after: outcome before and after the step.
         blocker: blocker after the step.
         run: folder of the run after the step, for a replay.
         won, lost: whether the step turned a failure into a success, or a success into a failure.
@@ -210,18 +213,18 @@ def _outcome_changes(
     verdicts, scene = before.verdicts, before.scene()
     for run in after:
         for candidate in run.candidates:
-            was, now = verdicts[candidate.id].outcome, run.verdicts[candidate.id]
-            there, here = is_success(was, success), is_success(now.outcome, success)
+            old, verdict = verdicts[candidate.id].outcome, run.verdicts[candidate.id]
+            succeeded, succeeds = is_success(old, success), is_success(verdict.outcome, success)
             yield OutcomeChange(
                 candidate.id,
                 candidate.instance,
                 scene.instance(candidate.instance).object,
-                was,
-                now.outcome,
-                now.blocker,
+                old,
+                verdict.outcome,
+                verdict.blocker,
                 str(run.path),
-                won=here and not there,
-                lost=there and not here,
+                won=succeeds and not succeeded,
+                lost=succeeded and not succeeds,
             )
 
 
@@ -246,33 +249,33 @@ class StepAgreement:
 
     Attributes:
         step: name of the step.
-        found: confusion matrix and figures of the trials, each counted once.
-        all_grasps: the same for all grasps that they were chosen from; None if unknown.
+        selected: confusion matrix and figures of the trials, each counted once.
+        all_grasps: figures of all grasps that the trials were chosen from; None if unknown.
         unpredictable: number of trials with a failure that the step's mode does not predict.
     """
 
     step: StepName
-    found: Agreement
+    selected: Agreement
     all_grasps: Agreement | None
     unpredictable: int = 0
 
     @property
     def estimated(self) -> Agreement:
         """Figures of all grasps of the run if known, else of the trials."""
-        return self.all_grasps or self.found
+        return self.all_grasps or self.selected
 
 
-def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTrial]:
-    """The trials of a sheet about grasps of a run, carried out or not.
+def trials_of_run(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTrial]:
+    """The trials of a run's grasps, carried out or not.
 
     Args:
         sheet: contents of the trials file.
         path: the trials file, for messages.
-        run: run of the sheet, or another one of the same scene; grasps are matched by id and
+        run: run in the trials file, or another run of the same scene; grasps are matched by id and
             content.
 
     Raises:
-        InvalidInputError: the run is the sheet's, but a grasp differs from the planned one.
+        InvalidInputError: the run is in the trials file, but a grasp differs from the planned one.
     """
     scene, found = run.document.scene.content, []
     contents = grasp_contents(run, (trial.grasp for trial in sheet.trials))
@@ -298,16 +301,16 @@ def agreement_by_step(
 
     Args:
         steps: all steps.
-        sheet: the trials file, with the strata of the trials.
-        trials: see `tried_grasps`.
+        sheet: contents of the trials file, with the strata.
+        trials: see `trials_of_run`.
         success: criterion of success.
     """
-    real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
+    attempted = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
     found = []
     for step in steps.steps:
         runs = [*step.runs, *steps.tried] if step.name == "placed" else list(step.runs)
-        predicted, actual, told = [], [], []
-        for trial in real:
+        predicted, actual, compared = [], [], []
+        for trial in attempted:
             assert trial.outcome is not None
             verdicts = [run.verdicts[trial.grasp] for run in runs if trial.grasp in run.verdicts]
             judged = [v.outcome for v in verdicts if v.outcome is not Outcome.SIMULATION_FAILED]
@@ -315,13 +318,12 @@ def agreement_by_step(
                 good = sum(is_success(outcome, success) for outcome in judged)
                 predicted.append(good > len(judged) / 2)
                 actual.append(is_success(trial.outcome, success))
-                told.append(trial)
+                compared.append(trial)
         answers = np.array(predicted, dtype=bool), np.array(actual, dtype=bool)
-        strata = selection_strata(sheet, told)
-        every = None if strata is None else strata.agreement(*answers)
-        beyond = outcomes_unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
-        apart = sum(trial.outcome in beyond for trial in told)
-        found.append(
-            StepAgreement(step.name, estimate_agreement(count_cells(*answers)), every, apart)
-        )
+        selected = estimate_agreement(count_cells(*answers))
+        strata = selection_strata(sheet, compared)
+        all_grasps = None if strata is None else strata.agreement(*answers)
+        outcomes = outcomes_unpredictable_for_runs(ComparedRuns(runs[0])) if runs else frozenset()
+        unpredictable = sum(trial.outcome in outcomes for trial in compared)
+        found.append(StepAgreement(step.name, selected, all_grasps, unpredictable))
     return tuple(found)

@@ -85,15 +85,15 @@ def _is_or_are(count: int) -> str:
 
 
 def _failure_outcomes(change: Change) -> str:
-    """Outcomes into which successes turn, most frequent first."""
-    into = Counter(move.after for move in change.lost)
-    parts = [f"{count} {outcome_label(outcome)}" for outcome, count in into.most_common(4)]
-    rest = into.total() - sum(count for _, count in into.most_common(4))
+    """Outcomes into which successes turn, most frequent first, in brackets."""
+    outcomes = Counter(move.after for move in change.lost)
+    parts = [f"{count} {outcome_label(outcome)}" for outcome, count in outcomes.most_common(4)]
+    rest = outcomes.total() - sum(count for _, count in outcomes.most_common(4))
     return f" ({', '.join(parts)}{f', {rest} otherwise' if rest else ''})" if parts else ""
 
 
 def reality_sentence(agreement: Sequence[StepAgreement]) -> str:
-    """Sentence about the grasps or trials behind the agreement with the robot."""
+    """Sentence about the grasps that the counts and shares of agreement with the robot describe."""
     if any(one.all_grasps is None for one in agreement):
         return "counts and shares are of the tried grasps, each counted once"
     grasps = round(max(sum(one.estimated.cells) for one in agreement))
@@ -108,24 +108,24 @@ def replay_arguments(run: str, grasp: str) -> list[str]:
     return ["burg-drake", "replay", run, "--grasp", grasp]
 
 
-def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
+def steps_view(steps: GapSteps, changes: Sequence[Change]) -> TextTable:
     """Table of grasps that each step keeps and loses."""
     table = TextTable("Where grasps are lost", caption=_caption(steps))
     table.names("step").numbers(
         "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
     )
     table.texts("turned into")
-    for change in found:
+    for change in changes:
         lost, whole = len(change.lost), change.successes
         low, high = change.share_lost
-        into = Counter(outcome_label(move.after) for move in change.lost)
+        outcomes = Counter(outcome_label(move.after) for move in change.lost)
         table.row(
             GAP_STEP_TITLES[change.step],
             *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
             format_percent(lost / whole) if whole else "-",
             f"{100 * low:.0f}-{100 * high:.0f} %" if whole else "-",
             str(change.failed),
-            ", ".join(f"{name} {count}" for name, count in into.most_common()),
+            ", ".join(f"{name} {count}" for name, count in outcomes.most_common()),
         )
     return table
 
@@ -158,23 +158,23 @@ def reality_table(agreement: Sequence[StepAgreement]) -> FindingTable:
     found.names("step").numbers("trials", "TP", "FP", "FN", "TN", "not predictable")
     found.shares(*measures, interval=False)
     for one in agreement:
-        trials, cells = one.found.trials, (f"{cell:g}" for cell in one.found.cells)
+        trials, cells = one.selected.trials, (f"{cell:g}" for cell in one.selected.cells)
         shares = (_share_cell(one.estimated.figure(name)) for name in measures)
         found.row(GAP_STEP_TITLES[one.step], f"{trials}", *cells, f"{one.unpredictable}", *shares)
     return found
 
 
-def _share_cell(found: Estimate) -> tuple[str, Html]:
-    if found.value is None or found.low is None or found.high is None:
+def _share_cell(estimate: Estimate) -> tuple[str, Html]:
+    if estimate.value is None or estimate.low is None or estimate.high is None:
         return "-", Html("-")
-    mark = interval_mark(found.value, found.low, found.high)
-    text = f"{100 * found.value:.0f} {bracketed_interval(found, percent=True)} %"
-    return text, join(mark, f" {format_percent(found.value)}")
+    mark = interval_mark(estimate.value, estimate.low, estimate.high)
+    text = f"{100 * estimate.value:.0f} {bracketed_interval(estimate, percent=True)} %"
+    return text, join(mark, f" {format_percent(estimate.value)}")
 
 
 def gap_json(
     steps: GapSteps,
-    found: Sequence[Change],
+    changes: Sequence[Change],
     agreement: Sequence[StepAgreement],
     success: Success,
 ) -> dict[str, Any]:
@@ -184,7 +184,7 @@ def gap_json(
     return {
         "success": success,
         "asked": plain_data(steps.document),
-        "story": step_sentences(steps, found, success),
+        "story": step_sentences(steps, changes, success),
         "steps": [
             {
                 "name": step.name,
@@ -199,13 +199,13 @@ def gap_json(
             }
             for step in steps.steps
         ],
-        "changes": [_change_json(change) for change in found],
+        "changes": [_change_json(change) for change in changes],
         "pushed": None if pushed is None else asdict(pushed),
         "reality": [
             {
                 "step": one.step,
                 "weighted": False,
-                **json_values(one.found),
+                **json_values(one.selected),
                 "all_grasps": json_values(one.all_grasps),
                 "unpredictable": one.unpredictable,
             }

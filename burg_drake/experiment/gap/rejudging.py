@@ -76,9 +76,12 @@ from burg_drake.station import Station
 
 @dataclass(frozen=True, eq=False)
 class _RejudgeTask:
-    """A trial to be judged again; without a judge if its scene cannot be built.
+    """A trial to be judged again.
 
-    `judge_content` is a hash of all inputs of the judge except the versions of the software.
+    Attributes:
+        trial: the trial.
+        factory: builds the judge; None if the scene cannot be built.
+        judge_content: hash of all inputs of the judge except the versions of the software.
     """
 
     trial: Rejudged
@@ -99,18 +102,18 @@ def rejudge(
 ) -> Rejudging:
     """Judges every real trial with a measured placement again.
 
-    Each is judged as its run was: mode, engine (or the one that judged the grasp again there),
-    motion and settings. The hand moves to the pose commanded to the robot. Objects that were not
-    measured stay as planned. A trial with an impossible scene is not judged, and the reason is
-    recorded.
+    Mode, engine, motion and settings are those of the trial's run; if another engine judged the
+    grasp again in the run, that engine is used. The hand moves to the pose commanded to the robot.
+    Objects that were not measured stay as planned. A trial with an impossible scene is not judged,
+    and the reason is recorded.
 
     Args:
-        sheet: the trials.
-        path: the trials file, to whose folder the sheet's paths are relative.
+        sheet: contents of the trials file.
+        path: the trials file, to whose folder paths of runs are relative.
         out: folder for the results; created if necessary.
-        runs: runs by the sheet's keys, in place of its own; trials with a missing key, or whose
-            grasp is missing or different in the run, are skipped.
-        success: criterion of success; the sheet's if None.
+        runs: runs by key, in place of those in the trials file; trials with a missing key, or with
+            a grasp that is missing or different in the run, are skipped.
+        success: criterion of success; the criterion in the trials file if None.
         executor: executor; if None as many processes as there are processors.
         retry_failed: repeat simulations that failed in an earlier call.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
@@ -136,7 +139,7 @@ def rejudge(
         for id, verdict in _judge_tasks(tasks, known, executor, reporter, failed):
             journal.append(id, verdict)
             known[id] = verdict
-    trials = tuple(_with_verdict(one.trial, known, failed) for one in tasks)
+    trials = tuple(_with_verdict(task.trial, known, failed) for task in tasks)
     found = Rejudging(
         path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
     )
@@ -159,14 +162,14 @@ def _skip_reasons(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
 def _rejudge_tasks(trials: Sequence[RealTrial], runs: Mapping[str, Run]) -> list[_RejudgeTask]:
     from burg_drake.station import SceneCheck
 
-    places: dict[str, tuple[Scene, Station, SceneCheck]] = {}
+    setups: dict[str, tuple[Scene, Station, SceneCheck]] = {}
     tasks = []
     for trial in trials:
         run = runs[trial.run]
-        if trial.run not in places:
+        if trial.run not in setups:
             scene, station = run.scene(), run.station()
-            places[trial.run] = scene, station, SceneCheck(station, scene.library)
-        tasks.append(_rejudge_task(trial, run, *places[trial.run]))
+            setups[trial.run] = scene, station, SceneCheck(station, scene.library)
+        tasks.append(_rejudge_task(trial, run, *setups[trial.run]))
     return tasks
 
 
@@ -230,32 +233,35 @@ def _judge_tasks(
     """Judges tasks without a known verdict, grouped by scene.
 
     Args:
-        tasks, known, executor, reporter: all tasks, existing verdicts, and who judges and reports.
-        failed: receives the reasons by id for trials whose scenes cannot be built.
+        tasks: all tasks.
+        known: existing verdicts by id.
+        executor: executor of the judgements.
+        reporter: reporter of the progress.
+        failed: receives reasons by id for trials whose judge cannot be built.
 
     Yields:
         Ids and verdicts.
     """
     jobs: dict[str, Job] = {}
     total = 0
-    for one in tasks:
-        if one.factory is None or one.trial.candidate is None:
+    for task in tasks:
+        if task.factory is None or task.trial.candidate is None:
             continue
         total += 1
-        if one.trial.candidate.id not in known:
-            key = one.judge_content
-            held = jobs[key].candidates if key in jobs else ()
-            jobs[key] = Job(key, one.factory, (*held, one.trial.candidate))
+        if task.trial.candidate.id not in known:
+            key = task.judge_content
+            earlier = jobs[key].candidates if key in jobs else ()
+            jobs[key] = Job(key, task.factory, (*earlier, task.trial.candidate))
     if not jobs:
         return
     todo = sum(len(job.candidates) for job in jobs.values())
     begin = Progress(STARTING_PHASE, total - todo, total, unit="trials")
     pace = ProgressMeter(reporter.show, begin, "judging again")
 
-    def note(lost: JobFailed) -> None:
-        failed.update({c.id: one_line(lost.error) for c in lost.job.candidates})
+    def note_failure(event: JobFailed) -> None:
+        failed.update({c.id: one_line(event.error) for c in event.job.candidates})
 
-    with closing(executor.judge(jobs.values(), note)) as judged:
+    with closing(executor.judge(jobs.values(), note_failure)) as judged:
         for _, candidate, verdict in judged:
             pace.step(outcome=verdict.outcome)
             yield candidate.id, verdict
@@ -282,7 +288,7 @@ class Rejudged:
 
     Attributes:
         number: number of the trial.
-        run: key of its run in the sheet.
+        run: key of the trial's run in the trials file.
         grasp, instance, object: id of the grasp, names of instance and object.
         real: outcome on the robot.
         planned: outcome in the run.
@@ -348,7 +354,7 @@ class Rejudged:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rejudging:
-    """All trials of a sheet.
+    """The trials of a file, judged again.
 
     Attributes:
         path: folder with the results.
@@ -404,16 +410,16 @@ class Rejudging:
         return count, *wilson_interval(count, len(trials))
 
     def precision(self, *, measured: bool, every: bool = False) -> tuple[int, int]:
-        """Number of true among predicted successes, and number of predicted successes; arguments as
-        for `agreement`.
+        """Number of predicted successes that succeeded, and number of predicted successes;
+        arguments as for `agreement`.
         """
-        promised = [
+        predicted = [
             trial
             for trial in (self.judged if every else self.predictable)
             if (verdict := trial.outcome if measured else trial.planned) is not None
             and is_success(verdict, self.success)
         ]
-        return sum(is_success(trial.real, self.success) for trial in promised), len(promised)
+        return sum(is_success(trial.real, self.success) for trial in predicted), len(predicted)
 
     @property
     def explained_disagreements(self) -> tuple[int, int, float, float]:
@@ -429,16 +435,16 @@ class Rejudging:
         """McNemar's exact test of agreement with reality: verdicts as measured (first) against
         verdicts as planned.
         """
-        of = self.causes
-        return compare_paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
+        causes: tuple[TrialCause, ...] = ("agreed", "placement", "worsened", "physics")
+        return compare_paired_counts(*(self.causes[cause] for cause in causes))
 
 
 def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
-    """Why a trial cannot be judged again in a run; empty if it can.
+    """Reason why a trial cannot be judged again in a run; empty if it can.
 
     Args:
         trial: the trial.
-        run: run in place of the trial's.
+        run: run for the trial; None if there is none.
         content: content hash of the run's grasp with this id; None if there is none.
     """
     if trial.outcome is None:
@@ -455,11 +461,11 @@ def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
 
 
 def match_runs_to_sources(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
-    """Replacement for each run of a sheet: the run itself, or else the run of the same scene with
-    most of the grasps.
+    """Replacement for each run of a trials file: the run itself, or else the run of the same scene
+    that has most of the tried grasps.
 
     Args:
-        sheet: the trials.
+        sheet: contents of the trials file.
         runs: the runs in a folder.
     """
     found = {}
@@ -483,28 +489,32 @@ def rejudged_scene_file(trial: Rejudged, folder: Path) -> Path:
     return folder / "scenes" / f"{trial.number:03d}.yaml"
 
 
-def write_rejudging(found: Rejudging) -> None:
+def write_rejudging(rejudging: Rejudging) -> None:
     """Writes scenes, table and figures.
 
     Raises:
         InvalidInputError: a file cannot be written.
     """
-    for trial in found.trials:
+    for trial in rejudging.trials:
         if trial.scene is not None:
-            save_displaced_scene(trial.scene, rejudged_scene_file(trial, found.path))
-    rows = [row for trial in found.trials if (row := _trial_columns(trial, found)) is not None]
+            save_displaced_scene(trial.scene, rejudged_scene_file(trial, rejudging.path))
+    rows = [
+        row for trial in rejudging.trials if (row := _trial_columns(trial, rejudging)) is not None
+    ]
     if rows:
-        write_table(found.path / REJUDGED_TABLE_FILE, concatenate_tables(rows))
-    atomic_write(found.path / "rejudged.json", json.dumps(rejudging_json(found), indent=1) + "\n")
+        write_table(rejudging.path / REJUDGED_TABLE_FILE, concatenate_tables(rows))
+    atomic_write(
+        rejudging.path / "rejudged.json", json.dumps(rejudging_json(rejudging), indent=1) + "\n"
+    )
 
 
-def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
-    """Table row of one trial; empty for a trial without a judge."""
+def _trial_columns(trial: Rejudged, rejudging: Rejudging) -> Columns | None:
+    """Table row of one trial; None for a trial without a verdict."""
     if trial.scene is None or trial.candidate is None or trial.verdict is None:
         return None
     origin = replace(
         trial.origin,
-        scene=str(rejudged_scene_file(trial, found.path)),
+        scene=str(rejudged_scene_file(trial, rejudging.path)),
         scene_content=trial.scene.content[:HASH_DIGITS],
         run="",
     )
@@ -522,7 +532,7 @@ def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
         "trial": trial.number,
         "real": trial.real.value,
         "planned": trial.planned.value,
-        "cause": trial.cause(found.success) or "",
+        "cause": trial.cause(rejudging.success) or "",
         "notes": "; ".join(trial.notes),
     }
     return {name: np.array([value]) for name, value in values.items()} | columns
@@ -541,41 +551,41 @@ def concatenate_tables(tables: list[Columns]) -> Columns:
     return {name: np.concatenate([part(table, name) for table in tables]) for name in names}
 
 
-def rejudging_json(found: Rejudging) -> dict[str, Any]:
+def rejudging_json(rejudging: Rejudging) -> dict[str, Any]:
     """The figures as JSON values."""
-    count = len(found.predictable)
+    count = len(rejudging.predictable)
     return {
-        "success": found.success,
-        "judged": len(found.judged),
-        "unpredictable": found.causes["unpredictable"],
+        "success": rejudging.success,
+        "judged": len(rejudging.judged),
+        "unpredictable": rejudging.causes["unpredictable"],
         "agree": {
             name: {"count": right, "of": count, "low": low, "high": high}
             for name, measured in (("planned", False), ("measured", True))
-            for right, low, high in [found.agreement(measured=measured)]
+            for right, low, high in [rejudging.agreement(measured=measured)]
         },
         "precision": {
             name: {
                 which: dict(zip(("count", "of"), shares, strict=True))
                 for which, every in (("all", True), ("predictable", False))
-                for shares in [found.precision(measured=measured, every=every)]
+                for shares in [rejudging.precision(measured=measured, every=every)]
             }
             for name, measured in (("planned", False), ("measured", True))
         },
-        "causes": {cause: found.causes[cause] for cause in DISAGREEMENT_CAUSES},
+        "causes": {cause: rejudging.causes[cause] for cause in DISAGREEMENT_CAUSES},
         "explained": dict(
-            zip(("count", "of", "low", "high"), found.explained_disagreements, strict=True)
+            zip(("count", "of", "low", "high"), rejudging.explained_disagreements, strict=True)
         ),
-        "mcnemar_p": found.mcnemar_test.p_value,
+        "mcnemar_p": rejudging.mcnemar_test.p_value,
         "table": [
             {"planned": p, "measured": m, "real": r, "count": n}
-            for (p, m, r), n in sorted(found.table.items())
+            for (p, m, r), n in sorted(rejudging.table.items())
         ],
-        "trials": [_trial_json(trial, found) for trial in found.trials],
-        "skipped": {str(number): why for number, why in found.skipped.items()},
+        "trials": [_trial_json(trial, rejudging) for trial in rejudging.trials],
+        "skipped": {str(number): why for number, why in rejudging.skipped.items()},
     }
 
 
-def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
+def _trial_json(trial: Rejudged, rejudging: Rejudging) -> dict[str, Any]:
     return {
         "number": trial.number,
         "run": trial.run,
@@ -584,7 +594,7 @@ def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
         "real": trial.real.value,
         "planned": trial.planned.value,
         "measured": None if trial.outcome is None else trial.outcome.value,
-        "cause": trial.cause(found.success),
+        "cause": trial.cause(rejudging.success),
         "why_not": trial.failure_reason,
         "notes": list(trial.notes),
     }

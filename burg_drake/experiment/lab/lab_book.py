@@ -2,7 +2,7 @@
 
 An entry names the state of the trial that it replaces. It is written if the trial is still in that
 state. An entry that is already in the file or its journal counts as written, so a browser may send
-it repeatedly. Otherwise another browser was faster, and this one gets an error.
+it repeatedly. Any other entry is refused with an error, as another browser changed the trial first.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LabEntry:
     Attributes:
         number: number of the trial.
         replaces: state of the trial when the entry was made, see `trial_state_hash`.
-        outcome: outcome; None removes an entry.
+        outcome: outcome; None removes the outcome that is there.
         time: time of the click, ISO 8601 with time zone.
         operator, note: the operator and remarks.
         width_mm: final distance between the pads [mm].
@@ -60,7 +60,7 @@ class LabBook:
     def __init__(self, runs: TriedRuns, *, show_simulated: bool = False) -> None:
         self.runs, self.show_simulated = runs, show_simulated
         self.book = TrialBook(runs.path)
-        self.plan = plan_hash(runs.sheet)
+        self.plan_hash = hash_plan(runs.sheet)
         self._lock = threading.Lock()
         self._cached: tuple[object, TrialSheet, str] | None = None
 
@@ -69,7 +69,7 @@ class LabBook:
 
         Raises:
             DocumentError: the file cannot be read, perhaps only now while somebody edits it.
-            InvalidInputError: the file has another plan by now.
+            InvalidInputError: the file holds other trials by now.
         """
         return self.sheet_and_version()[0]
 
@@ -80,14 +80,14 @@ class LabBook:
             The trial with the entry.
 
         Raises:
-            TrialChanged: the trial is neither in the state `entry.replaces` nor as the entry says,
-                and the entry was never written before.
+            TrialChanged: the trial is not in the state `entry.replaces`, and neither the file nor
+                its journal has the entry.
             BurgError: there is no such trial, or the file cannot be read or written.
         """
         with self._lock:
             trial = self.sheet().trial(entry.number)
             while True:
-                values = _entered_values(entry, trial)
+                values = _changed_fields(entry, trial)
                 if self._is_written(entry, values, trial):
                     return trial
                 if trial_state_hash(trial) != entry.replaces:
@@ -101,8 +101,8 @@ class LabBook:
                     trial = changed.trial
 
     def record_photo(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
-        """Enters photo and placement from before a trial, even if it was carried out meanwhile;
-        keeps other entries.
+        """Enters photo and placement from before a trial, even if the trial was carried out
+        meanwhile; keeps its other entries.
 
         Raises:
             BurgError: as for `enter`.
@@ -124,7 +124,7 @@ class LabBook:
         return trial
 
     def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
-        """Whether the entry is in the file, or was there before a later entry."""
+        """Whether the entry is in the file, or was in the file before a later entry."""
         if all(getattr(trial, name) == value for name, value in values.items()):
             return True
         if trial_state_hash(trial) == entry.replaces or entry.outcome is None:
@@ -147,7 +147,7 @@ class LabBook:
         cached = self._cached
         if cached is None or cached[0] != key:
             sheet = self.book.sheet()
-            if plan_hash(sheet) != self.plan:
+            if hash_plan(sheet) != self.plan_hash:
                 raise InvalidInputError(f"{path} now holds other trials; start the page again")
             cached = (key, sheet, content_hash(*map(str, key))[:12])
             self._cached = cached
@@ -161,24 +161,23 @@ def _conflict(trial: RealTrial) -> TrialChanged:
     return TrialChanged(message, trial)
 
 
-def _entered_values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
-    """Fields of a trial set by an entry."""
+def _changed_fields(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
+    """New values of the fields of a trial that an entry sets."""
+    if entry.outcome is None:
+        return {"outcome": None, "time": "", "operator": "", "note": entry.note, "robot": None}
     effort = None if trial.robot is None else trial.robot.effort_n
     known = entry.width_mm is not None or effort is not None
-    robot = RobotReport(width_mm=entry.width_mm, effort_n=effort) if known else None
-    if entry.outcome is None:
-        robot = None
     return {
         "outcome": entry.outcome,
-        "time": entry.time if entry.outcome is not None else "",
-        "operator": entry.operator if entry.outcome is not None else "",
+        "time": entry.time,
+        "operator": entry.operator,
         "note": entry.note,
-        "robot": robot,
+        "robot": RobotReport(width_mm=entry.width_mm, effort_n=effort) if known else None,
     }
 
 
-def plan_hash(sheet: TrialSheet) -> str:
-    """Short hash of the plan, without entries."""
+def hash_plan(sheet: TrialSheet) -> str:
+    """Short hash of the planned trials, without entries."""
     trials = [f"{t.number} {t.run} {t.grasp} {t.content}" for t in sheet.trials]
     return content_hash(sheet.created, [run.hash for run in sheet.runs.values()], trials)[:12]
 
@@ -186,14 +185,14 @@ def plan_hash(sheet: TrialSheet) -> str:
 def trial_state_hash(trial: RealTrial) -> str:
     """Short hash of the values entered by people for a trial."""
     values = entered_values(trial)
-    return content_hash({k: str(values.get(k)) for k in OPERATOR_FIELDS})[:12]
+    return content_hash({name: str(values.get(name)) for name in OPERATOR_FIELDS})[:12]
 
 
 def plan_data(lab: LabBook) -> dict[str, Any]:
-    """The unchanging data of the plan for the page."""
+    """The unchanging data of the trials for the page."""
     sheet, runs = lab.runs.sheet, lab.runs
     return {
-        "plan": lab.plan,
+        "plan": lab.plan_hash,
         "file": lab.runs.path.name,
         "outcomes": [
             {"value": outcome.value, "label": label, "meaning": meaning}
@@ -242,10 +241,11 @@ def entry_data(trial: RealTrial) -> dict[str, Any]:
 
 
 def _placement_data(place: ObjectPlace) -> dict[str, Any]:
-    note = "doubtful; the file in placements/ has the reason"  # The trials file has no reasons.
-    off = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
-    reason = note if place.status == "uncertain" else ""
-    return {"status": place.status, "mm": off, "deg": place.turn_deg, "reason": reason}
+    # The trials file has no reasons.
+    doubtful = place.status == "uncertain"
+    reason = "doubtful; the file in placements/ has the reason" if doubtful else ""
+    offset = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
+    return {"status": place.status, "mm": offset, "deg": place.turn_deg, "reason": reason}
 
 
 def entry_states(lab: LabBook) -> dict[str, Any]:
@@ -253,6 +253,6 @@ def entry_states(lab: LabBook) -> dict[str, Any]:
     try:
         sheet, version = lab.sheet_and_version()
     except BurgError as error:
-        return {"plan": lab.plan, "problem": str(error)}
+        return {"plan": lab.plan_hash, "problem": str(error)}
     entries = [entry_data(trial) for trial in sheet.trials]
-    return {"plan": lab.plan, "version": version, "problem": "", "entries": entries}
+    return {"plan": lab.plan_hash, "version": version, "problem": "", "entries": entries}

@@ -9,7 +9,6 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from burg_drake.cameras import (
 )
 from burg_drake.core import BurgError, InvalidInputError, one_line
 from burg_drake.experiment.lab.lab_book import LabBook
+from burg_drake.experiment.trials.trial_book import current_time
 from burg_drake.experiment.trials.trial_photos import save_photo_and_placement, summarize_placements
 from burg_drake.scene import Scene
 
@@ -67,14 +67,14 @@ class LabCamera:
         self._lock = threading.RLock()
         self._view: _View | None = None
         self._epoch = 0
-        self._check: threading.Thread | None = None
-        self._checked: dict[str, Any] | None = None
-        self._measuring: tuple[int, bool] | None = None
+        self._check_thread: threading.Thread | None = None
+        self._last_report: dict[str, Any] | None = None
+        self._check_request: tuple[int, bool] | None = None
         self._drawing = threading.Lock()
-        self._shown = self._drawn = 0
+        self._shown_number = self._drawn_number = 0
 
     def watch(self, number: int) -> None:
-        """Switches the view to the scene of a trial, and hides offsets of other trials.
+        """Switches the view to the scene of a trial, and hides the offsets of other trials.
 
         Raises:
             BurgError: there is no such trial, or the camera cannot be opened.
@@ -82,9 +82,9 @@ class LabCamera:
         scene = self._lab.runs.of(self._lab.runs.sheet.trial(number)).scene
         with self._lock:
             with self._drawing:
-                self._shown = number
-                if self._view is not None and self._drawn not in (0, number):
-                    self._view.live.placement, self._drawn = None, 0
+                self._shown_number = number
+                if self._view is not None and self._drawn_number not in (0, number):
+                    self._view.live.placement, self._drawn_number = None, 0
             if self._view is not None and self._view.scene.content == scene.content:
                 return
             self.close()
@@ -97,7 +97,7 @@ class LabCamera:
                 source.close()
                 raise
             self._epoch += 1
-            self._view, self._drawn = _View(self._epoch, scene, live), 0
+            self._view, self._drawn_number = _View(self._epoch, scene, live), 0
             live.start()
 
     def close(self) -> None:
@@ -120,16 +120,16 @@ class LabCamera:
     @property
     def is_checking(self) -> bool:
         """Whether a placement check is running."""
-        return self._check is not None and self._check.is_alive()
+        return self._check_thread is not None and self._check_thread.is_alive()
 
     def check(self, number: int, *, keep: bool) -> None:
         """Starts a thread that measures the object poses in the newest picture.
 
         Args:
             number: number of the trial.
-            keep: whether to save photo and placement for the trial after the check, even if it gets
-                an outcome meanwhile, as the photo is older. A trial with an outcome stays
-                unchanged.
+            keep: whether to save photo and placement for the trial after the check. A trial with an
+                outcome stays unchanged. A trial that gets its outcome during the check still gets
+                both, as the photo is older.
 
         Raises:
             BurgError: there is no picture with a pose, or a check is running.
@@ -149,19 +149,19 @@ class LabCamera:
                     " then check again"
                 )
             refusal = self._why_not_kept(number) if keep else ""
-            self._measuring = (number, keep and not refusal)
-            self._check = threading.Thread(
-                target=self._measure,
+            self._check_request = (number, keep and not refusal)
+            self._check_thread = threading.Thread(
+                target=self._run_check,
                 args=(view, number, picture.located, keep, refusal),
                 name="placement check",
                 daemon=True,
             )
-            self._check.start()
+            self._check_thread.start()
 
-    def wait_for_check(self, seconds: float | None = None) -> None:
+    def wait_for_check(self) -> None:
         """Waits for the running placement check, if any."""
-        if self._check is not None:
-            self._check.join(seconds)
+        if self._check_thread is not None:
+            self._check_thread.join()
 
     def status(self) -> dict[str, Any]:
         """Status for the page, shown beside the picture."""
@@ -169,28 +169,28 @@ class LabCamera:
         if view is None:
             return {"scene": "", "line": "", "checking": False, "check": None, "drawn": 0}
         picture, reader = view.live.picture, view.live.reader
-        lost = reader.fault if reader.state == "lost" else ""
+        fault = reader.fault if reader.state == "lost" else ""
         line = describe_pose(picture.located.estimate, view.scene.board) if picture else "waiting"
         return {
             "scene": view.scene.name,
-            "fault": lost,
+            "fault": fault,
             "valid": picture is not None and picture.located.estimate.valid,
             "line": line,
             "checking": self.is_checking,
             "measuring": self._running_check(),
-            "drawn": self._drawn,
-            "check": self._checked,
+            "drawn": self._drawn_number,
+            "check": self._last_report,
         }
 
     def _running_check(self) -> dict[str, Any] | None:
-        """Trial of the running check, and whether its result is kept."""
-        measuring = self._measuring
-        if measuring is None or not self.is_checking:
+        """Trial of the running check, and whether its result is kept; None without a check."""
+        request = self._check_request
+        if request is None or not self.is_checking:
             return None
-        return {"number": measuring[0], "keep": measuring[1]}
+        return {"number": request[0], "keep": request[1]}
 
     def _why_not_kept(self, number: int) -> str:
-        """Reason why a photo taken now is not kept; empty if it is kept."""
+        """Reason why a photo of a trial taken now is not kept; empty if it is kept."""
         try:
             self._lab.require_open(number)
         except BurgError as error:
@@ -198,12 +198,12 @@ class LabCamera:
         return ""
 
     def _show_offsets(self, view: _View, number: int, check: PlacementCheck) -> None:
-        """Draws offsets of a trial if it is shown."""
+        """Draws the offsets of a trial if the trial is shown."""
         with self._drawing:
-            if self._shown == number:
-                view.live.placement, self._drawn = check, number
+            if self._shown_number == number:
+                view.live.placement, self._drawn_number = check, number
 
-    def _measure(
+    def _run_check(
         self, view: _View, number: int, located: LocatedFrame, keep: bool, refusal: str
     ) -> None:
         begun = time.monotonic()
@@ -222,8 +222,8 @@ class LabCamera:
             report["problem"] = f"the check failed: {one_line(error)}"
             traceback.print_exc()
         report["seconds"] = time.monotonic() - begun
-        report["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
-        self._checked = report
+        report["time"] = current_time()
+        self._last_report = report
 
     def _save(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
@@ -238,15 +238,17 @@ class LabCamera:
 def _offset_row(placed: Placement) -> dict[str, Any]:
     """Offset of an object for the page, and whether it is within the overlay's tolerance."""
     style = OverlayStyle()
-    off = None if placed.displacement is None else math.hypot(*placed.displacement)
+    offset = None if placed.displacement is None else math.hypot(*placed.displacement)
     turn = placed.angle
     within = (
-        off is not None and off <= style.tolerance and abs(turn or 0.0) <= style.angle_tolerance
+        offset is not None
+        and offset <= style.tolerance
+        and abs(turn or 0.0) <= style.angle_tolerance
     )
     return {
         "status": placed.status,
         "reason": placed.reason,
         "within": within,
-        "mm": None if off is None else round(1e3 * off, 2),
+        "mm": None if offset is None else round(1e3 * offset, 2),
         "deg": None if turn is None else round(math.degrees(turn), 2) + 0.0,
     }

@@ -64,12 +64,12 @@ HAND_BODY = "hand"  # Name of the hand in pictures.
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """A shape for pictures, which may contain it several times.
+    """A shape that a picture may show several times.
 
     Attributes:
         key: unique key of the body.
         shape: visual shape.
-        color: colour; None for the shape's own.
+        color: colour; None for the colour of the shape's file.
     """
 
     key: str
@@ -84,7 +84,7 @@ class PlacedBody:
     Attributes:
         name: name of its instance, `hand`, or `ground`.
         body: the body.
-        X_SB: (4, 4) its pose in the scene frame.
+        X_SB: (4, 4) pose of the body in the scene frame.
     """
 
     name: str
@@ -172,9 +172,9 @@ def _object_bodies(scene: Scene) -> list[PlacedBody]:
 
 def _hand_body(station: Station, number: int, visual: HandVisual) -> DrawnBody:
     color = (visual.color.r(), visual.color.g(), visual.color.b())
-    own = isinstance(visual.model, Mesh)
+    has_color = isinstance(visual.model, Mesh)
     key = f"hand {station.hand_model} {number}"
-    return DrawnBody(key, visual.model, None if own else color)
+    return DrawnBody(key, visual.model, None if has_color else color)
 
 
 def count_bodies(pictures: Sequence[Sequence[PlacedBody]]) -> dict[str, tuple[DrawnBody, int]]:
@@ -199,8 +199,8 @@ class Viewpoint:
     """Camera of a picture.
 
     Attributes:
-        X_SC: (4, 4) camera's optical frame in the scene frame.
-        intrinsics: of a camera without distortion.
+        X_SC: (4, 4) pose of the camera's optical frame in the scene frame.
+        intrinsics: intrinsics without distortion.
     """
 
     X_SC: Array
@@ -225,8 +225,8 @@ class Painting:
 
     def visible_pixels(self, placed: Sequence[PlacedBody], name: str) -> NDArray[np.bool_]:
         """(H, W) mask of the pixels that show a body of this name."""
-        mine = [i for i, one in enumerate(placed) if one.name == name]
-        return np.isin(self.owner, mine)
+        indices = [i for i, one in enumerate(placed) if one.name == name]
+        return np.isin(self.owner, indices)
 
 
 class Painter(Protocol):
@@ -289,10 +289,10 @@ class RayPainter:
         for index, one in enumerate(placed):
             if one.body.key not in self._triangles:
                 self._triangles[one.body.key] = shape_triangles(one.body.shape)
-            corners, mine = self._triangles[one.body.key]
+            corners, triangles = self._triangles[one.body.key]
             vertices.append(transform_points(one.X_SB, corners))
-            faces.append(mine + first)
-            owner.append(np.full(len(mine), index))
+            faces.append(triangles + first)
+            owner.append(np.full(len(triangles), index))
             first += len(corners)
         return np.concatenate(vertices), np.concatenate(faces), np.concatenate(owner)
 
@@ -302,19 +302,19 @@ def _body_colors(placed: Sequence[PlacedBody]) -> list[tuple[float, float, float
     names = list(
         dict.fromkeys(one.name for one in placed if one.name not in (GROUND_BODY, HAND_BODY))
     )
-    more = distinct_colors(len(names))
-    own = {
-        n: CATEGORY_COLORS[i][:3] if i < len(CATEGORY_COLORS) else more[i]
-        for i, n in enumerate(names)
+    further = distinct_colors(len(names))
+    colors = {
+        name: CATEGORY_COLORS[i][:3] if i < len(CATEGORY_COLORS) else further[i]
+        for i, name in enumerate(names)
     }
-    return [own.get(one.name, one.body.color or hand_color) for one in placed]
+    return [colors.get(one.name, one.body.color or hand_color) for one in placed]
 
 
 class VtkPainter:
     """Paints bodies of a fixed stock by VTK.
 
     Args:
-        stock: by key, each body and its maximum number in one picture.
+        stock: each body and its maximum number in one picture, by key of the body.
 
     Raises:
         MissingDependencyError: a system library of the renderer is missing (it would crash).
@@ -337,14 +337,14 @@ class VtkPainter:
         self._labels: dict[tuple[str, int], int] = {}
         for key, (body, count) in stock.items():
             for number in range(count):
-                self._add(key, number, body)
+                self._add_body(key, number, body)
         self._context = self._graph.CreateDefaultContext()
 
     def paint(self, placed: Sequence[PlacedBody], view: Viewpoint) -> Painting:
         """See `Painter.paint`."""
         supersampling = 2  # Rendered pixels for each pixel of the picture, in each direction.
         clipping = ClippingRange(0.02, 20.0)  # Metres.
-        used = self._put(placed)
+        used = self._place_bodies(placed)
         query = self._graph.get_query_output_port().Eval(self._context)
         info = camera_info(supersampled_intrinsics(view.intrinsics, supersampling))
         camera = ColorRenderCamera(
@@ -364,7 +364,7 @@ class VtkPainter:
             np.where(known, owner[np.where(known, shown, 0)], NO_BODY),
         )
 
-    def _add(self, key: str, number: int, body: DrawnBody) -> None:
+    def _add_body(self, key: str, number: int, body: DrawnBody) -> None:
         frame = GeometryFrame(f"{len(self._frames)}")
         self._frames[key, number] = self._graph.RegisterFrame(self._source, frame)
         self._labels[key, number] = label = len(self._frames)
@@ -381,8 +381,8 @@ class VtkPainter:
                 f"{key} cannot be shown: {' '.join(str(error).split())}"
             ) from error
 
-    def _put(self, placed: Sequence[PlacedBody]) -> list[tuple[str, int]]:
-        """Poses all bodies; returns the frame of each placed body."""
+    def _place_bodies(self, placed: Sequence[PlacedBody]) -> list[tuple[str, int]]:
+        """Sets the poses of all bodies; returns the key and number of each placed body."""
         # Pose of hidden bodies, beyond the camera's range.
         hidden_pose = RigidTransform([0.0, 0.0, -1e4])
         poses, used, counts = FramePoseVector(), [], dict[str, int]()

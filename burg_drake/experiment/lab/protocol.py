@@ -39,7 +39,7 @@ def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated
     Args:
         trial: the trial.
         runs: runs of the trials file.
-        picture: JPEG of its grasp.
+        picture: JPEG of the trial's grasp.
         show_simulated: whether to show the simulated outcome.
     """
     alt = f"the hand at the grasp of trial {trial.number}, on {trial.instance}"
@@ -110,7 +110,7 @@ def _entry_lines(trial: RealTrial) -> Html:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SheetOptions:
+class ProtocolOptions:
     """Options of the protocol page.
 
     Attributes:
@@ -122,24 +122,24 @@ class SheetOptions:
     printouts: Mapping[int, str] | None = None
 
 
-def sheet_page(
-    runs: TriedRuns, pictures: TrialPictures, options: SheetOptions | None = None
+def protocol_page(
+    runs: TriedRuns, pictures: TrialPictures, options: ProtocolOptions | None = None
 ) -> str:
-    """The page.
+    """The protocol of the trials as an HTML page.
 
     Args:
         runs: runs of the trials file.
-        pictures: pictures of its trials.
+        pictures: pictures of the trials.
         options: options; the defaults if None.
     """
-    options = options or SheetOptions()
+    options = options or ProtocolOptions()
     blocks = trials_by_block(runs.sheet)
     sections = [
         _block_section(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]
     return html_document(
         f"Trials on the robot: {runs.path.name}",
-        page_style("burg_drake.experiment.lab", "sheet_page.css"),
+        page_style("burg_drake.experiment.lab", "protocol.css"),
         _header(runs, blocks),
         *sections,
         element("footer", f"Written by burg_drake {burg_drake.__version__}."),
@@ -158,9 +158,9 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
         "If a person interfered or an object fell before the trial, tick “not attempted” and"
         " go on; repeat the trial at the end if there is time.",
     )
-    sheet, tried = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
-    robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in tried))
-    scenes = list(dict.fromkeys(one.scene.name for one in tried))
+    sheet, setups = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
+    robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in setups))
+    scenes = list(dict.fromkeys(one.scene.name for one in setups))
     done = sum(trial.outcome is not None for trial in sheet.trials)
     about = [f"{len(sheet.trials)} trials in {count_with_noun(len(blocks), 'block')}"]
     about += [f"seed {sheet.selection.seed}", f"file {runs.path.name}"]
@@ -191,7 +191,7 @@ def _block_section(
     pictures: TrialPictures,
     number: int,
     trials: tuple[RealTrial, ...],
-    options: SheetOptions,
+    options: ProtocolOptions,
 ) -> Html:
     scene = runs.of(trials[0]).scene
     first, last = trials[0].number, trials[-1].number

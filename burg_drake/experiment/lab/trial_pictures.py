@@ -56,7 +56,7 @@ class ViewedGrasp:
     hand: Array
 
 
-def pinhole(size: tuple[int, int], half_view: float = PICTURE_HALF_VIEW) -> Intrinsics:
+def pinhole(size: tuple[int, int], half_view: float) -> Intrinsics:
     """Pinhole intrinsics from image size and the tangent of half the vertical angle of view."""
     width, height = size
     focal = height / 2.0 / half_view
@@ -145,7 +145,7 @@ def _finger_points(subject: ViewedGrasp) -> Array:
 
 
 def _are_unobstructed(rays: RayCaster, points: Array, direction: Array) -> np.ndarray:
-    """(N,) whether rays from points in a direction are unobstructed; they start slightly off the
+    """(N,) whether rays from points in a direction are unobstructed. They start 1 mm off the
     surface.
     """
     face, _ = rays.first_hits(points + 1e-3 * direction, np.tile(direction, (len(points), 1)))
@@ -160,26 +160,22 @@ def mark_target(painting: Painting, placed: Sequence[PlacedBody], target: str) -
     """(H, W, 3) the picture with an outline around the visible target, and other bodies paler."""
     rim_width_share = 1 / 150  # Of the picture's height.
     fading = 0.45  # Blend towards white of bodies other than the target and the hand.
-    mine, hand = painting.visible_pixels(placed, target), painting.visible_pixels(placed, HAND_BODY)
+    seen, hand = painting.visible_pixels(placed, target), painting.visible_pixels(placed, HAND_BODY)
     faded = painting.color + fading * (255.0 - painting.color)
-    image = np.where((mine | hand)[..., None], painting.color, np.round(faded)).astype(np.uint8)
+    image = np.where((seen | hand)[..., None], painting.color, np.round(faded)).astype(np.uint8)
     width = max(2, round(rim_width_share * image.shape[0]))
-    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * width + 1, 2 * width + 1))
-    mask = mine.astype(np.uint8)
-    rim = (cv2.dilate(mask, around) > 0) & ~mine
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * width + 1, 2 * width + 1))
+    rim = (cv2.dilate(seen.astype(np.uint8), kernel) > 0) & ~seen
     image[rim] = TARGET_RIM_COLOR
     return image
 
 
-def write_names(
-    painting: Painting, placed: Sequence[PlacedBody], marked: Sequence[str] = ()
-) -> Bytes:
+def write_names(painting: Painting, placed: Sequence[PlacedBody]) -> Bytes:
     """(H, W, 3) the picture with the names of the objects.
 
     Args:
         painting: picture of the objects.
         placed: bodies of the picture.
-        marked: highlighted names.
     """
     min_pixels = 30  # Objects with fewer visible pixels get no name.
     letter_height_share = 0.042  # Of the picture's height.
@@ -193,8 +189,8 @@ def write_names(
         rows, columns = np.nonzero(body)
         if len(rows) >= min_pixels:
             boxes.append([[columns.min(), rows.min()], [columns.max(), rows.max()]])
-            color = (255, 205, 120) if name in marked else (255, 255, 255)
-            plates.append(render_tag(name, color, round(letter_height_share * image.shape[0])))
+            height = round(letter_height_share * image.shape[0])
+            plates.append(render_tag(name, (255, 255, 255), height))
     if plates:
         draw_tags(image, np.array(boxes, float), plates, bodies)
     return image
@@ -311,8 +307,8 @@ class _SceneGeometry:
         if instance not in self._surfaces:
             scene = self.bodies.scene
             surface = scene.library.surface(scene.instance(instance).object)
-            corners = np.asarray(surface.triangles_center)
-            self._surfaces[instance] = transform_points(scene.X_SO(instance), corners)
+            centers = np.asarray(surface.triangles_center)
+            self._surfaces[instance] = transform_points(scene.X_SO(instance), centers)
         subject = ViewedGrasp(X_SG, width, self._surfaces[instance], self.bodies.corners(X_SG))
         return grasp_viewpoint(subject, self._rays, self._hand_rays, inverse(X_SG), size)
 
@@ -330,8 +326,8 @@ class _SceneGeometry:
     def corners(self) -> Array:
         """(N, 3) corners of the board and of the objects on it, in S [m]."""
         x, y = self.bodies.scene.board.size
-        sheet = np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0], [x, y, 0.0]])
-        return np.vstack([sheet, *self.hulls])
+        board = np.array([[0.0, 0.0, 0.0], [x, 0.0, 0.0], [0.0, y, 0.0], [x, y, 0.0]])
+        return np.vstack([board, *self.hulls])
 
     @cached_property
     def _rays(self) -> RayCaster:
@@ -347,9 +343,9 @@ class _SceneGeometry:
 
 
 class PictureCache:
-    """Makes pictures in a thread, from the first request on, and keeps them. `close` it.
+    """Makes pictures in a thread, from the first request on, and keeps them. `close` ends it.
 
-    Pictures are called `grasp/NUMBER`, of a trial, and `above/BLOCK` and `front/BLOCK`.
+    A picture's name is `grasp/NUMBER` for a trial, `above/BLOCK` or `front/BLOCK` for a block.
 
     Args:
         runs: runs of the trials file.
@@ -367,15 +363,17 @@ class PictureCache:
 
     @property
     def names(self) -> list[str]:
-        """Names of all pictures, in the order in which they are needed."""
-        found, setup = [], set[int]()
+        """Names of pictures in the order in which they are needed. Pictures of a block from the
+        front are left out: they are made with those from above.
+        """
+        names, blocks = [], set[int]()
         for number in sorted(self._trials):
             block = self._trials[number].block
-            if block not in setup:
-                setup.add(block)
-                found += [f"above/{block}"]
-            found.append(f"grasp/{number}")
-        return found
+            if block not in blocks:
+                blocks.add(block)
+                names.append(f"above/{block}")
+            names.append(f"grasp/{number}")
+        return names
 
     def close(self) -> None:
         """Ends the thread."""

@@ -104,8 +104,8 @@ class TriedRuns:
         moved: folders of runs in place of those in the file, by key.
 
     Attributes:
-        path: as given.
-        sheet: the file's contents when it was opened.
+        path: the trials file.
+        sheet: contents of the trials file when it was opened.
 
     Raises:
         BurgError: the file does not fit the schema or has no trials; a run or a grasp is missing or
@@ -119,7 +119,7 @@ class TriedRuns:
             raise InvalidInputError(
                 f"{path} has no trials; burg-drake trials plan makes a file with trials"
             )
-        used = dict.fromkeys(trial.run for trial in self.sheet.trials)
+        used = {trial.run for trial in self.sheet.trials}
         runs = load_sources(self.sheet, path, moved=moved, only=used)
         self._tried = {
             key: TriedScene(run, run.scene(), run.station()) for key, run in runs.items()
@@ -139,13 +139,13 @@ class TriedRuns:
         return self.of(trial).scene.X_SO(candidate.instance) @ candidate.X_OG
 
     def width(self, trial: RealTrial) -> float:
-        """Distance between the pads at the grasp [m]; of the open hand if unknown."""
+        """Distance between the pads at the grasp [m]; that of the open hand if unknown."""
         width = self.candidate(trial).width
         return float(self.of(trial).station.hand.opening[1]) if math.isnan(width) else width
 
 
 def trials_by_block(sheet: TrialSheet) -> dict[int, tuple[RealTrial, ...]]:
-    """The trials of a sheet in their order, by block."""
+    """The trials by block, in the order of their numbers."""
     blocks: dict[int, list[RealTrial]] = {}
     for trial in sorted(sheet.trials, key=lambda trial: trial.number):
         blocks.setdefault(trial.block, []).append(trial)

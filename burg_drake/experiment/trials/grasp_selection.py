@@ -7,7 +7,7 @@ depend on the order of the runs, and a smaller selection is a part of a larger o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,7 @@ class EligibleGrasps:
 
 
 def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
-    """Runs by short keys that do not depend on their order; each run once.
+    """Opens runs, each once, and gives them short keys that do not depend on their order.
 
     Args:
         given: runs, of one scene or of many, or their folders.
@@ -76,8 +76,8 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
     """
     runs: dict[str, Run] = {}
     places = []
-    for one in given:
-        for run in _open_runs(one):
+    for source in given:
+        for run in _open_runs(source):
             places.append(str(run.path))
             if not run.document.hash or not len(run.results["id"]):
                 continue
@@ -106,39 +106,40 @@ def list_eligible_grasps(
 ) -> tuple[list[EligibleGrasps], list[str]]:
     """Eligible grasps of each run, and notes about them.
 
-    A grasp that several runs have judged on the same scene and station is one; it belongs to the
-    run that checks most: mode `arm` before `reach` before `hand`.
+    A grasp that several runs have judged on the same scene and station is listed once, for the run
+    that checks most: mode `arm` before `reach` before `hand`.
 
     Raises:
         InvalidInputError: reachable grasps are wanted of a run without an arm.
     """
     notes: list[str] = []
     pools = []
-    owned: defaultdict[tuple[str, str], set[str]] = defaultdict(set)
+    listed: defaultdict[tuple[str, str], set[str]] = defaultdict(set)
     order = sorted(runs, key=lambda k: (-MODES.index(runs[k].document.mode), runs[k].document.hash))
-    shared = _shared_worlds(runs)
+    shared = _shared_scenes_and_stations(runs)
     for key in order:
         run = runs[key]
         pool = _make_pool(key, run, among, notes)
-        world = (run.document.scene.content, run.document.station.content)
-        if world in shared:
-            own = grasp_contents(run)
-            twice = np.isin(pool.cells("id"), [id for id, c in own.items() if c in owned[world]])
-            owned[world].update(own.values())
-            if twice.any():
+        place = (run.document.scene.content, run.document.station.content)
+        if place in shared:
+            contents = grasp_contents(run)
+            repeated_ids = [id for id, content in contents.items() if content in listed[place]]
+            repeated = np.isin(pool.cells("id"), repeated_ids)
+            listed[place].update(contents.values())
+            if repeated.any():
                 notes.append(
-                    f"{twice.sum()} grasps of run {key} are also in another run of the"
+                    f"{repeated.sum()} grasps of run {key} are also in another run of the"
                     " same scene; each is tried once and counts there"
                 )
-                pool = replace(pool, rows=pool.rows[~twice])
+                pool = replace(pool, rows=pool.rows[~repeated])
         pools.append(pool)
     return sorted((p for p in pools if len(p.rows)), key=lambda p: p.key), notes
 
 
-def _open_runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
-    if isinstance(one, Run):
-        return [one]
-    return one.runs if isinstance(one, Campaign) else load_runs(one)
+def _open_runs(source: Run | Campaign | str | Path) -> Sequence[Run]:
+    if isinstance(source, Run):
+        return [source]
+    return source.runs if isinstance(source, Campaign) else load_runs(source)
 
 
 def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGrasps:
@@ -149,19 +150,19 @@ def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGr
         )
     results = run.results
     failed = results["outcome"] == Outcome.SIMULATION_FAILED.value
-    passed = np.isin(results["stage"], [stage.value for stage in DECIDED_STAGES[among]])
+    eligible = np.isin(results["stage"], [stage.value for stage in DECIDED_STAGES[among]])
     if failed.any():
         notes.append(f"{failed.sum()} grasps of run {key} could not be simulated and are left out")
     count, judged = run.document.grasps.count, len(results["id"])
     if judged < count:
         notes.append(f"run {key} is not complete: {judged} of {count} grasps are judged")
-    return EligibleGrasps(key, run, np.flatnonzero(passed & ~failed))
+    return EligibleGrasps(key, run, np.flatnonzero(eligible & ~failed))
 
 
-def _shared_worlds(runs: dict[str, Run]) -> set[tuple[str, str]]:
-    """Scenes and stations shared by several runs."""
-    worlds = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
-    return {world for world in worlds if worlds.count(world) > 1}
+def _shared_scenes_and_stations(runs: dict[str, Run]) -> set[tuple[str, str]]:
+    """Pairs of scene and station that several runs have in common."""
+    places = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
+    return {place for place in places if places.count(place) > 1}
 
 
 def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
@@ -179,17 +180,17 @@ def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
 
 
 def stratum_labels(
-    pool: EligibleGrasps, selection: Selection, probability: Callable[[Run], Mapping[str, float]]
+    pool: EligibleGrasps, selection: Selection, table: Path | None
 ) -> NDArray[np.str_]:
-    """(N,) stratum of each grasp within its object; empty if it has none.
+    """(N,) label of each grasp's stratum among the strata of its object; empty without a stratum.
 
     Args:
         pool: the grasps.
         selection: settings with the balance.
-        probability: returns the predicted probability of success by grasp id.
+        table: table of robustness for the balance `probability`; see `robustness_by_grasp`.
 
     Raises:
-        InvalidInputError: the run lacks the margin.
+        InvalidInputError: the run lacks the margin, or has no valid table of robustness.
     """
     if selection.balance == "none":
         return np.full(len(pool.rows), "all")
@@ -203,18 +204,18 @@ def stratum_labels(
     if selection.balance == "margin":
         values, name = _margin_values(pool, selection.margin), selection.margin
     else:
-        known = probability(pool.run)
-        values = np.array([known.get(id, np.nan) for id in pool.cells("id").tolist()])
+        shares = robustness_by_grasp(pool.run, table)
+        values = np.array([shares.get(id, np.nan) for id in pool.cells("id").tolist()])
         name = "probability"
     objects = pool.cells("object")
     labels = np.full(len(values), "", dtype=object)
-    for held in np.unique(objects):
-        mine = objects == held
-        labels[mine] = _quantile_labels(values[mine], name, selection.bins)
+    for object_name in np.unique(objects):
+        rows = objects == object_name
+        labels[rows] = _quantile_labels(values[rows], name, selection.bins)
     return labels.astype(np.str_)
 
 
-def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]:
+def robustness_by_grasp(run: Run, table: Path | None) -> dict[str, float]:
     """Share of a grasp's perturbed repeats that were lifted, by grasp id.
 
     Args:
@@ -231,19 +232,19 @@ def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]
             f"{run.path}`, which predicts how often grasps are lifted"
         )
     shares = lifted_shares(found, {run.document.hash}, run.candidates.id)
-    return {id: share for (of, id), share in shares.items() if of == run.document.hash}
+    return {id: share for (hash, id), share in shares.items() if hash == run.document.hash}
 
 
 def allocate_to_strata(
     populations: Mapping[str, int], wanted: int, first: Sequence[str]
 ) -> dict[str, int]:
-    """Number of grasps for each stratum, as even as the populations allow, with the sum `wanted` if
-    there are enough.
+    """Divides a number of grasps among strata, as evenly as their populations allow. The numbers
+    sum to `wanted` if there are enough grasps.
 
     Args:
         populations: number of grasps by stratum.
         wanted: total number.
-        first: the strata in the order in which they get a remainder.
+        first: strata in the order in which they receive the remainder.
     """
     chosen = dict.fromkeys(populations, 0)
     left = min(wanted, sum(populations.values()))
@@ -257,30 +258,33 @@ def allocate_to_strata(
 
 def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
     if name not in pool.run.results or name not in MarginNames.all:
-        there = [margin for margin in MarginNames.all if margin in pool.run.results]
+        known = [margin for margin in MarginNames.all if margin in pool.run.results]
         raise InvalidInputError(
-            f"{pool.run.path} has no margin {quote_value(name)}; {suggest_names(name, there)}"
+            f"{pool.run.path} has no margin {quote_value(name)}; {suggest_names(name, known)}"
         )
     return pool.cells(name).astype(float)
 
 
 def _quantile_labels(values: NDArray[np.float64], name: str, bins: int) -> NDArray[np.str_]:
-    """Labels of bins with about equally many grasps; equal values share a bin."""
+    """Labels of bins with about equally many grasps; equal values share a bin, and values that are
+    not finite have an empty label.
+    """
     known = np.isfinite(values)
     labels = np.full(len(values), "", dtype=object)
     if known.any():
         edges = np.unique(np.quantile(values[known], np.linspace(0.0, 1.0, bins + 1)))
-        place = np.searchsorted(edges[1:-1], values, side="right")
-        for k in np.unique(place[known]):
-            own = known & (place == k)
-            low, high = (format_number(float(v), 4) for v in (values[own].min(), values[own].max()))
+        bins_of_values = np.searchsorted(edges[1:-1], values, side="right")
+        for k in np.unique(bins_of_values[known]):
+            rows = known & (bins_of_values == k)
+            bounds = values[rows].min(), values[rows].max()
+            low, high = (format_number(float(bound), 4) for bound in bounds)
             text = low if low == high else f"{low} to {high}"
-            labels[own] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
+            labels[rows] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
     return labels
 
 
 MAX_SHORTFALL_ITEMS = 20
-"""Maximum number of lines, and of objects in a line; the rest is counted."""
+"""Maximum number of notes on shortfalls, and of objects in a note; the rest is counted."""
 
 
 @dataclass(frozen=True)
@@ -288,11 +292,11 @@ class Shortfall:
     """Missing grasps of an object of a run.
 
     Attributes:
-        run, object: key of the run, and name in the library.
-        kind: kind of shortfall; objects with the same kind share a line.
+        run, object: key of the run, and name of the object in the library.
+        kind: kind of shortfall; objects with the same kind share a note.
         counts: available and wanted number, such as `3 of 5`.
-        description: text of kind and counts if all objects of a line have the same; the kind if
-            empty.
+        description: text of the note, with the counts, if all its objects have the same counts;
+            `kind` if empty.
     """
 
     run: str
@@ -303,7 +307,7 @@ class Shortfall:
 
 
 def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
-    """Shortfall of one object with too few grasps in a stratum or overall; empty if there are
+    """Shortfall of one object that has too few grasps in a stratum or overall; empty if it has
     enough.
 
     Args:
@@ -326,11 +330,11 @@ def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
     return [Shortfall(first.run, first.object, kind, counts + rest, description + rest)]
 
 
-def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
-    """A line for each kind with its objects, and counts by object if they differ."""
+def shortfall_notes(shortfalls: Iterable[Shortfall]) -> list[str]:
+    """A note for each kind of shortfall with its objects, and counts by object if they differ."""
     kinds: defaultdict[str, list[Shortfall]] = defaultdict(list)
-    for one in found:
-        kinds[one.kind].append(one)
+    for shortfall in shortfalls:
+        kinds[shortfall.kind].append(shortfall)
     lines = [_shortfall_line(kind, members) for kind, members in kinds.items()]
     more = len(lines) - MAX_SHORTFALL_ITEMS
     if more > 0:
@@ -339,18 +343,18 @@ def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
 
 
 def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
-    alike = len({one.description for one in members}) == 1
+    same_counts = len({one.description for one in members}) == 1
     by_run: defaultdict[str, list[str]] = defaultdict(list)
     for one in members[:MAX_SHORTFALL_ITEMS]:
-        by_run[one.run].append(one.object if alike else f"{one.object} ({one.counts})")
+        by_run[one.run].append(one.object if same_counts else f"{one.object} ({one.counts})")
     where = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
     more = len(members) - MAX_SHORTFALL_ITEMS
     where += f" and {more} others" if more > 0 else ""
-    return f"{where}: {members[0].description or kind}" if alike else f"{where}: {kind}"
+    return f"{where}: {members[0].description or kind}" if same_counts else f"{where}: {kind}"
 
 
 Chosen = list[tuple[EligibleGrasps, int, str]]
-"""Grasps with the key of their stratum; the number is an index into the pool."""
+"""Chosen grasps: the pool, the index in the pool, and the key of the stratum."""
 
 
 def draw_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[EligibleGrasps]:
@@ -372,19 +376,19 @@ def select_grasps(
     short: list[Shortfall] = []
     unknown = 0
     for pool in pools:
-        labels = stratum_labels(pool, selection, lambda run: robustness_by_grasp(run, table))
+        labels = stratum_labels(pool, selection, table)
         objects = pool.cells("object")
         unknown += int((labels == "").sum())
-        for held in np.unique(objects).tolist():
+        for object_name in np.unique(objects).tolist():
             members: defaultdict[str, list[int]] = defaultdict(list)
-            for k in np.flatnonzero((objects == held) & (labels != "")).tolist():
+            for k in np.flatnonzero((objects == object_name) & (labels != "")).tolist():
                 members[str(labels[k])].append(k)
             if selection.balance == "outcome":
                 members["success"], members["failure"]  # create both, even if empty
             if not members:
-                short.append(Shortfall(pool.key, held, "no grasp to choose from"))
+                short.append(Shortfall(pool.key, object_name, "no grasp to choose from"))
                 continue
-            found = _make_strata(pool, held, members, selection)
+            found = _make_strata(pool, object_name, members, selection)
             strata |= found
             short += find_shortfall(list(found.values()), selection.per_object)
             for key, stratum in found.items():
@@ -416,22 +420,28 @@ def _rare_class_note(chosen: Chosen, selection: Selection) -> list[str]:
 
 
 def _make_strata(
-    pool: EligibleGrasps, held: str, members: Mapping[str, Sequence[int]], selection: Selection
+    pool: EligibleGrasps,
+    object_name: str,
+    members: Mapping[str, Sequence[int]],
+    selection: Selection,
 ) -> dict[str, Stratum]:
     """Strata of one object, with the number of chosen grasps."""
-    seed = selection.seed
-    first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
-    share, more = divmod(selection.per_object, len(first))
-    asked = {label: share + (k < more) for k, label in enumerate(first)}
-    taken = allocate_to_strata({k: len(v) for k, v in members.items()}, selection.per_object, first)
+    first = sorted(
+        members,
+        key=lambda label: content_hash(selection.seed, "more", pool.scene, object_name, label),
+    )
+    share, remainder = divmod(selection.per_object, len(first))
+    wanted = {label: share + (k < remainder) for k, label in enumerate(first)}
+    populations = {label: len(indices) for label, indices in members.items()}
+    selected = allocate_to_strata(populations, selection.per_object, first)
     return {
-        f"{pool.key}/{held}/{label}": Stratum(
+        f"{pool.key}/{object_name}/{label}": Stratum(
             run=pool.key,
-            object=held,
+            object=object_name,
             label=label,
-            population=len(members[label]),
-            selected=taken[label],
-            wanted=asked[label],
+            population=populations[label],
+            selected=selected[label],
+            wanted=wanted[label],
         )
         for label in sorted(members)
     }

@@ -1,4 +1,4 @@
-"""Timed robot motions of the trials: one file for each trial, named by its number.
+"""Timed robot motions of the trials: one file for each trial, named by the trial's number.
 
 017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plan_files`
 index.csv                    all trials with their files, or the reason why there is no motion
@@ -74,7 +74,7 @@ class ExportedMotion:
 
 @dataclass(frozen=True)
 class TrialPlans(PlanFolder):
-    """Folder of plans named by trial, apart from their journal.
+    """Folder of a journal, with the plans in another folder, named by trial.
 
     Attributes:
         out: folder of the plans.
@@ -102,20 +102,20 @@ def export_trials(
 ) -> list[ExportedMotion]:
     """Plans the motion of every trial and writes it to a file, as `reach` does.
 
-    The hand moves as in the grasp's run. Results of an earlier call with the same sheet are kept.
+    The hand moves as in the grasp's run. Results of an earlier call with the same trials are kept.
 
     Args:
         path: the trials file.
         out: folder for the plans.
         format: file format of the plans.
-        station: with the arm; each run's own if None.
-        moved: folders of runs in place of the sheet's, by key.
+        station: station whose arm moves; the station of each run if None.
+        moved: folders of runs in place of those in the file, by key.
         retry_failed: repeat all trials that an earlier call could not judge.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
 
     Returns:
-        One row per trial, in the order of the sheet; also in index.csv.
+        One row per trial, in the order of the trials file; also in index.csv.
 
     Raises:
         InvalidInputError: a run or grasp is missing or has changed, a station has no arm, or the
@@ -125,27 +125,28 @@ def export_trials(
     sheet, out = load_trials(path), Path(out)
     for trial in sheet.trials:
         require_name(trial.grasp)
-    runs = load_sources(sheet, path, moved=moved, only={t.run: t for t in sheet.trials})
+    runs = load_sources(sheet, path, moved=moved, only={trial.run for trial in sheet.trials})
     _require_export_folder(out)
     jobs = []
     for key, run in runs.items():
-        own = [trial for trial in sheet.trials if trial.run == key]
-        jobs.append((own, _make_judge_factory(run, own, out / "runs" / key, out, format, station)))
+        trials = [trial for trial in sheet.trials if trial.run == key]
+        folder = out / "runs" / key
+        jobs.append((trials, _make_judge_factory(run, trials, folder, out, format, station)))
     ensure_writable_folder(out)
     remove_unfinished(out)
     rows: dict[int, ExportedMotion] = {}
     with Reporter(progress) as reporter:
-        for own, (factory, candidates) in jobs:
+        for trials, (factory, candidates) in jobs:
             plans = factory.plans
             assert isinstance(plans, TrialPlans)
             verdicts = plan_into_folder(
                 plans, candidates, factory, workers or None, reporter, retry_failed=retry_failed
             )
-            for trial in own:
+            for trial in trials:
                 rows[trial.number] = _make_row(trial, verdicts[trial.grasp], plans)
-    found = [rows[trial.number] for trial in sheet.trials]
-    atomic_write(out / MOTION_INDEX_FILE, _index_csv(found))
-    return found
+    ordered = [rows[trial.number] for trial in sheet.trials]
+    atomic_write(out / MOTION_INDEX_FILE, _index_csv(ordered))
+    return ordered
 
 
 def _make_judge_factory(
@@ -156,7 +157,7 @@ def _make_judge_factory(
     format: PlanFormat,
     station: StationLike | None,
 ) -> tuple[ReachJudgeFactory, Candidates]:
-    """Factory of the judge for the tried grasps of one run, and these grasps."""
+    """Factory of the judge for one run, and the tried grasps of the run."""
     from burg_drake.motion import require_usable_arm
 
     scene = run.scene()
@@ -188,11 +189,11 @@ def _make_judge_factory(
 def _make_row(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> ExportedMotion:
     plan = plans.plan_path(trial.grasp)
     failed = verdict.outcome is Outcome.SIMULATION_FAILED
-    there = verdict.outcome is Outcome.REACHABLE and plan.is_file()
+    has_plan = verdict.outcome is Outcome.REACHABLE and plan.is_file()
     own = plan.with_name(f"{_file_stem(trial)}{plan.suffix}")
-    if there and own != plan and not own.exists():  # two trials have the same grasp
+    if has_plan and own != plan and not own.exists():  # two trials have the same grasp
         atomic_write(own, plan.read_bytes())
-    duration = verdict.margins.get("duration") if there else None
+    duration = verdict.margins.get("duration") if has_plan else None
     return ExportedMotion(
         number=trial.number,
         block=trial.block,
@@ -203,7 +204,7 @@ def _make_row(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> Exported
         answer="" if failed else verdict.outcome.value,
         blocker=verdict.blocker,
         reason=verdict.reason,
-        file=own.name if there else "",
+        file=own.name if has_plan else "",
         duration=None if duration is None else round(duration, 3),
     )
 
@@ -215,10 +216,10 @@ def _file_stem(trial: RealTrial) -> str:
 def _require_export_folder(out: Path) -> None:
     """Refuses a folder with anything but exported trials."""
     if out.is_dir() and not (out / "runs").is_dir():
-        held = sorted(item.name for item in out.iterdir() if not item.name.startswith("."))
-        if held:
+        names = sorted(item.name for item in out.iterdir() if not item.name.startswith("."))
+        if names:
             raise InvalidInputError(
-                f"folder {out} is not empty and not an export of trials: it has {held[0]}"
+                f"folder {out} is not empty and not an export of trials: it has {names[0]}"
                 " in it; choose another folder, or empty it"
             )
 

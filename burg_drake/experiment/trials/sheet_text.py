@@ -32,9 +32,9 @@ _YAML_SPACE = " \t\n\r\x85\u2028\u2029"
 """Space around a value in YAML; a no-break space is part of the value."""
 _ITEM_START = re.compile("( *)- +")
 """Start of a trial, on the line where it begins."""
-_YAML_DIRECTIVE = re.compile("^%", re.MULTILINE)  # YAML directive.
+_YAML_DIRECTIVE = re.compile("^%", re.MULTILINE)
 _ANCHOR_OR_TAG = re.compile(r"(^|[\s\[{,:-])[&!]", re.MULTILINE)
-"""Possible anchor or tag, whose meaning depends on other lines."""
+"""Possible anchor or tag, which may have a meaning for other lines or depend on them."""
 
 Edit = tuple[int, int, str]
 """Start and end offset of a text, and its replacement."""
@@ -52,7 +52,7 @@ class SheetText:
         text: text of the file.
         sheet: parsed contents.
         starts: offsets of the first line of each trial in order, and of the end of the last trial;
-            empty if trials are written in another way.
+            empty if a trial does not have its own lines.
         column: column of the hyphens before trials.
     """
 
@@ -64,7 +64,7 @@ class SheetText:
 
     @classmethod
     def read(cls, text: str, name: str) -> SheetText:
-        """Reads all of a text.
+        """Reads a whole text.
 
         Raises:
             DocumentError: it does not fit the schema.
@@ -74,43 +74,43 @@ class SheetText:
         return cls(name, text, sheet, *_locate_trials(root, text))
 
     def read_changed(self, text: str) -> SheetText:
-        """Reads a later text of the file; if a single trial has changed, only its lines.
+        """Reads a later text of the file; if only one trial has changed, only the trial's lines.
 
         Raises:
             DocumentError: it does not fit the schema.
         """
         if text == self.text:
             return self
-        place = self._find_changed_trial(text)
-        found = None if place is None else self._replace_trial_lines(place, text)
-        return found or SheetText.read(text, self.name)
+        index = self._find_changed_trial(text)
+        changed = None if index is None else self._replace_trial_lines(index, text)
+        return changed or SheetText.read(text, self.name)
 
     def with_trial(self, new: RealTrial) -> SheetText:
-        """The text with a new trial in place of the one with the same number.
+        """The text with a new trial in place of the trial with this number.
 
         Raises:
             DocumentError: the trial cannot be edited in place, such as with an alias.
         """
-        place = self.sheet.index(new.number)
-        old, trials = self.sheet.trials[place], list(self.sheet.trials)
-        trials[place] = new
+        index = self.sheet.index(new.number)
+        old, trials = self.sheet.trials[index], list(self.sheet.trials)
+        trials[index] = new
         if self.starts:
-            start, end = self.starts[place : place + 2]
+            start, end = self.starts[index : index + 2]
             (node,) = parse_yaml_node(self.text[start:end], self.name).value
             line = self.text.count("\n", 0, start) + node.start_mark.line
         else:
             start, end = 0, len(self.text)
             root = parse_yaml_node(self.text, self.name)
             trials_node = next(value for key, value in root.value if key.value == "trials")
-            node = trials_node.value[place]
+            node = trials_node.value[index]
             line = node.start_mark.line
-        own = self.text[start:end]
+        lines = self.text[start:end]
         try:
-            changed = _apply_edits(own, _list_edits(_LineIndex(own), node, old, new))
-            text = self.text[:start] + changed + self.text[end:]
-            found = self._replace_trial_lines(place, text) or SheetText.read(text, self.name)
-            if found.sheet == dataclasses.replace(self.sheet, trials=tuple(trials)):
-                return found
+            edited = _apply_edits(lines, _list_edits(_LineIndex(lines), node, old, new))
+            text = self.text[:start] + edited + self.text[end:]
+            changed = self._replace_trial_lines(index, text) or SheetText.read(text, self.name)
+            if changed.sheet == dataclasses.replace(self.sheet, trials=tuple(trials)):
+                return changed
         except (InvalidInputError, yaml.YAMLError):
             pass
         raise DocumentError(
@@ -118,16 +118,18 @@ class SheetText:
             " cannot change; write it as 'key: value' lines, without aliases"
         )
 
-    def _replace_trial_lines(self, place: int, text: str) -> SheetText | None:
-        """Reads a text that differs in the lines of one trial; None if all of it has to be read."""
+    def _replace_trial_lines(self, index: int, text: str) -> SheetText | None:
+        """Reads a text that differs in the lines of one trial; None if the whole text has to be
+        read.
+        """
         if not self.starts:
             return None
-        longer = len(text) - len(self.text)
-        starts = *self.starts[: place + 1], *(at + longer for at in self.starts[place + 1 :])
-        trial = _parse_trial(text[starts[place] : starts[place + 1]], self.name, self.column)
+        added = len(text) - len(self.text)
+        starts = *self.starts[: index + 1], *(start + added for start in self.starts[index + 1 :])
+        trial = _parse_trial(text[starts[index] : starts[index + 1]], self.name, self.column)
         if trial is None:
             return None
-        trials = (*self.sheet.trials[:place], trial, *self.sheet.trials[place + 1 :])
+        trials = (*self.sheet.trials[:index], trial, *self.sheet.trials[index + 1 :])
         try:
             sheet = dataclasses.replace(self.sheet, trials=trials)
         except InvalidInputError:  # such as the number of another trial
@@ -135,33 +137,34 @@ class SheetText:
         return SheetText(self.name, text, sheet, starts, self.column)
 
     def _find_changed_trial(self, text: str) -> int | None:
-        """Index of the only trial in whose lines another text differs; None if it may differ
-        elsewhere.
+        """Index of the trial whose lines contain all differences from another text; None if there
+        is no such trial.
         """
         if not self.starts:
             return None
         longest = min(len(text), len(self.text))
         tail = _bisect_largest(longest, lambda n: text[-n:] == self.text[-n:])
-        same = _bisect_largest(longest - tail, lambda n: text[:n] == self.text[:n])
-        place = bisect.bisect_right(self.starts, same) - 1
-        if not 0 <= place < len(self.sheet.trials):
+        head = _bisect_largest(longest - tail, lambda n: text[:n] == self.text[:n])
+        index = bisect.bisect_right(self.starts, head) - 1
+        if not 0 <= index < len(self.sheet.trials):
             return None
-        last = len(self.text) - tail
-        return place if last <= self.starts[place + 1] else None
+        return index if len(self.text) - tail <= self.starts[index + 1] else None
 
 
-def _bisect_largest(most: int, holds: Callable[[int], bool]) -> int:
-    """The largest number from 0 to `most` for which a monotone condition holds."""
-    return bisect.bisect_left(range(1, most + 1), True, key=lambda n: not holds(n))
+def _bisect_largest(limit: int, holds: Callable[[int], bool]) -> int:
+    """The largest number from 0 to `limit` for which a monotone condition holds."""
+    return bisect.bisect_left(range(1, limit + 1), True, key=lambda n: not holds(n))
 
 
 def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
-    """Offsets and column of trials whose lines can be read alone, see `SheetText`."""
+    """Offsets and column of trials whose lines can be read alone, see `SheetText`; no offsets if
+    trials are written in another way.
+    """
     nothing: tuple[tuple[int, ...], int] = ((), 0)
-    at = next((k for k, (key, _) in enumerate(root.value) if key.value == "trials"), None)
-    if _YAML_DIRECTIVE.search(text) or at is None or _has_alias(root):
+    key_index = next((k for k, (key, _) in enumerate(root.value) if key.value == "trials"), None)
+    if _YAML_DIRECTIVE.search(text) or key_index is None or _has_alias(root):
         return nothing
-    items = root.value[at][1].value
+    items = root.value[key_index][1].value
     lines = _LineIndex(text)
     starts, columns = [], set()
     for item in items:
@@ -172,10 +175,10 @@ def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
         starts.append(start)
         columns.add(len(hyphen[1]))
     end = len(text)
-    if at + 1 < len(root.value):
-        after = root.value[at + 1][0].start_mark
-        end = lines.starts[after.line]
-        if text[end : lines.offset(after)].strip(_YAML_SPACE):
+    if key_index + 1 < len(root.value):
+        next_key = root.value[key_index + 1][0].start_mark
+        end = lines.starts[next_key.line]
+        if text[end : lines.offset(next_key)].strip(_YAML_SPACE):
             return nothing
     return ((*starts, end), columns.pop()) if len(columns) == 1 else nothing
 
@@ -183,22 +186,22 @@ def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
 def _has_alias(node: yaml.Node) -> bool:
     """Whether a tree contains a node twice, as by an alias."""
     seen: set[int] = set()
-    left = [node]
-    while left:
-        node = left.pop()
+    stack = [node]
+    while stack:
+        node = stack.pop()
         if id(node) in seen:
             return True
         seen.add(id(node))
         if isinstance(node, yaml.MappingNode):
-            left += [part for pair in node.value for part in pair]
+            stack += [part for pair in node.value for part in pair]
         elif isinstance(node, yaml.SequenceNode):
-            left += node.value
+            stack += node.value
     return False
 
 
 def _parse_trial(lines: str, name: str, column: int) -> RealTrial | None:
-    """Parses the lines of a trial, if their meaning does not depend on other lines: a single list
-    entry with its hyphen in this column, whole lines, no anchor.
+    """Parses the lines of a trial; None if their meaning may depend on other lines. They have to be
+    whole lines with a single list entry, its hyphen in this column, and without anchors and tags.
     """
     if not lines.endswith("\n") or _ANCHOR_OR_TAG.search(lines):
         return None
@@ -227,8 +230,8 @@ class _LineIndex:
         return self.starts[int(mark.line)] + int(mark.column)
 
     def end(self, node: yaml.Node) -> int:
-        """End offset of a value's text; marks of the parser come after blank lines and comments
-        that follow.
+        """End offset of a value's text. The parser's own end mark lies after the blank lines and
+        comments that follow the value.
         """
         if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -247,11 +250,12 @@ class _LineIndex:
 
 
 def _list_edits(text: _LineIndex, node: yaml.Node, old: RealTrial, new: RealTrial) -> list[Edit]:
+    """Edits of the lines of a trial: a trial in flow style is written anew, others by key."""
     if not isinstance(node, yaml.MappingNode) or node.flow_style:
-        whole = yaml.safe_dump(
+        trial = yaml.safe_dump(
             plain_data(new), default_flow_style=True, sort_keys=False, width=1 << 30
         )
-        return [(text.offset(node.start_mark), text.offset(node.end_mark), whole.strip())]
+        return [(text.offset(node.start_mark), text.offset(node.end_mark), trial.strip())]
     entries = {key.value: (key, value) for key, value in node.value}
     _require_in_order(text, node)
     column = node.start_mark.column
@@ -273,13 +277,13 @@ def _list_edits(text: _LineIndex, node: yaml.Node, old: RealTrial, new: RealTria
 def _replace_value(
     text: _LineIndex, trial: yaml.Node, key: yaml.Node, value: yaml.Node, lines: str, default: bool
 ) -> Edit:
-    """Edits that give a key another value; a value at its default is removed with its lines, unless
-    they contain something else.
+    """Edit that gives a key another value. A value at its default is removed with its lines, unless
+    the lines contain something else.
     """
     start, end = text.offset(key.start_mark), text.end(value)
     first, last = text.line_start(start), text.line_end(end)
-    alone = not (text.text[first:start] + text.text[end:last]).strip(_YAML_SPACE)
-    if default and alone and key.start_mark.line != trial.start_mark.line:
+    has_own_lines = not (text.text[first:start] + text.text[end:last]).strip(_YAML_SPACE)
+    if default and has_own_lines and key.start_mark.line != trial.start_mark.line:
         return (first - len(text.newline), last, "")
     return (start, max(start, end), lines)
 
@@ -291,13 +295,13 @@ def _format_entry(entry: Mapping[str, Any], column: int, newline: str) -> str:
 
 
 def _require_in_order(text: _LineIndex, node: yaml.Node) -> None:
-    """Refuses values that are not written in order, such as aliases."""
-    at = text.offset(node.start_mark)
+    """Refuses a mapping whose keys and values are not written in order, such as with an alias."""
+    last = text.offset(node.start_mark)
     for key, value in node.value:
         for part in (key, value):
-            if text.offset(part.start_mark) < at:
+            if text.offset(part.start_mark) < last:
                 raise InvalidInputError("an alias")
-            at = text.offset(part.start_mark)
+            last = text.offset(part.start_mark)
 
 
 def _field_default(field: dataclasses.Field[Any]) -> Any:

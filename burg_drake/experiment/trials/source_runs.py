@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +24,15 @@ Moved = Mapping[str, "str | Path"]
 
 
 def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
-    """Short hash of a grasp: of the exact bits of its pose in the object frame and its width, and
-    of its instance.
+    """Short hash of a grasp: its instance, and the exact bits of its width and its pose in the
+    object frame.
     """
     pose = check_pose(X_OG, "X_OG")
     return content_hash(instance, pose, float(width))[:HASH_DIGITS]
 
 
 def grasp_contents(run: Run, ids: Iterable[str] | None = None) -> dict[str, str]:
-    """`grasp_content` of a run's grasps by id; only of those in `ids` if given."""
+    """`grasp_content` of a run's grasps by id; of all grasps if `ids` is None."""
     grasps, instances = run.candidates.grasps, run.candidates.instance
     wanted = None if ids is None else {*ids}
     return {
@@ -47,18 +47,18 @@ def load_sources(
     path: str | Path,
     *,
     moved: Moved | None = None,
-    only: Mapping[str, object] | None = None,
+    only: Collection[str] | None = None,
 ) -> dict[str, Run]:
-    """The runs of a sheet by key, with every grasp that is tried.
+    """Opens the runs of a trials file, by key, and checks that they have every tried grasp.
 
     Args:
         sheet: contents of the trials file.
         path: the trials file, to whose folder paths of runs are relative.
-        moved: folders in place of the sheet's, by key.
+        moved: folders of runs in place of those in the file, by key.
         only: keys of the needed runs; all if None.
 
     Raises:
-        UnknownNameError: `moved` names a run that the sheet does not have.
+        UnknownNameError: `moved` names a run that the trials file does not have.
         InvalidInputError: a folder is missing or holds another run, or a grasp is missing, not
             judged, or changed; the message names the trials file and what to do.
     """
@@ -78,7 +78,7 @@ def load_sources(
 def load_source_run(
     sheet: TrialSheet, path: str | Path, key: str, *, moved: Moved | None = None
 ) -> Run:
-    """One run of a sheet, without checks of its grasps; see `load_sources`."""
+    """Opens one run of a trials file, without checks of its grasps; see `load_sources`."""
     return _load_source(key, sheet.runs[key], Path(path), moved or {})
 
 
@@ -90,8 +90,8 @@ def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
         runs: what `load_sources` returned.
 
     Returns:
-        Columns as in `evaluation.results_table`; missing values are NaN or empty texts. `run` is
-        the hash of the run, as in the table.
+        Columns as in `evaluation.results_table`; missing values are NaN or empty texts. Column
+        `run` has the hash of the run.
     """
     names = list(dict.fromkeys(name for run in runs.values() for name in run.results))
     rows = {
@@ -118,29 +118,29 @@ def _load_source(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
             f"{path}: run {key!r} is not in {folder}; write its folder into runs.{key}.path, or"
             f" say in which folder it is now"
         ).about("moved")
-    there = load_runs(folder)
-    for run in there:
+    runs = load_runs(folder)
+    for run in runs:
         if run.document.hash == source.hash:
             return run
-    what = f"run {there[0].document.hash}" if len(there) == 1 else f"{len(there)} other runs"
+    what = f"run {runs[0].document.hash}" if len(runs) == 1 else f"{len(runs)} other runs"
     raise InvalidInputError(
         f"{path}: run {key!r} is {source.hash}, of scene {source.scene.name!r}, but {folder} holds"
-        f" {what}, of scene {there[0].document.scene.name!r}; give the one"
+        f" {what}, of scene {runs[0].document.scene.name!r}; give the one"
         " that the trials were planned with, or plan them again"
     ).about("moved")
 
 
 def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:
     """Refuses trials whose grasp differs from the planned one."""
-    number = {id: i for i, id in enumerate(run.candidates.id)}
+    index = {id: i for i, id in enumerate(run.candidates.id)}
     grasps, instances = run.candidates.grasps, run.candidates.instance
     for trial in trials:
         where = f"{path}: trial {trial.number}"
-        i = number.get(trial.grasp)
+        i = index.get(trial.grasp)
         if i is None:
             raise InvalidInputError(
                 f"{where}: grasp {quote_value(trial.grasp)} is not in {run.path};"
-                f" {suggest_names(trial.grasp, number)}"
+                f" {suggest_names(trial.grasp, index)}"
             )
         instance = str(instances[i])
         content = grasp_content(instance, grasps.X_OG[i], float(grasps.width[i]))
@@ -164,11 +164,11 @@ def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:
 
 
 def make_source_run(run: Run, folder: Path | None = None) -> SourceRun:
-    """The entry of a run in a sheet.
+    """The entry of a run in a trials file.
 
     Args:
         run: the run.
-        folder: folder of the sheet; if None the path is absolute.
+        folder: folder of the trials file; if None the path is absolute.
 
     Raises:
         InvalidInputError: the run was begun, but has no hash yet.

@@ -47,7 +47,7 @@ def half_width(share: float, trials: int) -> float:
 
 
 def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05) -> float:
-    """Chance that McNemar's exact test tells two methods apart on the same trials.
+    """Power of McNemar's exact test to tell two methods apart on the same trials.
 
     Args:
         trials: number of trials.
@@ -57,25 +57,25 @@ def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05)
     """
     from scipy.stats import binom
 
-    apart = better + worse
-    if apart <= 0.0:
+    disagreement = better + worse
+    if disagreement <= 0.0:
         return 0.0
-    m = np.arange(trials + 1)
-    most = _rejection_limit(m, alpha)
-    q = better / apart
-    found = np.where(most >= 0, binom.cdf(most, m, q) + binom.sf(m - most - 1, m, q), 0.0)
-    return float(binom.pmf(m, trials, min(apart, 1.0)) @ found)
+    m = np.arange(trials + 1)  # number of trials on which the methods disagree
+    limit = _rejection_limit(m, alpha)
+    q = better / disagreement
+    power = np.where(limit >= 0, binom.cdf(limit, m, q) + binom.sf(m - limit - 1, m, q), 0.0)
+    return float(binom.pmf(m, trials, min(disagreement, 1.0)) @ power)
 
 
 def smallest_difference(
     trials: int, worse: float = 0.0, *, power: float = 0.8, alpha: float = 0.05
 ) -> float:
-    """Smallest difference between two methods that McNemar's exact test finds with some chance.
+    """Smallest difference between two methods that McNemar's exact test finds with a given power.
 
     Args:
         trials: number of trials of both methods.
         worse: share of trials where only the worse method is right.
-        power: the chance.
+        power: chance that the test finds the difference.
         alpha: significance level, two-sided.
 
     Returns:
@@ -95,8 +95,8 @@ def smallest_difference(
 
 
 def expected_estimates(sheet: TrialSheet) -> list[ExpectedEstimate]:
-    """Shares that the trials of a sheet will estimate: success by object and overall, weighted to
-    all grasps, and precision and recall of the simulation.
+    """Shares that the trials will estimate: success by object, overall, and weighted to all
+    grasps; precision and recall of the simulation.
     """
     objects = Counter(trial.object for trial in sheet.trials)
     positive = sum(is_success(t.simulated, sheet.selection.success) for t in sheet.trials)
@@ -137,7 +137,7 @@ def power_table(sheet: TrialSheet) -> TextTable:
 
 def detectable_difference_sentence(trials: int) -> str:
     """Sentence on the detectable difference between two methods."""
-    # By the share of trials in which only the method that is worse overall is right.
+    # Keys: share of trials in which only the method that is worse overall is right.
     found = {worse: smallest_difference(trials, worse) for worse in (0.0, 0.05, 0.1)}
     if all(math.isnan(size) for size in found.values()):
         return (
@@ -158,10 +158,11 @@ def detectable_difference_sentence(trials: int) -> str:
 
 
 def _rejection_limit(m: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
-    """The largest number of the rarer of `m` disagreements at which the two-sided exact test
-    rejects; -1 where it never does."""
+    """Largest count of the rarer of the two kinds of `m` disagreements at which the two-sided exact
+    test rejects; -1 where it never rejects."""
     from scipy.stats import binom
 
-    most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)  # smallest with this tail at least
+    # smallest count whose lower tail is at least alpha / 2
+    most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)
     critical: NDArray[np.int64] = np.where(2.0 * binom.cdf(most, m, 0.5) <= alpha, most, most - 1)
     return critical

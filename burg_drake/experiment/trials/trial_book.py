@@ -128,12 +128,12 @@ class TrialBook:
             correct: the entry replaces contradicting values.
             again: the trial was carried out once more; the entry replaces all values.
             expected: record only if the trial still equals this one.
-            entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and nothing
-                else is said), `operator`, `note`, `photo`, `placement`, `robot`, a `RobotReport`
-                or its fields that are known.
+            entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and no time
+                is given), `operator`, `note`, `photo`, `placement`, `robot` (a `RobotReport`, or a
+                mapping of its known fields).
 
         Returns:
-            The trial as it is on the disk.
+            The trial as written to the disk.
 
         Raises:
             UnknownNameError: a field does not exist.
@@ -153,7 +153,7 @@ class TrialBook:
             new = replace(base, **merge_robot_report(base, given))
             if new.outcome is not None and "time" not in given:
                 same = not again and new.outcome is trial.outcome and trial.time
-                new = replace(new, time=trial.time if same else _current_time())
+                new = replace(new, time=trial.time if same else current_time())
             return new
 
         how: How = "again" if again else "corrected" if correct else "recorded"
@@ -181,7 +181,7 @@ class TrialBook:
             numbers: numbers of trials; all if None.
 
         Returns:
-            These trials.
+            The trials that differ.
         """
         return [
             self._record_change(found.number, lambda trial: trial, "kept")
@@ -190,7 +190,7 @@ class TrialBook:
         ]
 
     def _restore_values(self, trial: RealTrial) -> RealTrial:
-        """Restores last recorded values in place of older ones. The caller holds the lock."""
+        """Replaces older values by the last recorded ones. The caller holds the lock."""
         lost = [found.values for found in self.missing_values() if found.number == trial.number]
         return replace_entered_values(trial, lost[0]) if lost else trial
 
@@ -202,7 +202,7 @@ class TrialBook:
         correct: bool = False,
         again: bool = False,
     ) -> None:
-        """Refuses an entry that contradicts present values, unless it may replace them.
+        """Refuses an entry that contradicts present values, unless `correct` or `again` is set.
 
         Args:
             trial: the present trial.
@@ -237,11 +237,16 @@ class TrialBook:
                 after = before.with_trial(new)
                 if read_text(self.path) == before.text:  # unless an editor has written it meanwhile
                     break
-            now = _current_time()
-            names = (old.number, old.grasp, old.content, now, how)
-            append_entry(
-                journal_path(self.path), Entry(*names, entered_values(old), entered_values(new))
+            entry = Entry(
+                number=old.number,
+                grasp=old.grasp,
+                content=old.content,
+                at=current_time(),
+                how=how,
+                before=entered_values(old),
+                after=entered_values(new),
             )
+            append_entry(journal_path(self.path), entry)
             if new != old:
                 atomic_write(self.path, after.text.encode())
                 sync_folder(Path(os.path.realpath(self.path)).parent)
@@ -266,7 +271,8 @@ class TrialBook:
         return known
 
 
-def _current_time() -> str:
+def current_time() -> str:
+    """The present time, ISO 8601 with time zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
@@ -275,49 +281,57 @@ TRIALS_LOCK_TIMEOUT = 30.0
 
 
 @contextlib.contextmanager
-def lock_trials_file(sheet_path: Path) -> Iterator[None]:
-    """Context manager that admits one writer at a time; any end of its process releases the lock.
+def lock_trials_file(trials_path: Path) -> Iterator[None]:
+    """Context manager that admits one writer at a time. The lock is released when the writer's
+    process ends, in whatever way.
 
     Args:
-        sheet_path: the trials file.
+        trials_path: the trials file.
 
     Raises:
         InvalidInputError: the lock file cannot be created, or another process keeps the lock.
     """
-    real = Path(os.path.realpath(sheet_path))  # links to a file share its lock
+    real = Path(os.path.realpath(trials_path))  # links to a file share its lock
     path = real.with_name(f".{real.name}.lock")
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
     try:
-        _acquire_lock(file, sheet_path)
+        _acquire_lock(file, trials_path)
         yield
     finally:
         os.close(file)
 
 
-def _acquire_lock(file: int, sheet_path: Path) -> None:
+def _acquire_lock(file: int, trials_path: Path) -> None:
     until = time.monotonic() + TRIALS_LOCK_TIMEOUT
     while True:
         try:
             if try_lock(file):
                 return
         except OSError as error:
-            raise missing_locks_error(sheet_path, error) from error
+            raise missing_locks_error(trials_path, error) from error
         if time.monotonic() > until:
             raise InvalidInputError(
-                f"{sheet_path} has been locked by another process for {TRIALS_LOCK_TIMEOUT:g} s;"
+                f"{trials_path} has been locked by another process for {TRIALS_LOCK_TIMEOUT:g} s;"
                 " nothing was recorded"
             )
         time.sleep(0.01)
 
 
 How = Literal["recorded", "corrected", "again", "restored", "kept"]
-"""`again`: the trial was carried out once more. `restored`: the file lacked it. `kept`: the file is
-right as it is."""
-JOURNAL_FIELDS = ("outcome", "time", "operator", "note", "photo", "placement", "robot")
-"""Recorded fields of a trial; the others belong to its plan."""
+"""`again`: the trial was carried out once more. `restored`: the file lacked recorded values.
+`kept`: the file is right where it differs from the journal."""
+EMPTY_ENTRY: dict[str, Any] = {
+    "outcome": None,
+    **dict.fromkeys(("time", "operator", "note", "photo"), ""),
+    "placement": {},
+    "robot": None,
+}
+"""Recorded fields of a trial, with their values without an entry."""
+JOURNAL_FIELDS = tuple(EMPTY_ENTRY)
+"""Recorded fields of a trial; all others are set when the trial is planned."""
 
 
 @dataclass(frozen=True)
@@ -341,8 +355,8 @@ class Entry:
 
     def is_of(self, trial: RealTrial) -> bool:
         """Whether the entry belongs to this trial, not to one in an earlier plan of the file."""
-        own = (trial.number, trial.grasp, trial.content)
-        return (self.number, self.grasp, self.content) == own
+        key = (trial.number, trial.grasp, trial.content)
+        return (self.number, self.grasp, self.content) == key
 
 
 @dataclass(frozen=True)
@@ -351,8 +365,8 @@ class MissingValues:
 
     Attributes:
         number: number of the trial.
-        values: last recorded values by field, as plain data, where the file has an older value.
-        edited: fields with a value in the file that was never recorded, so edited by hand.
+        values: last recorded values, as plain data, of fields with an older value in the file.
+        edited: fields whose value in the file was never recorded: somebody edited them by hand.
     """
 
     number: int
@@ -366,8 +380,8 @@ def entered_values(trial: RealTrial) -> dict[str, Any]:
 
 
 def replace_entered_values(trial: RealTrial, values: Mapping[str, Any]) -> RealTrial:
-    """A copy of a trial with other values in the form of `entered_values`; None is a field's
-    default.
+    """A copy of a trial with other values in the form of `entered_values`; None stands for the
+    default of a field.
 
     Raises:
         DocumentError: the values do not have the form of `entered_values`.
@@ -380,7 +394,7 @@ def replace_entered_values(trial: RealTrial, values: Mapping[str, Any]) -> RealT
 
 
 def journal_path(path: Path) -> Path:
-    """The journal of a trials file: beside the file itself, also where the path is a link to it."""
+    """The journal of a trials file. It lies beside the file itself, even if the path is a link."""
     real = Path(os.path.realpath(path))
     return real.with_name(f"{real.stem}.entries.jsonl")
 
@@ -395,8 +409,8 @@ def read_entries(path: Path) -> list[Entry]:
 
 
 def damaged_lines(path: Path) -> list[int]:
-    """Numbers, from 1, of the unreadable lines of a journal: from a killed writer, whose entry was
-    never acknowledged, or damaged otherwise.
+    """Numbers, from 1, of the unreadable lines of a journal. A killed writer leaves one, whose
+    entry was never acknowledged; other damage is possible.
 
     Raises:
         InvalidInputError: it cannot be read at all.
@@ -472,35 +486,26 @@ def sync_folder(folder: Path) -> None:
 
 
 def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
-    """Recorded values that the sheet lacks, by trial.
+    """Recorded values that the trials file lacks, by trial.
 
-    A field counts as lost if the sheet has a value from before the last entry, and as edited by
-    hand if it has a value that is not in the journal.
+    A field counts as lost if the file has a value from before the last entry, and as edited by
+    hand if the file has a value that is not in the journal.
     """
     found = []
     entries = list(entries)
     for trial in sheet.trials:
-        own = [entry for entry in entries if entry.is_of(trial)]
-        if not own:
+        recorded = [entry for entry in entries if entry.is_of(trial)]
+        if not recorded:
             continue
-        now, last = entered_values(trial), own[-1].after
+        now, last = entered_values(trial), recorded[-1].after
         differing = [name for name in JOURNAL_FIELDS if now.get(name) != last.get(name)]
-        known = [values for entry in own for values in (entry.before, entry.after)]
+        known = [values for entry in recorded for values in (entry.before, entry.after)]
         missing = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
         if differing:
             edited = tuple(name for name in differing if name not in missing)
             values = {name: last.get(name) for name in missing}
             found.append(MissingValues(trial.number, values, edited))
     return found
-
-
-EMPTY_ENTRY: dict[str, Any] = {
-    **dict.fromkeys(("time", "operator", "note", "photo"), ""),
-    "outcome": None,
-    "placement": {},
-    "robot": None,
-}
-"""Field values of a trial without an entry."""
 
 
 def parse_real_outcome(name: str) -> RealOutcome:
@@ -535,7 +540,7 @@ def check_entry(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Fills the robot's report in an entry up with fields already reported for the trial."""
+    """Completes the robot's report in an entry with the fields already reported for the trial."""
     robot = given.get("robot")
     if not isinstance(robot, Mapping):
         return dict(given)
@@ -543,7 +548,7 @@ def merge_robot_report(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, 
 
 
 def contains_value(value: Any, present: Any) -> bool:
-    """Whether a new value equals the present one, or has all fields that a report has so far."""
+    """Whether a new value equals the present one, or is a report that repeats its known fields."""
     if isinstance(value, RobotReport) and isinstance(present, RobotReport):
         return all(v in (None, getattr(value, k)) for k, v in vars(present).items())
     return bool(value == present)

@@ -21,19 +21,19 @@ from burg_drake.scene import Scene
 
 
 def summarize_placements(check: PlacementCheck) -> dict[str, ObjectPlace]:
-    """The main numbers of a placement check, by instance, rounded to a micrometre and a thousandth
-    of a degree."""
+    """Main numbers of a placement check by instance, rounded to a micrometre and a thousandth of a
+    degree."""
     return {name: _summarize_placement(placement) for name, placement in check.instances.items()}
 
 
 def require_scene_of_trial(
     scene: Scene | CheckedScene, sheet: TrialSheet, trial: RealTrial, where: str
 ) -> None:
-    """Refuses a scene that differs from that of a trial.
+    """Refuses a scene that differs from the scene of a trial.
 
     Args:
-        scene: scene of a file or of a placement check.
-        sheet: the trials.
+        scene: scene from a file or from a placement check.
+        sheet: contents of the trials file.
         trial: the trial.
         where: file of the scene or of the check, for the message.
 
@@ -89,7 +89,7 @@ def measure_placement(
 
 
 def save_photo_and_placement(
-    sheet_path: str | Path,
+    trials_path: str | Path,
     number: int,
     *,
     photo: str | Path | None = None,
@@ -98,7 +98,7 @@ def save_photo_and_placement(
     """Copies a photo and writes a placement check beside a trials file.
 
     Args:
-        sheet_path: the trials file.
+        trials_path: the trials file.
         number: number of the trial.
         photo: the photo; none if None.
         check: its placement check; none if None.
@@ -111,12 +111,12 @@ def save_photo_and_placement(
     """
     from burg_drake.cameras import decode_image
 
-    folder = Path(os.path.realpath(sheet_path)).parent
+    folder = Path(os.path.realpath(trials_path)).parent
     content = None if photo is None else read_bytes(photo, FileLimits.image_bytes)
     if content is not None and decode_image(content) is None:
         raise InvalidInputError(f"{photo} is not a readable image; give a PNG or JPEG")
     copy = ""
-    with lock_trials_file(Path(sheet_path)):  # no other process takes the same name
+    with lock_trials_file(Path(trials_path)):  # no other process takes the same name
         stem = _free_stem(folder, number)
         if photo is not None and content is not None:
             copy = f"photos/{stem}{Path(photo).suffix.lower()}"

@@ -10,7 +10,6 @@ import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
@@ -37,7 +36,12 @@ from burg_drake.experiment.trials.grasp_selection import (
     select_grasps,
 )
 from burg_drake.experiment.trials.source_runs import grasp_contents, make_source_run
-from burg_drake.experiment.trials.trial_book import entered_values, journal_path, read_entries
+from burg_drake.experiment.trials.trial_book import (
+    current_time,
+    entered_values,
+    journal_path,
+    read_entries,
+)
 from burg_drake.experiment.trials.trial_sheet import (
     Balance,
     RealTrial,
@@ -58,22 +62,21 @@ class SelectionSettings:
     """Which grasps of each object are chosen, and in which order they are tried.
 
     Attributes:
-        per_object: how many grasps of each object of a run, if there are as many.
-        balance: what each object's grasps are balanced by, as far as there are enough: `outcome`,
-            success and failure in simulation; `stage`, each outcome by itself; `margin:NAME`, bins
-            of equal numbers of a margin; `probability`, such bins of the predicted probability of
-            success, see `assess_robustness`; `none`.
-        bins: their number.
-        among: what is chosen from: `executed`, grasps that were tried in simulation, which in mode
-            `hand` all are at which the hand is clear; `reachable`, those that the arm can be at;
-            `clear`, all those at which the hand is clear, though no arm may come there; `all`, also
-            those at which simulation has the hand collide.
-        success: what counts: `lifted`, or `held`, also where it turned in the hand or another
-            object was moved.
-        scenes: how many scenes to draw at random; 0 for all.
-        blocks: in how many blocks the trials of a scene come; each scene has one block before any
-            has its second one.
-        seed: of choice and order.
+        per_object: number of grasps wanted of each object of a run.
+        balance: quantity whose values are to be equally frequent among the chosen grasps of an
+            object: `outcome`, success or failure in simulation; `stage`, deciding stage and
+            outcome; `margin:NAME`, bins of a margin with equally many grasps; `probability`, bins
+            of the predicted probability of success, see `assess_robustness`; `none`.
+        bins: number of bins for a margin or the probability.
+        among: grasps to choose from: `all`; those with the hand `clear`; those that the arm can
+            reach (`reachable`); those tried in simulation (`executed`). In mode `hand`, all clear
+            grasps are tried.
+        success: which outcomes count as success. `lifted`: only lifted. `held`: also grasps that
+            held the object but turned it, or moved another one.
+        scenes: number of scenes to draw at random; 0 for all.
+        blocks: number of blocks that the trials of a scene are divided into; the first blocks of
+            all scenes come before any second block.
+        seed: random seed of choice and order.
 
     Raises:
         InvalidInputError: a balance that does not exist, or a number that is too small.
@@ -102,7 +105,7 @@ class SelectionSettings:
 
     def __post_init__(self) -> None:
         kinds = [name for name in get_args(Balance) if name != "margin"]
-        if not self._margin and self.balance not in kinds:
+        if not self._margin_name and self.balance not in kinds:
             known = suggest_names(self.balance, [*kinds, f"{MARGIN_BALANCE_PREFIX}NAME"])
             raise InvalidInputError(f"there is no balance {quote_value(self.balance)}; {known}")
         for name, kind in (("among", Among), ("success", Success)):
@@ -116,15 +119,15 @@ class SelectionSettings:
 
     def selection(self) -> Selection:
         """The settings as stored in trials files."""
-        more = {
-            "balance": "margin" if self._margin else self.balance,
-            "margin": self._margin,
+        balance = {
+            "balance": "margin" if self._margin_name else self.balance,
+            "margin": self._margin_name,
             "bins": self.bins if self._has_bins else 0,
         }
-        return Selection(**(asdict(self) | more))
+        return Selection(**(asdict(self) | balance))
 
     @property
-    def _margin(self) -> str:
+    def _margin_name(self) -> str:
         """Name of the margin to balance by; empty for another balance."""
         return (
             self.balance.removeprefix(MARGIN_BALANCE_PREFIX)
@@ -134,7 +137,7 @@ class SelectionSettings:
 
     @property
     def _has_bins(self) -> bool:
-        return bool(self._margin) or self.balance == "probability"
+        return bool(self._margin_name) or self.balance == "probability"
 
 
 def plan_trials(
@@ -155,11 +158,12 @@ def plan_trials(
         runs: one or several runs, of one scene or of many, or their folders. A grasp that several
             runs have judged on the same scene and station is tried once.
         settings: number, choice and order of the grasps; the defaults if None.
-        robustness: table with probabilities, of the only run; those in the runs' folders if None.
-        out: file to write; none if None.
+        robustness: table with probabilities, for a single run; tables in the folders of the runs
+            if None.
+        out: trials file to write; none if None.
 
     Returns:
-        The sheet. Its notes say where there were too few grasps.
+        The trials. `notes` names the objects with too few grasps.
 
     Raises:
         InvalidInputError: there is no run or no eligible grasp; or the file has entries already.
@@ -184,7 +188,7 @@ def plan_trials(
     folder = None if out is None else Path(os.path.realpath(out)).parent
     used = {pool.key: pool.run for pool, _, _ in chosen}
     sheet = TrialSheet(
-        created=datetime.now().astimezone().isoformat(timespec="seconds"),
+        created=current_time(),
         runs={key: make_source_run(used[key], folder) for key in sorted(used)},
         selection=selection,
         strata=strata,
@@ -198,7 +202,7 @@ def plan_trials(
 
 
 def require_unused(path: str | Path) -> None:
-    """Refuses to overwrite trials with entries in the file or its journal.
+    """Refuses to overwrite a trials file if it or its journal has entries.
 
     Raises:
         InvalidInputError: there are entries, or the file is no trials file.
@@ -221,8 +225,8 @@ def require_unused(path: str | Path) -> None:
 def _shuffle_trials(
     chosen: Chosen, selection: Selection
 ) -> list[tuple[int, EligibleGrasps, int, str]]:
-    """Puts blocks of each scene, and grasps of each block, into a random order; returns them with
-    block numbers.
+    """Divides the grasps of each scene at random into blocks, and puts the blocks into a random
+    order; returns the grasps with their block numbers.
     """
     seed = selection.seed
     by_scene: defaultdict[str, list[tuple[str, EligibleGrasps, int, str]]] = defaultdict(list)
@@ -233,10 +237,10 @@ def _shuffle_trials(
     blocks = []
     for scene, members in by_scene.items():
         members.sort(key=lambda member: member[0])
-        for turn, part in enumerate(np.array_split(np.arange(len(members)), selection.blocks)):
+        for k, part in enumerate(np.array_split(np.arange(len(members)), selection.blocks)):
             if len(part):
-                place = (turn, content_hash(seed, "block", scene, turn))
-                blocks.append((place, [members[i] for i in part.tolist()]))
+                block_rank = (k, content_hash(seed, "block", scene, k))
+                blocks.append((block_rank, [members[i] for i in part.tolist()]))
     blocks.sort(key=lambda block: block[0])
     return [
         (number, pool, k, key)
@@ -251,23 +255,23 @@ def _make_trials(
     pools = {pool.key: pool for _, pool, _, _ in ordered}
     tried = {str(pool.cells("id")[k]) for _, pool, k, _ in ordered}
     hashes = {key: grasp_contents(pool.run, tried) for key, pool in pools.items()}
-    cells = {
+    columns = {
         key: {name: pool.cells(name) for name in ("id", "instance", "object", "outcome")}
         for key, pool in pools.items()
     }
     trials = []
     for number, (block, pool, k, stratum) in enumerate(ordered, 1):
-        id, instance, held, outcome = (str(values[k]) for values in cells[pool.key].values())
+        row = {name: str(values[k]) for name, values in columns[pool.key].items()}
         trials.append(
             RealTrial(
                 number=number,
                 block=block,
                 run=pool.key,
-                grasp=id,
-                content=hashes[pool.key][id],
-                instance=instance,
-                object=held,
-                simulated=Outcome(outcome),
+                grasp=row["id"],
+                content=hashes[pool.key][row["id"]],
+                instance=row["instance"],
+                object=row["object"],
+                simulated=Outcome(row["outcome"]),
                 stratum=stratum,
             )
         )

@@ -56,8 +56,8 @@ def require_time(text: str, name: str) -> None:
 
 
 Success = Literal["lifted", "held"]
-"""What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)
-or the object turned in the hand (`lifted_turned`)."""
+"""Outcomes that count as success: `lifted` alone, or with `held` also `lifted_disturbed` (another
+object moved) and `lifted_turned` (the object turned in the hand)."""
 Balance = Literal["outcome", "stage", "margin", "probability", "none"]
 
 
@@ -271,20 +271,20 @@ class TrialSheet:
         require_time(self.created, "created")
         for key, stratum in self.strata.items():
             require_known(stratum.run, self.runs, "run", "strata", key, "run")
-        lines: dict[int, int] = {}
+        indices: dict[int, int] = {}
         for i, trial in enumerate(self.trials):
-            first = lines.setdefault(trial.number, i)
+            first = indices.setdefault(trial.number, i)
             if first != i:
                 raise FieldError(
                     f"number {trial.number} is used twice, by entries {first + 1} and "
                     f"{i + 1} of the list",
                     *("trials", i, "number"),
                 )
-            self._check(i, trial)
+            self._check_trial(i, trial)
 
-    def _check(self, i: int, trial: RealTrial) -> None:
-        """Refuses a trial with an unknown run or stratum, or the stratum of another run; a sheet
-        without strata is not balanced.
+    def _check_trial(self, i: int, trial: RealTrial) -> None:
+        """Refuses a trial with an unknown run or stratum, or with the stratum of another run or
+        object. If the file has no strata, those of trials are not checked.
         """
         require_known(trial.run, self.runs, "run", "trials", i, "run")
         if not self.strata:
@@ -292,11 +292,11 @@ class TrialSheet:
         require_known(trial.stratum, self.strata, "stratum", "trials", i, "stratum")
         stratum = self.strata[trial.stratum]
         for name in ("run", "object"):
-            theirs, own = getattr(stratum, name), getattr(trial, name)
-            if theirs != own:
+            expected, actual = getattr(stratum, name), getattr(trial, name)
+            if expected != actual:
                 raise FieldError(
-                    f"stratum {trial.stratum!r} is of {name} {theirs!r}, trial {trial.number} of"
-                    f" {own!r}",
+                    f"stratum {trial.stratum!r} is of {name} {expected!r}, trial {trial.number} of"
+                    f" {actual!r}",
                     *("trials", i, "stratum"),
                 )
 

@@ -1,4 +1,4 @@
-"""A run of the hand alone that all tests of the gap share."""
+"""A run of the hand alone, shared by all tests of the gap."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 TILT = math.radians(115.0)
 FROM_BELOW = grasp_from_axes((1, 0, 0), (0, math.sin(TILT), -math.cos(TILT)), (0.0, -0.064, 0.19))
-"""At its upper edge, from the side and below: the hand lifts it, but the arm would be in the
-table."""
+"""At the box's upper edge, from the side and below: the hand lifts the box, but the arm would
+collide with the table."""
 GRASPS = np.stack([ABOVE, FROM_BELOW, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
 
 
 class Here:
-    """An executor without processes, whose start costs more than these few trials."""
+    """An executor in this process, as starting others takes longer than these few trials."""
 
     workers = 1
 
     def judge(
         self, jobs: Iterable[Job], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
-        """One after the other."""
+        """Judges one candidate after the other."""
         for job in jobs:
             judge = job.make_judge()
             for candidate in job.candidates:
@@ -45,7 +45,8 @@ class Here:
 
 @pytest.fixture(scope="module", autouse=True)
 def no_chart_of_reach() -> Iterator[None]:
-    """How far the arm reaches is most of the work of a page, and `tests/evaluation` has it."""
+    """Leaves out the section on reachability, which takes longest and has tests in
+    `tests/evaluation`."""
     with pytest.MonkeyPatch.context() as patch:
         place = "burg_drake.evaluation.report.pages.reachability_section"
         patch.setattr(place, lambda run: None)
@@ -54,7 +55,8 @@ def no_chart_of_reach() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Of the household box: lifted; lifted where no arm comes; within the box."""
+    """A run on the household box; its grasps are lifted, lifted but out of the arm's reach, and in
+    collision with the box."""
     return evaluate(
         "tabletop_six",
         "panda_tabletop",

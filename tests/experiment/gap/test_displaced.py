@@ -1,4 +1,4 @@
-"""Where a commanded grasp is in the frame of an object that stands elsewhere."""
+"""Commanded grasps in the frames of displaced objects, and displaced scenes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def random_pose(seed: int) -> Array:
 
 
 def test_the_hand_stays_where_it_was_told_to_go(scene: Scene) -> None:
-    """By numpy alone: world poses before and after are the same."""
+    """World poses before and after are equal, calculated by numpy alone."""
     X_SO, X_OG = random_pose(1), np.stack([random_pose(2), random_pose(3)])
     now = displaced_scene(scene, {"mug": X_SO})
     X_OG_now = grasps_as_commanded(scene, now, "mug", X_OG)
@@ -57,7 +57,7 @@ def test_what_stands_as_planned_keeps_every_bit(scene: Scene) -> None:
 
 
 def test_a_scene_that_moves_as_a_whole_with_its_grasps_is_not_displaced(scene: Scene) -> None:
-    """With the same rigid motion of objects and hands grasps are the same ones."""
+    """The same rigid motion of objects and hand leaves the grasps as they are."""
     X_SS, X_OG = random_pose(6), random_pose(7)
     now = displaced_scene(scene, {name: X_SS @ scene.X_SO(name) for name in scene.instances})
     X_SG = X_SS @ scene.X_SO("bowl") @ X_OG
@@ -114,7 +114,7 @@ def test_no_noise_is_the_scene_itself(scene: Scene) -> None:
 def test_what_collides_is_drawn_again_and_counted(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a mug that may only stand further right, half of the draws are refused."""
+    """Half of the draws are rejected for a mug that may only stand further right."""
     x = scene.X_SO("mug")[0, 3]
     noise = PlacementNoise(turn=0.0)
 

@@ -1,4 +1,4 @@
-"""The same grasps in steps: what a step reuses, what it repeats, and what is told."""
+"""Steps of a gap measurement: reused and repeated verdicts, changes, page and figures."""
 
 from __future__ import annotations
 
@@ -35,32 +35,32 @@ from burg_drake.experiment import (
     reality_sentence,
     reality_table,
     step_sentences,
-    tried_grasps,
+    trials_of_run,
 )
 from burg_drake.scene import Scene
 from burg_drake.station import ENGINES
 from tests.experiment.gap.conftest import Here
 
-NONE = PlacementNoise(place=0.0, turn=0.0)
-ASKED: dict[str, Any] = {"executor": Here(), "progress": False}
+NO_NOISE = PlacementNoise(place=0.0, turn=0.0)
+OPTIONS: dict[str, Any] = {"executor": Here(), "progress": False}
 
 
 def steps(last: Mode, samples: int) -> GapSettings:
-    """So many, with objects where they should be."""
-    return GapSettings(last=last, samples=samples, noise=NONE)
+    """Steps up to a mode, and displaced scenes without placement errors."""
+    return GapSettings(last=last, samples=samples, noise=NO_NOISE)
 
 
 @pytest.fixture(scope="module")
 def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> GapSteps:
-    """The grasps of a run by the hand alone, and in a scene that is displaced by nothing."""
+    """Steps: the hand alone, and a displaced scene without placement errors."""
     out = tmp_path_factory.mktemp("gap") / "steps"
-    return measure_gap(run, out, settings=steps("hand", 1), **ASKED)
+    return measure_gap(run, out, settings=steps("hand", 1), **OPTIONS)
 
 
 @pytest.fixture(scope="module")
 def ladder(run: Run, by_hand: GapSteps) -> GapSteps:
-    """The same folder with one step more."""
-    found = measure_gap(run, by_hand.path, settings=steps("reach", 0), **ASKED)
+    """The steps of `by_hand` with the step `reach` between them."""
+    found = measure_gap(run, by_hand.path, settings=steps("reach", 0), **OPTIONS)
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
@@ -75,7 +75,7 @@ def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: GapSt
 
 @pytest.mark.thorough
 def test_reach_has_the_bits_of_a_run_of_its_own(ladder: GapSteps) -> None:
-    """The oracle is the judge that nobody has shortened."""
+    """The reference is the judge of mode `reach`, which executes every trial."""
     hand, reach = (step.runs[0] for step in ladder.steps[:2])
     judge = build_judge(hand.scene(), hand.station(), engine=hand.document.engine, mode="reach")
     for candidate in hand.candidates:
@@ -111,17 +111,17 @@ def test_other_steps_are_refused(run: Run, ladder: GapSteps) -> None:
     with pytest.raises(
         InvalidInputError, match=r"steps of another measurement \(source is '.*' there"
     ):
-        measure_gap("tabletop_six", ladder.path, settings=steps("reach", 5), **ASKED)
+        measure_gap("tabletop_six", ladder.path, settings=steps("reach", 5), **OPTIONS)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
         measure_gap(run, ladder.path, settings=GapSettings(last="reach"), progress=False)
 
 
 class Killed(Exception):
-    """The end of a process."""
+    """Stands for the end of a process."""
 
 
-class Ending:
-    """Answers one question and is killed."""
+class KilledExecutor:
+    """Returns one verdict, and is killed."""
 
     workers = 1
 
@@ -132,13 +132,13 @@ class Ending:
 
 
 def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) -> None:
-    """Killed within the second step; then comes the same run by another engine."""
+    """A measurement is killed within its second step, and started again with another engine."""
     with pytest.raises(Killed):
         measure_gap(
             run,
             tmp_path,
             settings=steps("reach", 0),
-            **ASKED | {"executor": Ending()},
+            **OPTIONS | {"executor": KilledExecutor()},
         )
     journal = tmp_path / "reach" / "journal.jsonl"
     before = journal.read_bytes()
@@ -150,7 +150,7 @@ def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) ->
             other,
             tmp_path,
             settings=steps("reach", 0),
-            **ASKED | {"executor": Ending()},
+            **OPTIONS | {"executor": KilledExecutor()},
         )
     (tmp_path / "gap.yaml").unlink()  # which older versions wrote at the end
     with pytest.raises(InvalidInputError, match=r"holds another run \(engine is"):
@@ -158,23 +158,23 @@ def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) ->
             other,
             tmp_path,
             settings=steps("reach", 0),
-            **ASKED | {"executor": Ending()},
+            **OPTIONS | {"executor": KilledExecutor()},
         )
     assert journal.read_bytes() == before
 
 
 def test_a_gap_that_came_to_nothing_does_not_take_the_folder(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="overlap"):
-        measure_gap(overlapping(run.scene()), tmp_path, settings=steps("hand", 0), **ASKED)
-    again = measure_gap(run, tmp_path, settings=steps("hand", 0), **ASKED)
+        measure_gap(overlapping(run.scene()), tmp_path, settings=steps("hand", 0), **OPTIONS)
+    again = measure_gap(run, tmp_path, settings=steps("hand", 0), **OPTIONS)
     assert again.document.source == run.document.hash
 
 
 def overlapping(scene: Scene) -> Scene:
-    """With the mug where the box is."""
-    there = scene.instance("box").X_SO
+    """The scene with the mug at the pose of the box."""
+    X_SO = scene.instance("box").X_SO
     instances = [
-        replace(i, X_SO=there) if i.object == "mug" else i for i in scene.document.instances
+        replace(i, X_SO=X_SO) if i.object == "mug" else i for i in scene.document.instances
     ]
     return replace(scene, document=replace(scene.document, instances=tuple(instances)))
 
@@ -191,7 +191,7 @@ def test_options_of_a_scene_are_refused_with_a_run(
 
 
 def stated(run: Run, outcomes: dict[str, Outcome]) -> Run:
-    """The run with other verdicts."""
+    """The run with other outcomes."""
     verdicts = {
         id: Verdict(outcome, outcome.stage, blocker="bowl" if outcome.stage != "executed" else "")
         for id, outcome in outcomes.items()
@@ -203,7 +203,7 @@ def stated(run: Run, outcomes: dict[str, Outcome]) -> Run:
 
 @pytest.fixture
 def known(ladder: GapSteps) -> GapSteps:
-    """Steps with verdicts that are given: of three grasps one is lost in each step."""
+    """Steps with given outcomes: each step after the first loses one of three grasps."""
     hand = ladder.steps[0].runs[0]
     one, two, three = hand.candidates.id
     good = Outcome.LIFTED
@@ -234,7 +234,7 @@ def test_what_is_lost_and_won_is_counted(known: GapSteps) -> None:
 
 
 def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: GapSteps) -> None:
-    """The second one, which the first step lost, was ended from outside."""
+    """The simulation of the second grasp, which the step lost, fails instead."""
     one, two, three = known.first.candidates.id
     reach = known.steps[1].runs[0]
     table = {id: verdict.outcome for id, verdict in reach.verdicts.items()}
@@ -251,7 +251,7 @@ def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: GapSteps) ->
 
 
 def real_trials(run: Run, *outcomes: RealOutcome) -> list[RealTrial]:
-    """One of each grasp."""
+    """A trial of each grasp, with these outcomes."""
     contents = grasp_contents(run, run.candidates.id)
     return [
         RealTrial(
@@ -271,7 +271,7 @@ def real_trials(run: Run, *outcomes: RealOutcome) -> list[RealTrial]:
 
 
 def sheet_of(run: Run, trials: tuple[RealTrial, ...]) -> TrialSheet:
-    """A sheet that does not say what its trials were chosen from."""
+    """A trials file without strata."""
     document = run.document
     source = SourceRun(
         path=str(run.path),
@@ -288,10 +288,10 @@ def sheet_of(run: Run, trials: tuple[RealTrial, ...]) -> TrialSheet:
 def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
     trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
     sheet = sheet_of(run, (trials[0], replace(trials[1], content="0123456789ab")))
-    assert tried_grasps(sheet, "trials.yaml", run) == trials[:1]
+    assert trials_of_run(sheet, "trials.yaml", run) == trials[:1]
     own = replace(sheet, runs={"a": replace(sheet.runs["a"], hash=run.document.hash)})
     with pytest.raises(InvalidInputError, match=r"trial 2: grasp .* it had 0123456789ab when"):
-        tried_grasps(own, "trials.yaml", run)
+        trials_of_run(own, "trials.yaml", run)
 
 
 def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
@@ -300,14 +300,14 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     later = replace(trials[0], number=4, outcome=None)
     sheet = sheet_of(known.first, (*trials, later))
     found = agreement_by_step(known, sheet, [*trials, later], "lifted")
-    assert [(a.step, *a.found.cells) for a in found] == [
+    assert [(a.step, *a.selected.cells) for a in found] == [
         ("hand", 1, 1, 1, 0),
         ("reach", 2, 0, 0, 1),
         ("placed", 1, 0, 1, 0),
     ]
-    assert found[1].found.precision.value == 1.0
-    assert found[2].found.recall.value == 0.5
-    assert all(a.all_grasps is None and a.estimated is a.found for a in found)
+    assert found[1].selected.precision.value == 1.0
+    assert found[2].selected.recall.value == 0.5
+    assert all(a.all_grasps is None and a.estimated is a.selected for a in found)
     assert "each counted once" in reality_sentence(found)
     stopped = [replace(t, outcome=RealOutcome.NO_PATH) for t in trials]
     apart = agreement_by_step(known, sheet, stopped, "lifted")
@@ -315,8 +315,8 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
 
 
 def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known: GapSteps) -> None:
-    """Of 100 grasps, 10 of which the hand lifts, it was right about one of two, and about none of
-    the 90 that it does not lift: by hand."""
+    """The hand lifts 10 of 100 grasps. Its verdicts are right in one of two trials on these 10, and
+    wrong in the only trial on the other 90; expected figures are calculated by hand."""
     trials = real_trials(
         known.first, *[RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED]
     )
@@ -329,7 +329,7 @@ def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known
     told = [replace(trial, stratum=label) for trial, label in zip(trials, labels, strict=True)]
     sheet = replace(sheet_of(known.first, tuple(told)), strata=strata)
     hand = agreement_by_step(known, sheet, told, "lifted")[0]
-    assert hand.found.accuracy.value == pytest.approx(1 / 3)
+    assert hand.selected.accuracy.value == pytest.approx(1 / 3)
     assert hand.all_grasps is not None
     assert hand.all_grasps.cells == pytest.approx((5, 5, 90, 0))
     assert hand.estimated.accuracy.value == pytest.approx(0.05)
@@ -350,7 +350,7 @@ def test_the_page_shows_all_sections(ladder: GapSteps) -> None:
 
 
 def test_what_the_approach_pushes_is_told_by_object(known: GapSteps) -> None:
-    """Five trials of the arm, as a table has them; one has failed."""
+    """Result rows of five trials of the arm; one simulation failed."""
     arm = Run(known.first.path, known.first.document)
     arm.__dict__["results"] = {
         "instance": np.array(["box", "box", "mug", "mug", "mug"]),

@@ -1,4 +1,4 @@
-"""Real trials judged again where their objects stood."""
+"""Real trials judged again with objects at their measured poses."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def test_each_trial_is_judged_where_its_objects_stood(run: Run, found: Rejudging
 
 
 def test_the_hand_goes_where_it_was_sent(run: Run, found: Rejudging) -> None:
-    """World poses by scipy's rotations, in which the code takes no part."""
+    """World poses are calculated by scipy, independently of the code."""
     away, scene = found.trials[1], run.scene()
     assert away.candidate is not None and away.scene is not None
     there = scene.X_SO("box") @ run.candidate(away.grasp).X_OG
@@ -209,7 +209,7 @@ def test_what_the_hand_alone_cannot_predict_is_left_to_nothing(
 def test_an_answer_that_is_lost_is_asked_for_again(
     run: Run, sheet: TrialSheet, found: Rejudging, tmp_path: Path
 ) -> None:
-    """Killed within the last line: that trial alone goes to the judge, who knows it already."""
+    """The last line of the journal is torn, so only its trial is judged again."""
     whole = (found.path / "journal.jsonl").read_bytes()
     *kept, last = whole.splitlines(keepends=True)
     (tmp_path / "journal.jsonl").write_bytes(b"".join(kept) + last[:20])
@@ -279,7 +279,7 @@ def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
 def test_compare_tells_it_all(
     sheet: TrialSheet, found: Rejudging, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """All is known: nothing is simulated here."""
+    """All verdicts are known, so nothing is simulated."""
     folder = found.path.parent
     save_trials(sheet, folder / "trials.yaml")
     words = ["compare", str(folder / "run"), str(folder / "trials.yaml")]
@@ -321,7 +321,7 @@ def test_a_row_replays_in_the_scene_as_measured(
 
 
 class Nobody:
-    """An executor that nobody may ask."""
+    """An executor that fails the test if it is used."""
 
     workers = 1
 
@@ -339,7 +339,7 @@ def test_a_run_that_is_gone_or_another_one_is_refused(run: Run, sheet: TrialShee
 def test_another_grasp_of_the_same_id_is_not_judged_again(
     run: Run, sheet: TrialSheet, tmp_path: Path
 ) -> None:
-    """And of two runs that may stand for it, the one that has the grasps does."""
+    """Of two runs that may replace the source, the run that has the grasps does."""
     trial = replace(sheet.trials[0], content="0123456789ab")
     other = replace(sheet, runs={"a": replace(sheet.runs["a"], hash="0123")}, trials=(trial,))
     found = rejudge(other, "t.yaml", tmp_path, runs={"a": run}, executor=Nobody(), progress=False)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Trials of two scenes, and their pictures, made once a process."""
+"""Trials of two scenes, and their pictures, made once in each process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.experiment.pages.tried import make_runs, make_trials
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the runs; copy it to change anything."""
+    """A folder with the runs; tests that change it work on a copy."""
     folder = tmp_path_factory.mktemp("tried")
     with pytest.MonkeyPatch.context() as patch:
         make_trials(folder, make_runs(folder, patch))
@@ -23,7 +23,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def trials(made: Path, tmp_path: Path) -> Path:
-    """A trials file of one's own, with its runs."""
+    """A trials file with its runs, as a copy for one test."""
     shutil.copytree(made, tmp_path / "lab")
     return tmp_path / "lab" / "trials.yaml"
 
@@ -37,5 +37,5 @@ def runs(made: Path) -> TriedRuns:
 
 @pytest.fixture(scope="session")
 def pictures(runs: TriedRuns) -> TrialPictures:
-    """By Drake's renderer."""
+    """Pictures by Drake's renderer."""
     return TrialPictures(runs)

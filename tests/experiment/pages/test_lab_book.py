@@ -1,4 +1,4 @@
-"""Entries of the page of the lab: from several browsers, late, and twice; none is lost."""
+"""Entries of the lab page from several browsers, late, and repeated: none is lost."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def lab(trials: Path) -> LabBook:
 
 
 def entry(lab: LabBook, number: int, outcome: str | None, **more: object) -> LabEntry:
-    """As a browser makes it that has seen the file as it is now."""
+    """An entry by a browser that has seen the present file."""
     state = trial_state_hash(lab.sheet().trial(number))
     chosen = None if outcome is None else RealOutcome(outcome)
     made = LabEntry(number=number, replaces=state, outcome=chosen, time=TIME, operator="AB")

@@ -1,4 +1,4 @@
-"""Trials of two scenes with their runs, without physics: verdicts follow from the grasps' ids."""
+"""Trials of two scenes with their runs, without simulation: verdicts follow from grasp ids."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 def grasps_of(height: float, object: str, count: int) -> GraspSet:
-    """Grasps from above and from sides, turned about the vertical one by one."""
+    """Grasps from above and from the sides, each turned further about the vertical."""
     poses = []
     for k in range(count):
         a, tilt = 0.7 * k, 0.3 * (k % 3)
@@ -79,7 +79,7 @@ def make_trials(folder: Path, runs: list[Run], **first: object) -> Path:
     trials: list[RealTrial] = []
     for block, run in enumerate(runs, 1):
         for candidate in run.candidates:
-            thing = run.scene().instance(candidate.instance).object
+            object_name = run.scene().instance(candidate.instance).object
             trials.append(
                 RealTrial(
                     number=len(trials) + 1,
@@ -88,9 +88,9 @@ def make_trials(folder: Path, runs: list[Run], **first: object) -> Path:
                     grasp=candidate.id,
                     content=grasp_content(candidate.instance, candidate.X_OG, candidate.width),
                     instance=candidate.instance,
-                    object=thing,
+                    object=object_name,
                     simulated=run.verdicts[candidate.id].outcome,
-                    stratum=f"r{block}_{thing}",
+                    stratum=f"r{block}_{object_name}",
                 )
             )
     trials[0] = replace(trials[0], **first)

@@ -1,4 +1,4 @@
-"""The protocol: every trial once, blind, and nothing of it unescaped."""
+"""The protocol has every trial once, hides simulated outcomes, and escapes all texts."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ import pytest
 from burg_drake.core import Outcome, RealOutcome, make_pose
 from burg_drake.experiment import (
     MAIN_OUTCOMES,
+    ProtocolOptions,
     RealTrial,
     RobotReport,
-    SheetOptions,
     TrialPictures,
     TriedRuns,
     approach_text,
     closing_text,
-    sheet_page,
+    protocol_page,
 )
 
 VOID = {"meta", "br", "img"}
@@ -61,7 +61,7 @@ class Pages(HTMLParser):
             self.cards[self._card] += f" {data}"
 
 
-class Twice:
+class CachedPictures:
     """Makes each picture once for all pages of a test."""
 
     def __init__(self, pictures: TrialPictures) -> None:
@@ -85,11 +85,11 @@ def with_trials(runs: TriedRuns, change: object) -> TriedRuns:
 
 @pytest.fixture(scope="module")
 def once(pictures: TrialPictures) -> TrialPictures:
-    return Twice(pictures)  # type: ignore[return-value]
+    return CachedPictures(pictures)  # type: ignore[return-value]
 
 
 def test_every_trial_is_there_once(runs: TriedRuns, once: TrialPictures) -> None:
-    page = sheet_page(runs, once)
+    page = protocol_page(runs, once)
     pages = Pages(page)
     assert list(pages.cards) == [f"trial-{t.number}" for t in runs.sheet.trials]
     assert all(link.startswith("data:image/jpeg;base64,") for link in pages.links)
@@ -107,10 +107,10 @@ def test_the_operator_cannot_know_what_was_simulated(runs: TriedRuns, once: Tria
         return replace(trial, simulated=Outcome.DROPPED, stratum=trial.stratum)
 
     changed = with_trials(runs, other)
-    assert sheet_page(changed, once) == sheet_page(runs, once)
-    shown = SheetOptions(show_simulated=True)
-    assert sheet_page(changed, once, shown) != sheet_page(runs, once, shown)
-    assert "simulated" not in sheet_page(runs, once)
+    assert protocol_page(changed, once) == protocol_page(runs, once)
+    shown = ProtocolOptions(show_simulated=True)
+    assert protocol_page(changed, once, shown) != protocol_page(runs, once, shown)
+    assert "simulated" not in protocol_page(runs, once)
 
 
 def test_entries_are_filled_in_and_escaped(runs: TriedRuns, once: TrialPictures) -> None:
@@ -126,7 +126,7 @@ def test_entries_are_filled_in_and_escaped(runs: TriedRuns, once: TrialPictures)
             )
         return replace(trial, outcome=RealOutcome.NO_PATH) if trial.number == 2 else trial
 
-    page = sheet_page(with_trials(runs, carried_out), once)
+    page = protocol_page(with_trials(runs, carried_out), once)
     cards = Pages(page).cards
     assert NOTE not in page and html.escape(NOTE) in page
     assert NOTE in cards["trial-1"] and "<AB>" in cards["trial-1"]
