@@ -139,7 +139,7 @@ def _require_rigid(X: Array, name: str, first: int = 0) -> None:
     """Refuses poses (..., 4, 4) that are not rigid; `first` is the index of the first one."""
     tolerance = 1e-6  # Largest deviation from orthonormality.
 
-    def refuse(bad: NDArray[np.bool_], what: str) -> None:
+    def refuse(bad: NDArray[np.bool_] | np.bool_, what: str) -> None:
         if bad.any():
             index = np.argwhere(bad)[0]
             index[:1] += first
