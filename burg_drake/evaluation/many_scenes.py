@@ -320,7 +320,7 @@ class _CampaignCall:
         self.scene_request = replace(self.request, shard=self.campaign.document.shard_of_grasps)
         self.judged = 0
         asked = self.request.settings.scene_reports
-        self.reports = self.campaign.document.has_few_scenes if asked is None else asked
+        self.reports = self.campaign.document.writes_scene_reports if asked is None else asked
 
     def run(self) -> Campaign:
         """Judges all unfinished scenes; returns the updated run."""

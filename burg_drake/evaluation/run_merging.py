@@ -99,7 +99,7 @@ def lock_file(folder: Path) -> Path:
 
 def _finish_campaign(campaign: Campaign) -> None:
     document = campaign.document
-    reports = document.has_few_scenes
+    reports = document.writes_scene_reports
     for place in campaign.places:
         if not (place.folder / RUN_FILE).exists():
             continue

@@ -216,7 +216,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     assert judged("failed") == [crashing] and run.failures == []
     assert same_results(run, whole)
     assert read_table(run.table_path)["outcome"].tolist() == whole.results["outcome"].tolist()
-    assert [stretch.judged for stretch in run.document.stretches] == [30, 1, 1, 1]
+    assert [session.judged for session in run.document.stretches] == [30, 1, 1, 1]
 
 
 @pytest.mark.thorough

@@ -87,7 +87,7 @@ def test_an_interrupted_call_goes_on(
     again = run_all(scenes, station, tmp_path / "again", executor=rest)
     assert rest.judged == 40 - 17
     assert same(whole.results, again.results)
-    assert [stretch.judged for stretch in again.document.stretches] == [17, 23]
+    assert [session.judged for session in again.document.stretches] == [17, 23]
     nothing = Inline()
     files = {p: p.stat().st_mtime_ns for p in again.path.rglob("*") if p.is_file()}
     run_all(scenes, station, tmp_path / "again", executor=nothing)
@@ -165,7 +165,7 @@ def test_of_many_scenes_only_who_asks_gets_reports(
     def reports() -> list[bool]:
         return [run.report_path.exists() for run in campaign.runs]
 
-    monkeypatch.setattr("burg_drake.evaluation.run_document.MAX_SCENES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.run_document.MAX_SCENES_WITH_REPORTS", 2)
     campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
     assert campaign.complete and reports() == [False] * 3
     assert all(run.table_path.exists() for run in campaign.runs)
