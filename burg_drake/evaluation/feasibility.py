@@ -50,7 +50,7 @@ from burg_drake.evaluation.judge import (
     arm_reach,
     arm_screen,
     arm_settings,
-    hand_alone,
+    build_hand_clearance,
     hand_screen,
 )
 from burg_drake.evaluation.results_table import Columns, columns_of_verdicts, pose_columns
@@ -414,7 +414,7 @@ class ReachJudge:
         from burg_drake.motion import Planner
 
         scene, station = factory.scene, factory.station
-        hand, X_WO = hand_alone(scene, station)
+        hand, X_WO = build_hand_clearance(scene, station)
         arm = arm_reach(scene, station, factory.motion, exact=factory.exact)
         with_plans = factory.plans is not None
         self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=with_plans))

@@ -92,7 +92,7 @@ class Dispatch:
         self.jobs: list[ClusterJob] = []
         self.sent: dict[str, SentChunk] = {}
         self._maintain = maintain
-        self._coming: Iterator[ClusterJob | None] = iter(())
+        self._remaining_jobs: Iterator[ClusterJob | None] = iter(())
         self._exhausted = False
         self._answering: set[str] = set()
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -109,7 +109,7 @@ class Dispatch:
         Raises:
             ClusterError: a worker has other software versions, or the scheduler is lost.
         """
-        self._coming = jobs
+        self._remaining_jobs = jobs
         self.begin()
         try:
             while True:
@@ -226,7 +226,7 @@ class Dispatch:
 
     def open_next_job(self) -> ClusterJob | None:
         """The next job, if one is ready."""
-        for job in self._coming:
+        for job in self._remaining_jobs:
             if job is not None:  # None: no job is ready yet
                 self.jobs.append(job)
             return job

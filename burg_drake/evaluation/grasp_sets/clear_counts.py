@@ -32,7 +32,7 @@ from burg_drake.evaluation.grasp_sets.sampling import (
     approach_cone_from_above,
     shortfall_note,
 )
-from burg_drake.evaluation.judge import arm_reach, hand_alone
+from burg_drake.evaluation.judge import arm_reach, build_hand_clearance
 from burg_drake.evaluation.settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
 from burg_drake.motion import Reach, reach_without_objects
 from burg_drake.objects import ObjectLibrary
@@ -111,7 +111,7 @@ def _sample_alone(
     placed = Instance(object=object, X_SO=Pose.from_matrix(X_WO))
     document = SceneDocument(name=object, library=str(library.root), instances=(placed,))
     alone = Scene(document, library, library.root)
-    screen, _ = hand_alone(alone, bare)
+    screen, _ = build_hand_clearance(alone, bare)
     # 40 antipodal grasps are tried for each wanted one, which bounds the time to a second
     sampler = ObjectSampler(library, station, 40 * n, seed, SamplingSettings())
     tried = sampler(object, approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG))
@@ -242,7 +242,7 @@ def grasp_counts(
         raise InvalidInputError(f"grasps per object is {grasps_per_object}; give 1 or more")
     if not names:
         return
-    hand, X_WO = hand_alone(scene, station)
+    hand, X_WO = build_hand_clearance(scene, station)
     placed = []
     for name in names:
         object = scene.instance(name).object

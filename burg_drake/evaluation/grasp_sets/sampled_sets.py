@@ -26,7 +26,7 @@ from burg_drake.core import (
 from burg_drake.evaluation.candidates import INSTANCE_COLUMN
 from burg_drake.evaluation.grasp_sets.input import object_files, set_documents
 from burg_drake.evaluation.grasp_sets.sampling import sample_library, sample_on_scene
-from burg_drake.evaluation.judge import hand_alone
+from burg_drake.evaluation.judge import build_hand_clearance
 from burg_drake.evaluation.settings import SamplingSettings
 from burg_drake.geometry import Surface
 from burg_drake.grasping import (
@@ -283,7 +283,7 @@ def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
 def _clearances(
     instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: ProgressMeter
 ) -> dict[str, Any]:
-    screen, _ = hand_alone(scene, station)
+    screen, _ = build_hand_clearance(scene, station)
     columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
     for name in sorted(set(instance.tolist())):
         for some in _batches(instance == name):

@@ -26,7 +26,7 @@ from burg_drake.evaluation.candidates import (
     drop_equal_grasps,
     join_candidates,
 )
-from burg_drake.evaluation.judge import hand_alone
+from burg_drake.evaluation.judge import build_hand_clearance
 from burg_drake.evaluation.settings import (
     DEFAULT_APPROACH_ANGLE_DEG,
     SLIPPERY_FRICTION_FACTOR,
@@ -198,7 +198,7 @@ def sample_on_scene(
         from burg_drake.station import instance_pose
 
         draw = ObjectSampler(scene.library, station, n, seed, settings)
-        screen = None if settings.blind else hand_alone(scene, station)[0]
+        screen = None if settings.blind else build_hand_clearance(scene, station)[0]
         found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
         for name in names:
             object, X_WO = scene.instance(name).object, instance_pose(scene, station, name)
