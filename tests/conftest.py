@@ -177,8 +177,8 @@ def judged_here() -> Iterator[None]:
     from burg_drake.evaluation import JudgePool, SceneProcesses
     from tests.evaluation.scenes_here import ScenesHere
 
-    def scenes(preparer: Any, outputs: Any, workers: int) -> Any:
-        return (ScenesHere if workers == 1 else SceneProcesses)(preparer, outputs, workers)
+    def scenes(request: Any, outputs: Any, workers: int) -> Any:
+        return (ScenesHere if workers == 1 else SceneProcesses)(request, outputs, workers)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("burg_drake.evaluation.many_scenes.SceneProcesses", scenes)

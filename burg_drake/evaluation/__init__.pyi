@@ -183,7 +183,7 @@ from .outcome_counts import (
 from .part_store import (
     PARTS_FOLDER as PARTS_FOLDER,
     PartWriter as PartWriter,
-    read_journal_tails as read_journal_tails,
+    read_journal_counts as read_journal_counts,
 )
 from .replay import (
     TrialInputs as TrialInputs,

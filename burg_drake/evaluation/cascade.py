@@ -216,7 +216,7 @@ def _judge_open_grasps(
     total = len(run.assigned_ids)
     done = total - len(left)
     outcomes = run.index.count_outcomes(left)
-    pace = ProgressMeter(
+    meter = ProgressMeter(
         reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
     )
     session = begin_session(executor.workers, int(run.index.judged.sum()))
@@ -229,7 +229,7 @@ def _judge_open_grasps(
             for _, candidate, verdict in verdicts:
                 journal.append(candidate.id, verdict)
                 judged += 1
-                pace.step(outcome=verdict.outcome)
+                meter.step(outcome=verdict.outcome)
     finally:
         session = session.finish(judged, begun)
         document = add_session(document, session)

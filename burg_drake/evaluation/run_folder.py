@@ -62,7 +62,7 @@ class StoredRun:
     """Folder of a run whose rows are stored in parts.
 
     Attributes:
-        scene: name of its scene in the parts; empty for a run of one scene.
+        scene: name of the scene in the parts; empty for a run of one scene.
         folder: folder of the run.
     """
 
@@ -71,7 +71,7 @@ class StoredRun:
 
     @property
     def journal(self) -> Path:
-        """Path of its journal."""
+        """Path of the journal."""
         return self.folder / JOURNAL_FILE
 
 
@@ -137,8 +137,8 @@ class Run:
         return not len(self.left)
 
     @property
-    def places(self) -> list[StoredRun]:
-        """Folder of the run of its one scene; see `Campaign.places`."""
+    def stored_runs(self) -> list[StoredRun]:
+        """The run itself, as that of its one scene; see `Campaign.stored_runs`."""
         return [StoredRun("", self.path)]
 
     @property

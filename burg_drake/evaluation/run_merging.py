@@ -21,14 +21,14 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation.campaign_folder import (
     CAMPAIGN_LOCK_FILE,
-    LEDGER_FILE,
+    SCENE_STATES_FILE,
     SCENES_FOLDER,
     Campaign,
     SceneState,
     is_campaign,
-    ledger_text,
     open_results,
     save_campaign,
+    scene_states_text,
 )
 from burg_drake.evaluation.candidates import share_rows
 from burg_drake.evaluation.journal import JOURNAL_FILE, WriterLock, hold_unchanged
@@ -100,12 +100,12 @@ def lock_file(folder: Path) -> Path:
 def _finish_campaign(campaign: Campaign) -> None:
     document = campaign.document
     reports = document.writes_scene_reports
-    for place in campaign.places:
-        if not (place.folder / RUN_FILE).exists():
+    for stored in campaign.stored_runs:
+        if not (stored.folder / RUN_FILE).exists():
             continue
-        size = place.journal.stat().st_size
-        if not is_finished(place.folder, size, document.table, report=reports):
-            finish_run(load_run(place.folder), document.table, report=reports)
+        size = stored.journal.stat().st_size
+        if not is_finished(stored.folder, size, document.table, report=reports):
+            finish_run(load_run(stored.folder), document.table, report=reports)
     update_parts(campaign)
     write_campaign_report(campaign)
 
@@ -142,7 +142,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
     for name in merged.names:
         merge.add_scene(name)
     merge.copy_parts()
-    atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
+    atomic_write(staging / SCENE_STATES_FILE, scene_states_text(merge.states))
     save_campaign(merged)
     return MissingFromMerge(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 

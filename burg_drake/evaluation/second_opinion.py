@@ -189,14 +189,14 @@ def _judge_scenes(
 ) -> Campaign:
     """Judges the contested grasps of each scene again, and updates tables, reports and parts."""
     with WriterLock(campaign.path / CAMPAIGN_LOCK_FILE):
-        document, ledger = campaign.document, SceneStates(campaign.path)
-        done = {name for name, state in ledger.states.items() if state.state == "done"}
+        document, scene_states = campaign.document, SceneStates(campaign.path)
+        done = {name for name, state in scene_states.states.items() if state.state == "done"}
         contested = {g.name: g.contested for g in summarize(campaign).scenes if g.name in done}
         reports = {name: (campaign.folder(name) / REPORT_FILE).exists() for name in contested}
         folders = {name: campaign.folder(name) for name in contested}
 
         def is_settled(name: str) -> bool:
-            size, table = ledger.states[name].size, document.table
+            size, table = scene_states.states[name].size, document.table
             return is_finished(folders[name], size, table, report=reports[name])
 
         names = [name for name, n in contested.items() if n or not is_settled(name)]
@@ -205,7 +205,7 @@ def _judge_scenes(
             name = run.path.name
             finish_run(run, document.table, report=reports[name])
             size = (run.path / JOURNAL_FILE).stat().st_size
-            ledger.note(replace(ledger.states[name], size=size))
+            scene_states.note(replace(scene_states.states[name], size=size))
 
         runs = (load_run(campaign.folder(name)) for name in names)
         session, begun = begin_session(executor.workers, sum(contested.values())), time.monotonic()

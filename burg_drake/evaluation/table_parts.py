@@ -42,8 +42,8 @@ class JournalSegment:
         scene: name of the journal's scene in the run; empty in a run of one scene.
         begin, end: range of bytes of the journal.
         rows: number of rows in the part.
-        whole, last: hashes of these bytes, and of the last `SEGMENT_TAIL` of them.
-        modified: date of the journal when the part was made [ns]; 0 if it was longer.
+        whole, last: hash of these bytes, and of the last `SEGMENT_TAIL` bytes.
+        modified: date of the journal when the part was made [ns]; 0 if the journal went on.
     """
 
     scene: str
@@ -97,8 +97,8 @@ def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bo
     return _stream_hash(stream, segment.begin, segment.end) == segment.whole
 
 
-def whole_lines(journal: Path) -> int:
-    """Number of bytes up to the end of the last complete line of a journal."""
+def last_line_end(journal: Path) -> int:
+    """Byte at which the last complete line of a journal ends; 0 if there is none."""
     if not journal.exists():
         return 0
     with open_regular(journal) as stream:
@@ -114,7 +114,7 @@ def whole_lines(journal: Path) -> int:
 
 
 def line_end(journal: Path, place: int) -> int:
-    """End of the journal line that contains the byte at `place`."""
+    """Byte at which the journal line ends that contains the byte `place`."""
     with open_regular(journal) as stream:
         stream.seek(place)
         return place + len(stream.readline())

@@ -19,7 +19,7 @@ from burg_drake.core import (
     count_with_noun,
     format_count,
 )
-from burg_drake.evaluation.campaign_folder import LEDGER_FILE, SCENES_FOLDER, Campaign
+from burg_drake.evaluation.campaign_folder import SCENE_STATES_FILE, SCENES_FOLDER, Campaign
 from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, member_codes
 from burg_drake.evaluation.report.failure_sections import (
     CAUSE_MARGINS,
@@ -191,7 +191,7 @@ def renew_report(campaign: Campaign) -> None:
     Raises:
         InvalidInputError: it cannot be written.
     """
-    known, report = campaign.path / LEDGER_FILE, campaign.report_path
+    known, report = campaign.path / SCENE_STATES_FILE, campaign.report_path
     since = known.stat().st_mtime_ns if known.exists() else 0
     if not report.exists() or report.stat().st_mtime_ns < since:
         write_campaign_report(campaign)

@@ -47,7 +47,7 @@ def reproduce_campaign_command(campaign: Campaign) -> str:
     grasps = _sampling_options(document)
     if not grasps:
         return document.command
-    begun = (place.folder / STATION_FILE for place in campaign.places)
+    begun = (stored.folder / STATION_FILE for stored in campaign.stored_runs)
     station = next((path for path in begun if path.is_file()), None)
     words = [*_command_words(document, grasps, station), "-o", str(campaign.path)]
     scenes = _scene_words([entry.path for entry in document.scenes])
