@@ -212,8 +212,6 @@ from .report.page_elements import (
     folded_section as folded_section,
     header as header,
     html_page as html_page,
-    interval_mark as interval_mark,
-    nice_step as nice_step,
     number_cells as number_cells,
     section as section,
     style_sheet as style_sheet,

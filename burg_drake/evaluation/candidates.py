@@ -282,8 +282,8 @@ class InstanceNames:
     Attributes:
         scene: the scene with the instances.
         path: path of the file, for messages.
-        given: names of the scene's objects or instances by the file's names; the key "" stands for
-            any name in the file.
+        given: names of objects or instances of the scene, by object names in the file; the key ""
+            stands for any name in the file.
         is_file: whether the grasps come from a file, so that the user can map its names.
     """
 

@@ -393,13 +393,13 @@ def _judge_grasps(
     event = Progress(
         STARTING_PHASE, done, total, outcomes=outcomes, counted_outcome=Outcome.REACHABLE
     )
-    pace = ProgressMeter(reporter.show, event, "judging")
+    meter = ProgressMeter(reporter.show, event, "judging")
     with closing(judge_all(left, factory, workers=workers)) as judged:
         for candidate, verdict in judged:
             verdicts[candidate.id] = verdict
             if journal is not None:
                 journal.append(candidate.id, verdict)
-            pace.step(outcome=verdict.outcome)
+            meter.step(outcome=verdict.outcome)
     return verdicts
 
 

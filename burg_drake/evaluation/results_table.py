@@ -198,7 +198,7 @@ class TextValues(NamedTuple):
         return self.names.index(text) if text in self.names else -1
 
     def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
-        """The `most` most frequent texts of some rows, with counts; without empty texts."""
+        """The `most` most frequent texts of some rows (M,), with counts; without empty texts."""
         counts = np.bincount(self.codes[rows], minlength=len(self.names))
         ranked = np.argsort(-counts, kind="stable").tolist()
         found = [(self.names[k], int(counts[k])) for k in ranked if counts[k] and self.names[k]]
@@ -399,8 +399,8 @@ def best_rows(
 
     Ranked by the clearance of the open hand, in steps of 0.5 mm. Of all margins it best predicts
     how often a grasp is lifted if pose, mass and friction are perturbed, as in four of five
-    failures the open hand then hits something: its rank correlation with that share is 0.6, those
-    of the other margins are between -0.35 and 0.25 (`benchmarks/best.py`). Ties go to the smaller
+    failures the open hand then hits something: its rank correlation with that share is 0.6, that
+    of any other margin is between -0.35 and 0.25 (`benchmarks/best.py`). Ties go to the smaller
     disturbance, slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm, rounded to 0.1 mm and
     0.1 deg; then to the larger contact patch of the weaker pad, rounded to 1 mm2, to the higher
     score of the sampler, and by id. Contested grasps, and those without a known clearance, rank
@@ -421,7 +421,7 @@ def best_rows(
         chosen &= rows_of_names(only, "the table", columns["object"], columns["instance"])
     lifted = np.flatnonzero(chosen)
     lifted = _clearest_rows(columns, lifted, count, each=each)
-    room = _clearance_steps(columns, lifted)
+    clearance_steps = _clearance_steps(columns, lifted)
     penalty = (
         _round_to_step(columns["slip"][lifted], 1e-4) / 0.005
         + _round_to_step(columns["tilt"][lifted], float(np.deg2rad(0.1))) / 0.1
@@ -430,7 +430,7 @@ def best_rows(
     patch = _round_to_step(columns["patch_area"][lifted], 1e-6)
     score = np.nan_to_num(columns["score"][lifted], nan=-np.inf)
     # equal sums may differ in their last digits
-    order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -room))
+    order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -clearance_steps))
     ranked = lifted[order].tolist()
     if not each:
         return [int(row) for row in ranked[:count]]
@@ -467,9 +467,10 @@ def _clearest_rows(
         groups = [rows[objects == name] for name in set(objects.tolist())]
     kept = []
     for mine in groups:
-        room = _clearance_steps(columns, mine)
-        least = np.partition(room, len(room) - count)[-count] if 0 < count < len(room) else -np.inf
-        kept.append(mine[room >= least])
+        steps = _clearance_steps(columns, mine)
+        most = len(steps)
+        least = np.partition(steps, most - count)[-count] if 0 < count < most else -np.inf
+        kept.append(mine[steps >= least])
     return np.sort(np.concatenate(kept)) if kept else rows
 
 

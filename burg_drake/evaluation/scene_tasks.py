@@ -303,7 +303,7 @@ class SceneProcesses:
         """Waits for the next prepared scene; None if there are no more.
 
         Returns:
-            The scene's task with the scene, an error if it cannot be judged, or None without grasps.
+            The task, and the scene, an error if it cannot be judged, or None without grasps.
         """
         return self._prefetcher.take()
 

@@ -236,7 +236,7 @@ def _judge_contested(
         finish: called once for each run, when all of its verdicts are written.
     """
     opened: dict[str, _ContestedRun] = {}
-    pace = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
+    meter = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
     judged = 0
 
     def jobs() -> Iterator[Job]:
@@ -252,8 +252,8 @@ def _judge_contested(
         with closing(executor.judge(jobs())) as verdicts:
             for job, candidate, verdict in verdicts:
                 settling = opened[job.key]
-                judged += settling.write_answer(candidate, verdict)
-                pace.step(outcome=verdict.outcome)
+                judged += settling.write_verdict(candidate, verdict)
+                meter.step(outcome=verdict.outcome)
                 if not settling.open:
                     finish(opened.pop(job.key).close())
     finally:
@@ -267,7 +267,7 @@ class _ContestedRun:
 
     Attributes:
         left: grasps that are judged again.
-        open: number of these without an answer so far.
+        open: number of grasps in `left` without a new verdict so far.
     """
 
     def __init__(self, run: Run, engine: str, workers: int) -> None:
@@ -300,8 +300,8 @@ class _ContestedRun:
         factory = StationJudgeFactory(run.scene(), run.station(), engine, mode, settings)
         return Job(str(run.path), factory, self.left)
 
-    def write_answer(self, candidate: Candidate, verdict: Verdict) -> bool:
-        """Writes an answer to the journal; returns False if the simulation failed."""
+    def write_verdict(self, candidate: Candidate, verdict: Verdict) -> bool:
+        """Writes a new verdict to the journal; returns False if the simulation failed."""
         self.open -= 1
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             return False

@@ -117,7 +117,7 @@ def motion_text(motion: GraspMotion) -> str:
     parts.append(f"lift {least}{_mm(motion.lift_height)} mm")
     x, y, z = motion.lift_direction
     if (x, y) != (0.0, 0.0) or z < 0.0:
-        parts[-1] += f" along [{', '.join(map(_rounded_key, motion.lift_direction))}]"
+        parts[-1] += f" along [{', '.join(map(_twelve_digits, motion.lift_direction))}]"
     return ", ".join(parts)
 
 
@@ -143,11 +143,11 @@ def _millimetres(length: float) -> str:
 
 
 def _mm(length: float) -> str:
-    return _rounded_key(1e3 * length)
+    return _twelve_digits(1e3 * length)
 
 
-def _rounded_key(value: float) -> str:
-    """A number with 12 digits, without rounding errors."""
+def _twelve_digits(value: float) -> str:
+    """A number with 12 digits, which hide rounding errors."""
     return f"{value:.12g}"
 
 

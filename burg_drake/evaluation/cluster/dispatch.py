@@ -34,11 +34,11 @@ def send_bundle(
     """Sends a bundle to workers.
 
     Args:
-        client: of Dask.
-        bundle: with its data.
+        client: client of Dask.
+        bundle: bundle with its data.
         what: purpose of the bundle, for messages.
         deliveries: number of deliveries by the worker's address; updated.
-        addresses: of the workers.
+        addresses: addresses of the workers.
 
     Raises:
         ClusterError: a worker cannot unpack the bundle, or lacks it after several attempts; or the
@@ -74,10 +74,10 @@ class Dispatch:
     """Work of one run on a cluster.
 
     Attributes:
-        client: of Dask.
+        client: client of Dask.
         cluster: the workers.
         chunks_per_thread: chunks that a worker holds per thread, including waiting ones.
-        name: of the plugin that runs tasks on a worker.
+        name: name of the plugin that runs tasks on a worker.
         jobs: jobs with unfinished work.
         sent: chunks that workers have, by the key of their future.
     """
@@ -190,7 +190,7 @@ class Dispatch:
         """Gives workers as many chunks as they have room for, the least loaded workers first.
 
         Args:
-            addresses: of the workers; others are left alone.
+            addresses: addresses of the workers; other workers get no chunks.
 
         Yields:
             Results of items that cannot be sent.

@@ -70,7 +70,7 @@ class SentChunk:
         items: grasps, or the argument of the call.
         losses: workers lost so far at the chunk's only item.
         worker: the worker.
-        future: of Dask.
+        future: future of Dask.
         done: whether the worker has finished; the answer is lost if the worker is lost now.
     """
 
@@ -166,8 +166,8 @@ class ClusterJob(ABC):
 
         Args:
             chunk: the worker's chunk.
-            items: those of the chunk; all if None.
-            what: what the last workers did, as the failure's reason names it.
+            items: items of the chunk to take back; all if None.
+            what: verb phrase for what the last workers did, for the reason of the failure.
 
         Yields:
             Results of items at which too many workers were lost.

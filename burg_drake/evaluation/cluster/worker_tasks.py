@@ -30,7 +30,7 @@ class TaskAnswer:
         missing: whether the task was not run because the bundle is not on this machine.
         ended: whether the task was not run to its end because the worker closes or the run has
             ended.
-        error: what the call raised, how its process ended, or why the judge could not be built.
+        error: error of the call, end of its process, or reason why the judge could not be built.
     """
 
     missing: bool = False

@@ -50,7 +50,7 @@ def set_documents(
     """Documents, their content, and versions of the software, as JSON values.
 
     Args:
-        library: has the objects.
+        library: library with the objects.
         scene: scene of the objects, named in place of the library.
         station: station with the hand.
         objects: names of the objects with grasps.
@@ -300,8 +300,9 @@ class RankedGrasps:
 
 
 def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
-    """Ranks grasps of a run: lifted ones as in `Run.best`, then by outcome group in the order of
-    legends: held before lost before not executed.
+    """Ranks grasps of a run: lifted ones as in `Run.best`, then all others by outcome group.
+
+    The groups have the order of the legends: held, lost, not executed.
 
     Args:
         run: the run.

@@ -63,9 +63,9 @@ class CauseRows:
 
     Attributes:
         outcomes: (N,) indices into `Outcome`.
-        objects, blockers: of each grasp.
+        objects, blockers: (N,) object and blocker of each grasp.
         margins: (N,) the available margins of `CAUSE_MARGINS` by name.
-        replay: the command that shows the grasp of a row.
+        replay: returns the command that shows the grasp of a row.
     """
 
     outcomes: NDArray[np.int8]
@@ -138,9 +138,7 @@ def find_causes(rows: CauseRows) -> list[Cause]:
 
 
 def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: Outcome) -> int:
-    """Index of the median row of an outcome by the margin of its severity, and by order among
-    equals.
-    """
+    """Index of the median row of an outcome, by the margin that ranks its cases by severity."""
     name = next((m for m, starts in TYPICAL_MARGINS if outcome.value.startswith(starts)), "")
     values = margins[name][rows] if name in margins else np.zeros(len(rows))
     known = np.isfinite(values)
@@ -151,9 +149,7 @@ def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: 
 
 
 def collision_section(columns: ResultRows) -> ReportSection | None:
-    """Section of the bodies that the open hand collided with at the start and how deep; None if
-    none.
-    """
+    """Section of the bodies that the open hand overlaps at the grasp; None if there are none."""
     outcomes, blockers = columns.codes("outcome"), columns.codes("blocker")
     overlap = columns["overlap"]
     collision = [name.startswith("collision_") for name in outcomes.names]

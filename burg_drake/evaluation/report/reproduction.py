@@ -40,8 +40,9 @@ def reproduce_command(run: Run) -> str:
 
 
 def reproduce_campaign_command(campaign: Campaign) -> str:
-    """Command line that repeats a run over many scenes; for given grasps, of which it keeps no
-    single file, the command that began it.
+    """Command line that repeats a run over many scenes.
+
+    For given grasps it is the command that began the run, which keeps no single file of them.
     """
     document = campaign.document
     grasps = _sampling_options(document)
