@@ -49,7 +49,6 @@ from burg_drake.evaluation.candidates import INSTANCE_COLUMN
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.grasp_sets.mistake_search import campaign_hints
 from burg_drake.evaluation.journal import WriterLock
-from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.report.pages import renew_report
 from burg_drake.evaluation.run_document import (
     CampaignDocument,
@@ -395,11 +394,7 @@ class _CampaignCall:
         self.judging[item.name] = judging
         if judging.known_count:
             self.meter.skip(judging.known_count, note=self._progress_note())
-        request = self.request
-        factory = StationJudgeFactory(
-            scene, request.station, request.engine, request.mode, request.phases
-        )
-        return Job(item.name, factory, judging.left)
+        return Job(item.name, self.request.judge_factory(scene), judging.left)
 
     def _take_verdict(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
         judging = self.judging[job.key]

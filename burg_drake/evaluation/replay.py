@@ -44,7 +44,7 @@ class TrialInputs:
 
     Attributes:
         scene, station: the scene and station that were found.
-        notes: differences from the recorded ones, in words; empty if there are none.
+        notes: differences from the recorded documents, in words; empty if there are none.
     """
 
     scene: Scene
@@ -145,7 +145,7 @@ class Difference:
 
     Attributes:
         name: name of the result.
-        recorded, now: its values; NaN or an empty text if there is none.
+        recorded, now: values of the result; NaN or an empty text if there is none.
     """
 
     name: str
@@ -157,9 +157,8 @@ class Difference:
         """Whether rounding by a program that rewrote the table explains the difference."""
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
-        return math.isclose(
-            self.recorded, self.now, rel_tol=1e-14
-        )  # a spreadsheet writes 15 digits
+        spreadsheet_tolerance = 1e-14  # Spreadsheets write 15 digits.
+        return math.isclose(self.recorded, self.now, rel_tol=spreadsheet_tolerance)
 
     def __str__(self) -> str:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"

@@ -152,7 +152,7 @@ class _Merge:
 
     Attributes:
         states: progress of the merged scenes.
-        copied: by number of the run, scenes that were copied from it unchanged.
+        copied: scenes that were copied unchanged from each run, by the number of the run.
         missing: number of grasps without a verdict.
         not_begun: scenes that no run has begun.
     """

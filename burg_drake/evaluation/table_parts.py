@@ -275,7 +275,8 @@ def column_names(part: TablePart) -> list[str]:
 def to_numpy(name: str, column: Any) -> NDArray[Any]:
     """Converts an Arrow column to an array; nulls become NaN or empty texts."""
     arrow = require_arrow("a columnar table")
-    if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or _is_text(column.type):
+    text_types = (arrow.string(), arrow.large_string())
+    if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or column.type in text_types:
         if not arrow.types.is_dictionary(column.type):
             if column.type == arrow.null() or not len(column):
                 return np.full(len(column), "", dtype=np.str_)
@@ -312,11 +313,6 @@ def _arrow_column(name: str, values: NDArray[Any]) -> Any:
     if values.dtype.kind == "O":
         return arrow.array(values.tolist(), arrow.int64())
     return arrow.array(values, from_pandas=True)
-
-
-def _is_text(kind: Any) -> bool:
-    arrow = require_arrow("a columnar table")
-    return bool(arrow.types.is_string(kind) or arrow.types.is_large_string(kind))
 
 
 def _footer_hash(data: bytes) -> str:

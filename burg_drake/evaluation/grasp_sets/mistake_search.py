@@ -401,8 +401,8 @@ class _MistakeSearch:
         nearly_all = n >= MistakeLimits.min_share_about * self.count
         return enough and mistake.changes_reading and nearly_all
 
-    def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
-        """Titles of other formats with the grasp frame of the corrected grasps."""
+    def formats_alike(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
+        """Other formats with the grasp frame of the corrected grasps."""
         if not mistake.moves_frame:
             return ()
         X_GF = self.format.X_GF(self._gripper)
@@ -525,20 +525,20 @@ def _choose_mistake(
     chosen = good[0] if good else next(m for m in count if count[m] == best)
     reach = None
     if chosen.forward and chosen.moves_frame:
-        run = _adjacent_mistakes(chosen, count, MistakeLimits.tie_ratio * best)
-        known = [m for m in count if m in run and not m.step and m.forward]
-        middle = 0.5 * (run[0].forward + run[-1].forward)
-        chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))
-        reach = (run[0].forward, run[-1].forward)
-    likeness = search.likeness(chosen)
+        adjacent = _adjacent_mistakes(chosen, count, MistakeLimits.tie_ratio * best)
+        known = [m for m in count if m in adjacent and not m.step and m.forward]
+        middle = 0.5 * (adjacent[0].forward + adjacent[-1].forward)
+        chosen = known[0] if known else min(adjacent, key=lambda m: abs(m.forward - middle))
+        reach = (adjacent[0].forward, adjacent[-1].forward)
+    alike = search.formats_alike(chosen)
     return MistakeFound(
         chosen,
         before,
         count[chosen],
         search.count,
         search.total,
-        likeness=tuple(format.title for format in likeness),
-        format=_other_reader(search.format.name, [format.name for format in likeness]),
+        likeness=tuple(format.title for format in alike),
+        format=_other_reader(search.format.name, [format.name for format in alike]),
         alternatives=tuple(
             m.words
             for m in good

@@ -196,7 +196,8 @@ def scored_set(
     if by == "gravity_margin" and scene is None:
         raise InvalidInputError("gravity_margin depends on where up is; give a scene")
     objects = sorted(set(grasps.object.tolist()))
-    chosen = _friction_by_object(friction or {}, objects)
+    friction = friction or {}
+    _require_friction_names(friction, objects)
     jaws = jaws_of(station.hand, station.hand_model, station.packages)
     instance = None if scene is None else _instances(grasps, scene)
     X_WO = None
@@ -209,7 +210,7 @@ def scored_set(
     with Reporter(progress) as reporter:
         meter = ProgressMeter(reporter.show, Progress("scoring", total=len(grasps)))
         for name in objects:
-            payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
+            payload = Payload.of(library.entry(name), friction.get(name, friction.get("")))
             payloads[name] = asdict(payload)
             surface = _surface(library, name)
             for batch in _batches(grasps.object == name):
@@ -238,15 +239,14 @@ def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
     return [rows[k : k + 2000] for k in range(0, len(rows), 2000)]
 
 
-def _friction_by_object(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
-    """Coefficients by object, and under "" for all others."""
-    for name in given:
+def _require_friction_names(friction: Mapping[str, float], objects: list[str]) -> None:
+    """Refuses coefficients for objects without grasps."""
+    for name in friction:
         if name and name not in objects:
             raise UnknownNameError(
                 f"friction is given for {name!r}, but there are no grasps of it; "
                 f"{suggest_names(name, objects)}"
             )
-    return dict(given)
 
 
 def _surface(library: ObjectLibrary, name: str) -> Surface:
