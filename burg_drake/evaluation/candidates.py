@@ -128,12 +128,12 @@ class Candidates:
         wanted = _hashes(ids, len(ids))
         found = np.full(len(ids), -1, dtype=np.int64)
         known = self.id
-        for k, place in enumerate(np.searchsorted(hashes, wanted).tolist()):
-            while place < len(order) and hashes[place] == wanted[k]:
-                if known[order[place]] == ids[k]:
-                    found[k] = order[place]
+        for k, i in enumerate(np.searchsorted(hashes, wanted).tolist()):
+            while i < len(order) and hashes[i] == wanted[k]:
+                if known[order[i]] == ids[k]:
+                    found[k] = order[i]
                     break
-                place += 1
+                i += 1
         return found
 
     def __getstate__(self) -> dict[str, object]:
@@ -410,14 +410,14 @@ def rows_of_names(
         UnknownNameError: there are no grasps of that name.
     """
     names = list(only or ())
-    holders = [objects] if instances is None else [objects, instances]
+    columns = [objects] if instances is None else [objects, instances]
     if not names:
         return np.ones(len(objects), dtype=bool)
-    known = {name for column in holders for name in column.tolist()}
+    known = {name for column in columns for name in column.tolist()}
     for name in names:
         if name not in known:
             raise UnknownNameError(
                 f"{where} has no grasps of {name!r}; {suggest_names(name, known)}"
             )
-    held: NDArray[np.bool_] = np.any([np.isin(column, names) for column in holders], axis=0)
-    return held
+    named: NDArray[np.bool_] = np.any([np.isin(column, names) for column in columns], axis=0)
+    return named

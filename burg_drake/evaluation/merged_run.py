@@ -86,8 +86,8 @@ def choose_verdicts(
         for known in np.unique(source[both]).tolist():
             rows = np.flatnonzero(both & (source == known))
             ids = [candidates.id[row] for row in chosen[rows].tolist()]
-            first = (journals[known], best.place[rows].tolist())
-            _require_same_verdicts(ids, first, (journal, index.place[rows].tolist()))
+            first = (journals[known], best.line_begin[rows].tolist())
+            _require_same_verdicts(ids, first, (journal, index.line_begin[rows].tolist()))
         better = index.rank > best.rank
         source[better] = number
         best.replace_rows(better, index)
@@ -102,7 +102,7 @@ def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[by
         for k in np.flatnonzero(choice.index.judged).tolist():
             stream = streams[choice.source[k]]
             assert stream is not None
-            stream.seek(int(choice.index.place[k]))
+            stream.seek(int(choice.index.line_begin[k]))
             yield stream.readline(MAX_JOURNAL_LINE)
 
 

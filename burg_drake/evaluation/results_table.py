@@ -190,11 +190,11 @@ class TextValues(NamedTuple):
 
     def equal(self, text: str) -> NDArray[np.bool_]:
         """(N,) whether each row has this text."""
-        equal: NDArray[np.bool_] = self.codes == self.place(text)
+        equal: NDArray[np.bool_] = self.codes == self.code_of(text)
         return equal
 
-    def place(self, text: str) -> int:
-        """Index of a text; -1 if it does not occur."""
+    def code_of(self, text: str) -> int:
+        """Code of a text; -1 if it does not occur."""
         return self.names.index(text) if text in self.names else -1
 
     def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
@@ -208,9 +208,9 @@ class TextValues(NamedTuple):
 def code_texts(values: NDArray[np.str_]) -> TextValues:
     """Encodes a column (N,) of few distinct texts."""
     texts = values.tolist()
-    places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
-    codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
-    return TextValues(codes, tuple(places))
+    code_of_text = {text: code for code, text in enumerate(dict.fromkeys(texts))}
+    codes = np.fromiter(map(code_of_text.__getitem__, texts), dtype=np.int64, count=len(texts))
+    return TextValues(codes, tuple(code_of_text))
 
 
 def make_columns(

@@ -243,7 +243,7 @@ class CampaignDocument:
         shard = as_shard(self.shard or None)
         if shard is None or not shard.divides_scenes(len(self.scenes)):
             return self.scenes
-        return tuple(entry for place, entry in enumerate(self.scenes) if shard.has(place))
+        return tuple(entry for k, entry in enumerate(self.scenes) if shard.has(k))
 
     @property
     def shard_of_grasps(self) -> Shard | None:

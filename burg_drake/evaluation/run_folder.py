@@ -164,7 +164,7 @@ class Run:
         return ResultRows.of(
             self.candidates,
             np.flatnonzero(index.judged),
-            lambda rows: read_verdicts(journal, index.place[rows].tolist()),
+            lambda rows: read_verdicts(journal, index.line_begin[rows].tolist()),
             **self.table_settings,
         )
 
@@ -231,9 +231,9 @@ class Run:
     def contested(self) -> list[str]:
         """Ids of the executed grasps whose verdict is contested, see `Verdict.contested`."""
         rows = self.rows()
-        settled = self.index.judged_again[rows.places]
+        settled = self.index.judged_again[rows.candidate_rows]
         contested = np.zeros(len(self.candidates), dtype=bool)
-        contested[rows.places] = contested_rows(rows["confidence"], settled)
+        contested[rows.candidate_rows] = contested_rows(rows["confidence"], settled)
         return self._ids_where(contested & self.is_assigned)
 
     def _ids_where(self, chosen: NDArray[np.bool_]) -> list[str]:
@@ -246,10 +246,10 @@ class Run:
         Raises:
             UnknownNameError: there is no judged grasp with this id; the message names similar ids.
         """
-        (place,) = self.candidates.rows([id]).tolist()
+        (candidate_row,) = self.candidates.rows([id]).tolist()
         rows = self.rows()
-        found = np.flatnonzero(rows.places == place)
-        if place < 0 or not len(found):
+        found = np.flatnonzero(rows.candidate_rows == candidate_row)
+        if candidate_row < 0 or not len(found):
             raise self._unknown_grasp_error(id)
         return table_row(rows.columns(list(rows), found), 0)
 
@@ -271,8 +271,8 @@ class Run:
             UnknownNameError: the run has no such grasp; the message names similar ids.
         """
         candidate = self.candidate(id)
-        place = int(self.index.place[self.candidates.rows([id])[0]])
-        found = read_verdicts(self.path / JOURNAL_FILE, [place] if place >= 0 else [])
+        line_begin = int(self.index.line_begin[self.candidates.rows([id])[0]])
+        found = read_verdicts(self.path / JOURNAL_FILE, [line_begin] if line_begin >= 0 else [])
         return RecordedTrial(
             id=id,
             instance=candidate.instance,
@@ -296,7 +296,7 @@ class Run:
         """
         rows = self.rows()
         best = best_rows(rows, count, each=each, only=only)
-        return [self.candidates.id[row] for row in rows.places[best].tolist()]
+        return [self.candidates.id[row] for row in rows.candidate_rows[best].tolist()]
 
     def scene(self) -> Scene:
         """The scene of the run.

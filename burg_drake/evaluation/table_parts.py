@@ -79,14 +79,14 @@ def _follow_segments(segments: Sequence[JournalSegment], stream: BinaryIO) -> li
     size, modified = status.st_size, status.st_mtime_ns
     untouched = any(s.end == size and s.modified == modified for s in segments)
     found: list[JournalSegment] = []
-    place = 0
+    begin = 0
     while True:
-        following = [s for s in segments if s.begin == place and place < s.end <= size]
+        following = [s for s in segments if s.begin == begin and begin < s.end <= size]
         following = [s for s in following if _matches_journal(s, stream, untouched=untouched)]
         if not following:
             return found
         found.append(max(following, key=lambda s: s.end))
-        place = found[-1].end
+        begin = found[-1].end
 
 
 def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bool) -> bool:
@@ -113,11 +113,11 @@ def last_line_end(journal: Path) -> int:
     return 0
 
 
-def line_end(journal: Path, place: int) -> int:
-    """Byte at which the journal line ends that contains the byte `place`."""
+def line_end(journal: Path, byte: int) -> int:
+    """End of the journal line that contains a byte."""
     with open_regular(journal) as stream:
-        stream.seek(place)
-        return place + len(stream.readline())
+        stream.seek(byte)
+        return byte + len(stream.readline())
 
 
 def _stream_hash(stream: BinaryIO, begin: int, end: int) -> str:
@@ -306,8 +306,8 @@ def _arrow_column(name: str, values: NDArray[Any]) -> Any:
     arrow = require_arrow("a columnar table")
     if values.dtype.kind == "U":
         if len(values) and values.strides == (0,):  # one text for all rows
-            places = np.zeros(len(values), dtype=np.int32)
-            return arrow.DictionaryArray.from_arrays(places, arrow.array([str(values[0])]))
+            codes = np.zeros(len(values), dtype=np.int32)
+            return arrow.DictionaryArray.from_arrays(codes, arrow.array([str(values[0])]))
         column = arrow.array(values.tolist(), arrow.string())
         return column if name in UNIQUE_TEXT_COLUMNS else column.dictionary_encode()
     if values.dtype.kind == "O":
@@ -397,7 +397,7 @@ def results_frame(
 
 
 def _fill_null(codes: Any, texts: Sequence[str]) -> tuple[Any, Sequence[str]]:
-    """Replaces the code of null by that of an empty text."""
+    """Replaces the code of null by the code of an empty text."""
     if not (codes < 0).any():
         return codes, texts
     if "" not in texts:
@@ -409,8 +409,8 @@ def _category_column(name: str, codes: Any, texts: Sequence[str]) -> Any:
     """Categorical of codes; categories are the allowed texts if fixed, else the sorted texts."""
     pandas = _pandas()
     members = list(COLUMN_MEMBERS.get(name, texts if name == "name" else sorted(texts)))
-    place = np.array([members.index(text) for text in texts], dtype=np.int64)
-    codes = place[codes] if len(texts) else codes
+    member_of_text = np.array([members.index(text) for text in texts], dtype=np.int64)
+    codes = member_of_text[codes] if len(texts) else codes
     return pandas.Categorical.from_codes(codes, categories=members, ordered=name == "stage")
 
 

@@ -182,8 +182,8 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
     codes, texts = rows.codes("outcome")
     missed = ~np.isin(texts, CONTACT_OUTCOMES)[codes]
     by_scene = np.bincount(rows.run[missed], minlength=len(campaign.names))
-    for place in np.argsort(-by_scene, kind="stable")[: MistakeLimits.max_scenes].tolist():
-        name = campaign.names[place]
+    for k in np.argsort(-by_scene, kind="stable")[: MistakeLimits.max_scenes].tolist():
+        name = campaign.names[k]
         with contextlib.suppress(BurgError):
             hints = given_hints(load_run(campaign.folder(name)), campaign)
             if hints:

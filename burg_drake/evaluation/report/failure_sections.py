@@ -126,8 +126,8 @@ def find_causes(rows: CauseRows) -> list[Cause]:
     successes = (Outcome.LIFTED, Outcome.REACHABLE)  # Outcomes that are no failures.
     max_named = 3  # Number of objects and blockers listed for each outcome.
     found = []
-    for place, outcome in enumerate(Outcome):
-        mine = np.flatnonzero(rows.outcomes == place).astype(np.int64)
+    for code, outcome in enumerate(Outcome):
+        mine = np.flatnonzero(rows.outcomes == code).astype(np.int64)
         if len(mine) and outcome not in successes:
             objects = rows.objects.most_common(mine, max_named)
             blockers = rows.blockers.most_common(mine, max_named)
@@ -160,9 +160,9 @@ def collision_section(columns: ResultRows) -> ReportSection | None:
     found = np.unique(blockers.codes[collides], return_index=True, return_counts=True)
     order = np.lexsort((found[1], -found[2]))
     rows = []
-    for place, count in zip(found[0][order].tolist(), found[2][order].tolist(), strict=True):
-        name = blockers.names[place]
-        mask = collides & (blockers.codes == place)
+    for code, count in zip(found[0][order].tolist(), found[2][order].tolist(), strict=True):
+        name = blockers.names[code]
+        mask = collides & (blockers.codes == code)
         depth = overlap[mask] * 1e3
         own = int(on_target[outcomes.codes[mask]].sum())
         cells = [
