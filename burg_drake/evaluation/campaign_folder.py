@@ -47,7 +47,7 @@ class Campaign:
     """A run over many scenes, complete or not.
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         document: contents of campaign.yaml.
     """
 
@@ -198,7 +198,7 @@ def load_campaign(path: str | Path) -> Campaign:
 
     Raises:
         InvalidInputError: the folder holds no such run.
-        DocumentError: its campaign.yaml does not fit the schema.
+        DocumentError: campaign.yaml does not fit the schema.
     """
     path = Path(path)
     if not is_campaign(path):
@@ -245,7 +245,7 @@ def open_results(path: str | Path) -> Run | Campaign:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     return load_campaign(path) if is_campaign(path) else load_run(path)
 
@@ -255,7 +255,7 @@ def load_runs(path: str | Path) -> list[Run]:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     found = open_results(path)
     return list(found.runs) if isinstance(found, Campaign) else [found]
@@ -278,7 +278,7 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
         MissingDependencyError: a run over many scenes without pyarrow.
     """
     found = open_results(path)

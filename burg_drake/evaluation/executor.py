@@ -192,7 +192,7 @@ class OpenJob:
             self.to_judge = GraspQueue()
 
     def next_work(self) -> tuple[tuple[PendingGrasp, ...], bool]:
-        """Grasps to work on next, and whether they are to be screened (all by the same screen).
+        """Grasps to work on next, and whether a screen (the same for all) takes them.
 
         Grasps are screened when few are left to judge. The last screen comes first, unless too few
         grasps wait for it. Screening and judging thus alternate, so that the rate of verdicts
@@ -208,7 +208,7 @@ class OpenJob:
     def sort_screened(
         self, grasps: Sequence[PendingGrasp], states: Sequence[JudgingState]
     ) -> list[tuple[Candidate, Verdict]]:
-        """Queues the grasps that a screen passed on; returns the verdicts of those it rejected."""
+        """Queues the grasps that a screen passed on; returns the verdicts of rejected grasps."""
         verdicts = []
         for (candidate, _), state in zip(grasps, states, strict=True):
             if state.outcome is not None:
@@ -257,9 +257,9 @@ class WorkerSlot:
 
     Attributes:
         number: index in the pool.
-        job: its current or last job.
+        job: current or last job of the worker.
         assigned: work that it has not finished yet.
-        started: whether it was ever given work.
+        started: whether the worker was ever given work.
     """
 
     number: int
@@ -277,7 +277,7 @@ class JudgePool:
 
     Attributes:
         count: largest number of workers.
-        limits: their limits.
+        limits: limits of the workers.
         slots: the workers.
         jobs: jobs in progress.
         stopped: whether `stop` was called.
@@ -533,7 +533,7 @@ class LocalExecutor:
 
     Attributes:
         workers: number of processes.
-        limits: their limits.
+        limits: limits of the workers.
     """
 
     workers: int

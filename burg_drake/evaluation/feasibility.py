@@ -119,7 +119,7 @@ class PlanFolder:
     """A folder of plans.
 
     Attributes:
-        path: its path.
+        path: path of the folder.
         document: inputs and settings of the plans.
     """
 
@@ -275,7 +275,7 @@ def reach(
 
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
-        grasps: in the frames of their objects. A set goes to the instances that its column
+        grasps: grasps in their objects' frames. A set goes to the instances that its column
             `instance` names, or else to all instances of its objects; a mapping has sets by
             instance, as `read_grasps` returns.
         motion: approach, retreat and lift of the hand; the station's if None.

@@ -73,7 +73,7 @@ def is_locked(path: Path) -> bool:
 
 @contextmanager
 def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
-    """Keeps other processes from writing the folder whose lock file this is; they may read it.
+    """Keeps other processes from writing the folder of a lock file; they may read it.
 
     Args:
         path: the lock file. Nothing is locked if it does not exist, or on a file system without

@@ -112,7 +112,7 @@ class Screen(NamedTuple):
     """A stage that takes many grasps at once; its decisions do not depend on the batch.
 
     Attributes:
-        stage: its name.
+        stage: name of the stage.
         ask: returns the decision for each grasp.
         batch: batch size beyond which the cost per grasp hardly falls.
     """
@@ -127,7 +127,7 @@ Decide = Callable[[Candidate, "ArmPath | Plan | None"], Decision]
 
 
 class Judge(Protocol):
-    """Stages in the order in which a grasp passes them; the last one always decides."""
+    """Stages in the order in which a grasp passes them; the last stage always decides."""
 
     @property
     def screens(self) -> Sequence[Screen]:

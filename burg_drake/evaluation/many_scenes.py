@@ -408,7 +408,7 @@ class _CampaignCall:
             processes.write_rows(job.key)
 
     def _note_failed_job(self, failed: JobFailed) -> None:
-        """Records a scene whose job failed, for example as its judge cannot be built."""
+        """Records a scene whose job failed, such as one whose judge cannot be built."""
         self.judging.pop(failed.job.key).close()
         self._note_failure(failed.job.key, failed.error)
 

@@ -42,7 +42,7 @@ class RecordedTrial:
     Attributes:
         id: id of the grasp, or of this trial of it.
         instance: name of the target in the scene.
-        object: its name in the library.
+        object: name of the target in the library.
         X_OG: (4, 4) grasp in the target's frame.
         width: distance between the contacts [m].
         score: score of the sampler.
@@ -239,7 +239,7 @@ def make_columns(
 def grasp_columns(
     candidates: Candidates, rows: NDArray[np.int64], names: Sequence[str] | None = None
 ) -> Columns:
-    """Columns of `make_columns` that do not depend on verdicts; only those named, if given."""
+    """Columns of `make_columns` that do not depend on verdicts; all if `names` is None."""
     grasps = candidates.grasps
     X_OG = grasps.X_OG[rows]
     poses: Columns = {}

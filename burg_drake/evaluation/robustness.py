@@ -373,7 +373,7 @@ def _choose_grasps(
 def _tests_by_grasp(
     run: Run, chosen: Iterable[Candidate], settings: RobustnessSettings
 ) -> dict[str, _EngineTests]:
-    """Tests by id of the grasp; grasps that the same engine has judged share them."""
+    """Tests by id of the grasp; grasps judged by the same engine share one object."""
     scene, station, origin = run.scene(), run.station(), origin_of(run.document)
     trial = origin.settings(f"{run.path / RUN_FILE}: trial")
     loaded = [test for test in settings.tests if test in LOADED_TESTS]

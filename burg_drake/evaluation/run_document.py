@@ -26,7 +26,7 @@ class Input:
 
     Attributes:
         name: name of the scene or station.
-        path: its file, or the name of a built-in one.
+        path: file of the document, or the name of a built-in one.
         content: hash of its content, with objects and robot models.
     """
 
@@ -41,7 +41,7 @@ class Library:
 
     Attributes:
         name: name of the library.
-        path: its folder, absolute, or as `package://`.
+        path: folder of the library, absolute, or as `package://`.
         objects: build hash of each object of the scene.
     """
 

@@ -86,7 +86,7 @@ class Run:
             print(id, run.verdicts[id].outcome, run.verdicts[id].margins)
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         document: contents of run.yaml.
     """
 
@@ -116,7 +116,7 @@ class Run:
 
     @property
     def assigned_ids(self) -> Sequence[str]:
-        """Ids of the grasps assigned to this run: all, or those of its shard."""
+        """Ids of the grasps assigned to this run: all, or the grasps of its shard."""
         return select_share(self.candidates.id, self.document.shard)
 
     @property
@@ -138,7 +138,7 @@ class Run:
 
     @property
     def stored_runs(self) -> list[StoredRun]:
-        """The run itself, as that of its one scene; see `Campaign.stored_runs`."""
+        """The run itself, under an empty scene name; see `Campaign.stored_runs`."""
         return [StoredRun("", self.path)]
 
     @property
@@ -212,7 +212,7 @@ class Run:
         return run
 
     def with_document(self, document: RunDocument) -> Run:
-        """Copy with another document on the same grasps; keeps data that was read."""
+        """Copy with another document on the same grasps; keeps the data read so far."""
         run = Run(self.path, document)
         run.__dict__.update(self.__dict__ | {"document": document})
         return run
@@ -367,11 +367,11 @@ def load_run(path: str | Path) -> Run:
         print(len(run.verdicts), run.results["outcome"])
 
     Args:
-        path: its folder.
+        path: folder of the run.
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its run.yaml does not fit the schema.
+        DocumentError: run.yaml does not fit the schema.
     """
     path = Path(path)
     if path.is_file():
@@ -439,7 +439,7 @@ def require_run_folder(folder: Path) -> None:
 
 
 def refuse_other_files(folder: Path, own: Collection[str] = ()) -> None:
-    """Refuses a folder with files other than hidden ones and those named in `own`."""
+    """Refuses a folder with files that are neither hidden nor named in `own`."""
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
     if foreign := sorted(names.difference(own)):
         raise InvalidInputError(

@@ -68,7 +68,7 @@ class MissingFromMerge:
 
 
 def read_merge_note(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
-    """Reads the note of an unfinished merge of these runs; None if the folder has none."""
+    """Reads the note of an unfinished merge of the runs `sources`; None if there is none."""
     try:
         stored = json.loads(_merge_note_path(folder, sources).read_text(encoding="utf-8"))
         return MissingFromMerge(stored["missing"], tuple(stored["scenes"]), tuple(stored["shards"]))
@@ -193,7 +193,7 @@ class _Merge:
         self._note_state(name, runs[0], choice)
 
     def copy_parts(self) -> None:
-        """Copies parts whose scenes were all copied; other rows will be read from journals."""
+        """Copies parts whose scenes were all copied; the journals have the rows of other parts."""
         number = 0
         parts = self._merged.path / PARTS_FOLDER
         parts.mkdir()
@@ -352,7 +352,7 @@ def _distinct_folders(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def _staging_folder(folder: Path) -> Path:
-    """Creates an empty folder beside another, and removes those of killed merges."""
+    """Creates an empty folder beside another, and removes such folders of killed merges."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise InvalidInputError(f"{folder} exists already; choose another folder").about("out")
     parent = ensure_writable_folder(folder.absolute().parent)

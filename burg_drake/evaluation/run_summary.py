@@ -139,7 +139,7 @@ def unclear_notes(
     *,
     given: bool = False,
 ) -> tuple[str, ...]:
-    """Notes on objects at all of whose grasps the open hand collides.
+    """Notes on objects without a grasp at which the open hand is clear.
 
     Args:
         objects, outcomes, blockers: (N,) object, outcome and blocker of each grasp.

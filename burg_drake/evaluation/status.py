@@ -27,7 +27,7 @@ class Status:
     """Progress of a run.
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         kind: `run` for one scene, `campaign` for many.
         working: whether a process is working on it.
         judged: number of grasps with a verdict.
@@ -75,7 +75,7 @@ class RunWatch:
 
         Raises:
             InvalidInputError: there is no run.
-            DocumentError: its document does not fit the schema.
+            DocumentError: run.yaml or campaign.yaml does not fit the schema.
         """
         self._date = _document_time(Path(path))
         self._result = result = open_results(path)
@@ -189,6 +189,6 @@ def read_status(path: str | Path) -> Status:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     return RunWatch(path).look()

@@ -97,13 +97,13 @@ def read_motion(values: Mapping[str, float]) -> GraspMotion:
 
 
 def without_motion(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers without those of the motion."""
+    """Recorded numbers without the numbers of the motion."""
     known = {field.name for field in fields(GraspMotion)}.union(DIRECTION_NUMBERS)
     return {name: value for name, value in values.items() if name not in known}
 
 
 def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers without those of the motion, the limits, the approach and the measures."""
+    """Recorded numbers without motion, limits, approach and measures."""
     known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
 
@@ -340,7 +340,7 @@ def _read_pairs(text: str, where: str) -> dict[str, str]:
 
 
 def _restore_booleans(values: Mapping[str, float], schema: type[Any]) -> dict[str, object]:
-    """Recorded numbers with those of boolean fields as `true` or `false`."""
+    """Recorded numbers; numbers of boolean fields become `true` or `false`."""
     flags = {field.name for field in fields(schema) if field.type in (bool, "bool")}
     return {k: str(bool(v)).lower() if k in flags else v for k, v in values.items()}
 

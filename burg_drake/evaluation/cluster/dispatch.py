@@ -130,7 +130,7 @@ class Dispatch:
         meanwhile are ignored.
 
         Raises:
-            ClusterError: as `ClusterWorkers.update`.
+            ClusterError: see `ClusterWorkers.update`.
         """
         retry_interval = 1.0  # Seconds between attempts.
         for attempt in range(1, DELIVERY_ATTEMPTS + 1):
@@ -319,7 +319,7 @@ class Dispatch:
         """The answer of a task that has ended; None if it was cancelled.
 
         Raises:
-            KilledWorker: its worker was lost.
+            KilledWorker: the worker of the chunk was lost.
             OSError: the answer does not arrive within the time-out; see `retry_answer`.
             ClusterError: the task failed.
         """

@@ -44,10 +44,10 @@ class ClusterWorker:
     """A worker.
 
     Attributes:
-        address: its network address.
+        address: network address of the worker.
         threads: number of chunks that it processes at a time.
         chunks: chunks sent to it, oldest first.
-        job: its current job.
+        job: current job of the worker.
     """
 
     address: str
@@ -92,7 +92,7 @@ class ClusterJob(ABC):
         suspects: items at which a worker was lost, with the number of lost workers; each is sent
             alone.
         sent: number of chunks held by workers.
-        failed: whether it is given up.
+        failed: whether the job is given up.
         deliveries: number of deliveries of the bundle by the worker's address.
     """
 

@@ -51,7 +51,7 @@ def require_near(
     """Refuses grasps if all grasps of an object are far from it.
 
     Args:
-        grasps: in the frames of their objects; objects missing from the library are ignored.
+        grasps: grasps in their objects' frames; objects missing from the library are ignored.
         library: library with the objects.
         source: origin of the grasps, for the message.
         is_file: whether the origin is a file, whose object names the user can map.
@@ -170,7 +170,7 @@ def join_in_frame(scene: Scene, grasps: Mapping[str, GraspSet], X_SF: Array) -> 
 
     Args:
         scene: the scene.
-        grasps: in the frames of their objects, by name of an instance.
+        grasps: grasps in the frames of their objects, by name of an instance.
         X_SF: (4, 4) pose of the frame F in the scene frame: of a camera, or the identity.
 
     Returns:
@@ -319,8 +319,8 @@ def group_by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
 
     Args:
         scene: the scene.
-        grasps: with a column `instance` they stay on the named instances; else they go to every
-            instance of their object.
+        grasps: grasps, which stay on the instances in their column `instance`; without that column
+            they go to every instance of their object.
 
     Returns:
         The grasps by name of an instance, for `given_candidates`.
@@ -494,7 +494,7 @@ def read_in_frame(
     objects: Mapping[str, str] | None = None,
     seen: SeenScene | None = None,
 ) -> ImportedGrasps:
-    """Reads grasps and converts them to another frame, with a scene if necessary.
+    """Reads grasps, converted to another frame, with a scene if necessary.
 
     Args:
         path: the file, or the folder of a run.

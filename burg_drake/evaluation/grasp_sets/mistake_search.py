@@ -82,7 +82,7 @@ def find_mistake(
     """Finds the common pose mistake of a grasp set, if it has one.
 
     Args:
-        grasps: in the frames of their objects, by instance of the scene or by object of the
+        grasps: grasps in the frames of their objects, by instance of the scene or by object of the
             library. Their provenance says how a file was read.
         station: station with the hand.
         source: scene or library of the objects.
@@ -283,7 +283,7 @@ class _MistakeSearch:
         return len(self._name)
 
     def mistakes(self) -> list[Mistake]:
-        """Mistakes that are possible for these grasps."""
+        """Mistakes that are possible for the examined grasps."""
         # A camera's optical frame (OpenCV) in its body frame (ROS, x forward).
         optical_rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
         found = usual_mistakes(self.format, self._gripper)
@@ -552,7 +552,7 @@ def _choose_mistake(
 def _adjacent_mistakes(
     chosen: Mistake, count: Mapping[Mistake, int], least: float
 ) -> list[Mistake]:
-    """Mistakes with the same turn and neighbouring distances that fit about as well."""
+    """Mistakes with the same turn and adjacent distances whose corrections fit about as well."""
     same = [m for m in count if m.moves_frame and m.turn == chosen.turn]
     line = sorted(same, key=lambda mistake: mistake.forward)
     low = high = line.index(chosen)
@@ -595,8 +595,10 @@ def _spread_rows(grasps: Mapping[str, GraspSet]) -> dict[str, NDArray[np.int64]]
 
 
 def _promising_rows(grasps: GraspSet) -> NDArray[np.int64]:
-    """Rows of promising grasps: successes if scores are 0 and 1, else the half with the highest
-    scores, if these are enough. Data sets contain failures, and networks predict poor grasps.
+    """Rows of promising grasps; data sets contain failures, and networks predict poor grasps.
+
+    Promising are the successes, if all scores are 0 or 1 and enough are 1; else the half with the
+    highest scores, but at least `MistakeLimits.max_grasps`.
     """
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
     success = score == 1.0

@@ -54,7 +54,7 @@ def sample_grasps(
     settings: SamplingSettings | None = None,
     only: Iterable[str] | None = None,
 ) -> GraspSet:
-    """Samples antipodal grasps on the free objects of a scene, or on those of a library.
+    """Samples antipodal grasps on the free objects of a scene, or on the objects of a library.
 
     Example::
 
@@ -168,7 +168,7 @@ def scored_set(
         best = scored.select(scored.score.argsort()[::-1][:10])
 
     Args:
-        grasps: in the frames of their objects.
+        grasps: grasps in the frames of their objects.
         library: library with the objects.
         station: station with the hand.
         scene: scene of the objects. A grasp is on the instance in its column `instance`, or on the

@@ -251,7 +251,7 @@ def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
 
 
 def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
-    """Section of what hindered the arm, and of its obstacles; None if the arm was not checked."""
+    """Section of outcomes of the arm, with obstacles; None if the arm was not checked."""
     # Outcomes between a clear hand and the trial.
     arm_outcomes = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
     if summary.mode == "hand":

@@ -259,7 +259,7 @@ def _campaign_notice(campaign: Campaign, summary: Summary) -> str:
 
 
 def _report_link(campaign: Campaign, name: str) -> str:
-    """Relative link from the report of all scenes to that of one; empty if it does not exist."""
+    """Relative link from the report of all scenes to a scene's report; empty if there is none."""
     there = (campaign.folder(name) / REPORT_FILE).is_file()
     return quote(f"{SCENES_FOLDER}/{name}/{REPORT_FILE}") if there else ""
 

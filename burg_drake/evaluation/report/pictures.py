@@ -238,7 +238,7 @@ def scene_picture(scene: Scene, columns: ResultRows, groups: NDArray[np.int8]) -
     """The scene with the number of grasps that lifted each object.
 
     Args:
-        scene: as it was judged.
+        scene: scene as it was judged.
         columns: the results.
         groups: (N,) outcome group of each row, see `group_indices`.
     """
