@@ -396,7 +396,7 @@ def rows_of_names(
     only: Iterable[str] | None,
     where: str,
     objects: NDArray[np.str_],
-    instances: NDArray[np.str_] | None = None,
+    instances: NDArray[np.str_] | None,
 ) -> NDArray[np.bool_]:
     """Mask (N,) of the grasps whose object or instance is named; all True without names.
 
@@ -404,7 +404,7 @@ def rows_of_names(
         only: names of objects or instances.
         where: source of the grasps, for messages.
         objects: (N,) object of each grasp.
-        instances: (N,) instance of each grasp, if known.
+        instances: (N,) instance of each grasp; None if unknown.
 
     Raises:
         UnknownNameError: there are no grasps of that name.

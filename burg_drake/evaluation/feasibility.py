@@ -348,7 +348,7 @@ def plan_into_folder(
     workers: int | None,
     reporter: Reporter,
     *,
-    retry_failed: bool = False,
+    retry_failed: bool,
 ) -> dict[str, Verdict]:
     """Judges the grasps that a folder of plans lacks, and writes their plans.
 

@@ -293,7 +293,7 @@ def arrange_columns(
     origin: TrialOrigin,
     *,
     instances: Sequence[str],
-    joints: int = 0,
+    joints: int,
 ) -> dict[str, T | ColumnValues]:
     """Arranges the columns of a table in their order.
 
@@ -417,7 +417,6 @@ def best_rows(
     """
     chosen = columns["outcome"] == Outcome.LIFTED
     if only:
-        only = list(only)
         chosen &= rows_of_names(only, "the table", columns["object"], columns["instance"])
     lifted = np.flatnonzero(chosen)
     lifted = _clearest_rows(columns, lifted, count, each=each)

@@ -137,7 +137,7 @@ def unclear_notes(
     outcomes: NDArray[np.str_],
     blockers: NDArray[np.str_],
     *,
-    given: bool = False,
+    given: bool,
 ) -> tuple[str, ...]:
     """Notes on objects without a grasp at which the open hand is clear.
 
