@@ -93,7 +93,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
     folder.mkdir(parents=True)
     campaign = save_campaign(Campaign(folder, campaign_document(found, request)))
     by_name = dict(zip((entry.name for entry in found.entries), loaded, strict=True))
-    ledger = SceneStates(folder)
+    scene_states = SceneStates(folder)
     writer = PartWriter(campaign)
     for name in campaign.names:
         rng = np.random.default_rng(int(name[-5:]))
@@ -113,7 +113,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
         (run_folder / JOURNAL_FILE).write_bytes(b"".join(lines))
         size = sum(map(len, lines))
         state = SceneState(scene=name, state="done", run=document.hash, grasps=grasps, mine=grasps)
-        ledger.note(replace(state, sampling=5.0, size=size))
+        scene_states.note(replace(state, sampling=5.0, size=size))
         writer.add_rows(name, run)
     writer.close()
     return load_campaign(folder)

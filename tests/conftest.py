@@ -177,8 +177,8 @@ def judged_here() -> Iterator[None]:
     from burg_drake.evaluation import JudgePool, SceneProcesses
     from tests.evaluation.scenes_here import ScenesHere
 
-    def scenes(preparer: Any, outputs: Any, workers: int) -> Any:
-        return (ScenesHere if workers == 1 else SceneProcesses)(preparer, outputs, workers)
+    def scenes(request: Any, outputs: Any, workers: int) -> Any:
+        return (ScenesHere if workers == 1 else SceneProcesses)(request, outputs, workers)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("burg_drake.evaluation.many_scenes.SceneProcesses", scenes)
@@ -199,7 +199,7 @@ def no_pose_mistakes() -> Iterator[None]:
 
 def _pool_or_this_process(pool: type) -> Any:
     from burg_drake.core import BurgError
-    from burg_drake.evaluation import JobFailed, ScreenAnswers, judge_grasp, screen_grasps
+    from burg_drake.evaluation import JobFailed, JudgingState, judge_grasp, screen_grasps
 
     class ThisProcess:
         """Judges the grasps of one job after the other, in their order, without limits of time."""
@@ -215,19 +215,19 @@ def _pool_or_this_process(pool: type) -> Any:
                         raise
                     on_failure(JobFailed(job, error))
                     continue
-                grasps = [(candidate, ScreenAnswers()) for candidate in job.candidates]
+                grasps = [(candidate, JudgingState()) for candidate in job.candidates]
                 for screen in judge.screens:
                     passed = [grasp for grasp in grasps if grasp[1].outcome is None]
-                    answers: dict[str, ScreenAnswers] = {}
+                    states: dict[str, JudgingState] = {}
                     for k in range(0, len(passed), screen.batch):
                         batch = passed[k : k + screen.batch]
-                        for (candidate, _), answer in zip(
+                        for (candidate, _), state in zip(
                             batch, screen_grasps(judge, batch), strict=True
                         ):
-                            answers[candidate.id] = answer
-                    grasps = [(c, answers.get(c.id, answer)) for c, answer in grasps]
-                for candidate, answer in grasps:
-                    yield job, candidate, judge_grasp(judge, candidate, screened=answer)
+                            states[candidate.id] = state
+                    grasps = [(c, states.get(c.id, state)) for c, state in grasps]
+                for candidate, state in grasps:
+                    yield job, candidate, judge_grasp(judge, candidate, screened=state)
 
         def release(self) -> None:
             pass

@@ -157,8 +157,8 @@ from .judge import (
     Decide as Decide,
     Decision as Decision,
     Judge as Judge,
+    JudgingState as JudgingState,
     Screen as Screen,
-    ScreenAnswers as ScreenAnswers,
     StationJudge as StationJudge,
     StationJudgeFactory as StationJudgeFactory,
     arm_settings as arm_settings,
@@ -183,7 +183,7 @@ from .outcome_counts import (
 from .part_store import (
     PARTS_FOLDER as PARTS_FOLDER,
     PartWriter as PartWriter,
-    read_journal_tails as read_journal_tails,
+    read_journal_counts as read_journal_counts,
 )
 from .replay import (
     TrialInputs as TrialInputs,
@@ -212,8 +212,6 @@ from .report.page_elements import (
     folded_section as folded_section,
     header as header,
     html_page as html_page,
-    interval_mark as interval_mark,
-    nice_step as nice_step,
     number_cells as number_cells,
     section as section,
     style_sheet as style_sheet,

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 CAMPAIGN_FILE = "campaign.yaml"
 SCENES_FOLDER = "scenes"
 CAMPAIGN_LOCK_FILE = ".lock"
-LEDGER_FILE = "scenes.jsonl"
+SCENE_STATES_FILE = "scenes.jsonl"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class Campaign:
     """A run over many scenes, complete or not.
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         document: contents of campaign.yaml.
     """
 
@@ -75,7 +75,9 @@ class Campaign:
     def runs(self) -> tuple[Run, ...]:
         """Runs of the scenes that have been begun, in order, each read from its folder."""
         return tuple(
-            load_run(place.folder) for place in self.places if (place.folder / RUN_FILE).exists()
+            load_run(stored.folder)
+            for stored in self.stored_runs
+            if (stored.folder / RUN_FILE).exists()
         )
 
     def run(self, name: str) -> Run:
@@ -96,8 +98,8 @@ class Campaign:
         return self.path / SCENES_FOLDER / name
 
     @property
-    def places(self) -> list[StoredRun]:
-        """Names and folders of the scenes' runs, begun or not."""
+    def stored_runs(self) -> list[StoredRun]:
+        """Runs of the scenes, begun or not."""
         return [StoredRun(name, self.folder(name)) for name in self.names]
 
     @property
@@ -196,7 +198,7 @@ def load_campaign(path: str | Path) -> Campaign:
 
     Raises:
         InvalidInputError: the folder holds no such run.
-        DocumentError: its campaign.yaml does not fit the schema.
+        DocumentError: campaign.yaml does not fit the schema.
     """
     path = Path(path)
     if not is_campaign(path):
@@ -243,7 +245,7 @@ def open_results(path: str | Path) -> Run | Campaign:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     return load_campaign(path) if is_campaign(path) else load_run(path)
 
@@ -253,7 +255,7 @@ def load_runs(path: str | Path) -> list[Run]:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     found = open_results(path)
     return list(found.runs) if isinstance(found, Campaign) else [found]
@@ -276,7 +278,7 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
         MissingDependencyError: a run over many scenes without pyarrow.
     """
     found = open_results(path)
@@ -286,7 +288,7 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
     return found.columns(names)
 
 
-LedgerState = Literal["open", "done", "failed", "empty"]
+SceneStateName = Literal["open", "done", "failed", "empty"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -294,22 +296,22 @@ class SceneState:
     """Progress of a scene.
 
     Attributes:
-        scene: its name in the run.
+        scene: name of the scene in the run.
         state: `open` once its grasps are known, `done` once all assigned grasps are judged,
             `failed` if it cannot be judged, `empty` if there are no grasps for it.
-        run: hash of its run.
-        grasps: number of its grasps.
+        run: hash of the scene's run.
+        grasps: number of grasps on the scene.
         mine: number of grasps assigned to this run (or shard).
         sampling: CPU time of the sampling [s].
-        size: size of its journal when it was done [bytes].
-        failed, interrupted: number of grasps that could not be simulated, and how many of these
-            because their worker was killed from outside.
+        size: size of the journal when the scene was done [bytes].
+        failed: number of grasps that could not be simulated.
+        interrupted: number of failed grasps whose worker was killed from outside.
         why: reason of the failure.
         missing: notes on instances with fewer grasps than asked for; see `run_notes`.
     """
 
     scene: str
-    state: LedgerState
+    state: SceneStateName
     run: str = ""
     grasps: int = 0
     mine: int = 0
@@ -336,7 +338,7 @@ class SceneStates:
         Raises:
             InvalidInputError: the file cannot be read.
         """
-        self._path = folder / LEDGER_FILE
+        self._path = folder / SCENE_STATES_FILE
         self.states: dict[str, SceneState] = {}
         self._offset = 0
         self.refresh()
@@ -374,7 +376,7 @@ class SceneStates:
         self.states[state.scene] = state
 
 
-def ledger_text(states: Iterable[SceneState]) -> str:
+def scene_states_text(states: Iterable[SceneState]) -> str:
     """Contents of the file that `SceneStates` reads."""
     return "".join(_state_line(state) for state in states)
 
@@ -397,7 +399,7 @@ def _read_state(line: bytes) -> SceneState | None:
         state = SceneState(**stored)
     except (ValueError, RecursionError, TypeError):
         return None
-    known = state.state in get_args(LedgerState)
+    known = state.state in get_args(SceneStateName)
     typed = all(type(v) is SCENE_STATE_TYPES.get(k, int) for k, v in stored.items())
     return state if known and typed else None
 

@@ -139,12 +139,12 @@ class Candidates:
         wanted = _hashes(ids, len(ids))
         found = np.full(len(ids), -1, dtype=np.int64)
         known = self.id
-        for k, place in enumerate(np.searchsorted(hashes, wanted).tolist()):
-            while place < len(order) and hashes[place] == wanted[k]:
-                if known[order[place]] == ids[k]:
-                    found[k] = order[place]
+        for k, i in enumerate(np.searchsorted(hashes, wanted).tolist()):
+            while i < len(order) and hashes[i] == wanted[k]:
+                if known[order[i]] == ids[k]:
+                    found[k] = order[i]
                     break
-                place += 1
+                i += 1
         return found
 
     def __getstate__(self) -> dict[str, object]:
@@ -298,8 +298,8 @@ class InstanceNames:
     Attributes:
         scene: the scene with the instances.
         path: path of the file, for messages.
-        given: names of the scene's objects or instances by the file's names; the key "" stands for
-            any name in the file.
+        given: names of objects or instances of the scene, by object names in the file; the key ""
+            stands for any name in the file.
         is_file: whether the grasps come from a file, so that the user can map its names.
     """
 
@@ -412,7 +412,7 @@ def rows_of_names(
     only: Iterable[str] | None,
     where: str,
     objects: NDArray[np.str_],
-    instances: NDArray[np.str_] | None = None,
+    instances: NDArray[np.str_] | None,
 ) -> NDArray[np.bool_]:
     """Mask (N,) of the grasps whose object or instance is named; all True without names.
 
@@ -420,20 +420,20 @@ def rows_of_names(
         only: names of objects or instances.
         where: source of the grasps, for messages.
         objects: (N,) object of each grasp.
-        instances: (N,) instance of each grasp, if known.
+        instances: (N,) instance of each grasp; None if unknown.
 
     Raises:
         UnknownNameError: there are no grasps of that name.
     """
     names = list(only or ())
-    holders = [objects] if instances is None else [objects, instances]
+    columns = [objects] if instances is None else [objects, instances]
     if not names:
         return np.ones(len(objects), dtype=bool)
-    known = {name for column in holders for name in column.tolist()}
+    known = {name for column in columns for name in column.tolist()}
     for name in names:
         if name not in known:
             raise UnknownNameError(
                 f"{where} has no grasps of {name!r}; {suggest_names(name, known)}"
             )
-    held: NDArray[np.bool_] = np.any([np.isin(column, names) for column in holders], axis=0)
-    return held
+    named: NDArray[np.bool_] = np.any([np.isin(column, names) for column in columns], axis=0)
+    return named

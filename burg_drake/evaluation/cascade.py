@@ -31,7 +31,6 @@ from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
-from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.many_scenes import evaluate_scenes
 from burg_drake.evaluation.part_store import keep_parts
 from burg_drake.evaluation.run_document import add_session, begin_session
@@ -39,13 +38,13 @@ from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, 
 from burg_drake.evaluation.run_preparation import (
     GraspsLike,
     RunRequest,
-    extend_run,
     finish_run,
     next_round,
     open_rows,
     open_run,
     require_judged,
     require_sound,
+    resample_run,
 )
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.table_file import require_writer
@@ -183,7 +182,7 @@ def _evaluate_one(
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
-        make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.phases)
+        make_judge = request.judge_factory(scene)
         remove_unfinished(folder)
         retry_failed = request.retry_failed
         while True:
@@ -198,7 +197,7 @@ def _evaluate_one(
             if more is None:
                 break
             reporter.show(Progress("sampling"))
-            run, retry_failed = extend_run(run, more, scene, station), False
+            run, retry_failed = resample_run(run, more, scene, station, before=run), False
         run = finish_run(run, request.settings.table)
         keep_parts(run)
         return run
@@ -216,7 +215,7 @@ def _judge_open_grasps(
     total = len(run.assigned_ids)
     done = total - len(left)
     outcomes = run.index.count_outcomes(left)
-    pace = ProgressMeter(
+    meter = ProgressMeter(
         reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
     )
     session = begin_session(executor.workers, int(run.index.judged.sum()))
@@ -229,7 +228,7 @@ def _judge_open_grasps(
             for _, candidate, verdict in verdicts:
                 journal.append(candidate.id, verdict)
                 judged += 1
-                pace.step(outcome=verdict.outcome)
+                meter.step(outcome=verdict.outcome)
     finally:
         session = session.finish(judged, begun)
         document = add_session(document, session)

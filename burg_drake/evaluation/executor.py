@@ -41,15 +41,15 @@ from burg_drake.core import (
     worker_count,
 )
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Judge, ScreenAnswers, judge_grasp, screen_grasps
+from burg_drake.evaluation.judge import Judge, JudgingState, judge_grasp, screen_grasps
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Grasps that one judge judges.
+    """Grasps for one judge.
 
     Attributes:
-        key: names it among the jobs of a call.
+        key: name of the job, unique in a call.
         make_judge: builds the judge; pickled by reference, see `judge_all`.
         candidates: the grasps.
     """
@@ -97,8 +97,8 @@ class WorkerLimits:
     false_starts: int = 2
 
 
-Grasp = tuple[Candidate, ScreenAnswers]
-"""A grasp with the answers of its screens so far."""
+PendingGrasp = tuple[Candidate, JudgingState]
+"""A grasp without a verdict, and the decisions on it so far."""
 
 
 def build_judge(make_judge: Callable[[], Judge]) -> Judge:
@@ -125,30 +125,31 @@ GRASPS_PER_TASK = 4
 
 
 class GraspQueue:
-    """Queue of waiting grasps; new grasps come before those with screen answers.
+    """Queue of waiting grasps; fresh grasps come before appended ones.
 
     Args:
-        fresh: grasps without answers. Answers take memory, so they are made on taking a grasp.
+        fresh: grasps on which no stage has decided. Their `JudgingState` takes memory, so it is
+            made when a grasp is taken.
     """
 
     def __init__(self, fresh: Sequence[Candidate] = ()) -> None:
-        self._fresh, self._taken = fresh, 0
-        self._others: deque[Grasp] = deque()
+        self._fresh, self._taken_count = fresh, 0
+        self._appended: deque[PendingGrasp] = deque()
 
     def __len__(self) -> int:
-        return len(self._fresh) - self._taken + len(self._others)
+        return len(self._fresh) - self._taken_count + len(self._appended)
 
-    def append(self, grasp: Grasp) -> None:
+    def append(self, grasp: PendingGrasp) -> None:
         """Adds a grasp at the end."""
-        self._others.append(grasp)
+        self._appended.append(grasp)
 
-    def take(self, n: int) -> tuple[Grasp, ...]:
+    def take(self, n: int) -> tuple[PendingGrasp, ...]:
         """Removes and returns the first n grasps, or all if there are fewer."""
-        begin, end = self._taken, min(self._taken + n, len(self._fresh))
-        self._taken = end
-        fresh = [(self._fresh[k], ScreenAnswers()) for k in range(begin, end)]
-        rest = min(n - len(fresh), len(self._others))
-        return (*fresh, *(self._others.popleft() for _ in range(rest)))
+        begin, end = self._taken_count, min(self._taken_count + n, len(self._fresh))
+        self._taken_count = end
+        fresh = [(self._fresh[k], JudgingState()) for k in range(begin, end)]
+        rest = min(n - len(fresh), len(self._appended))
+        return (*fresh, *(self._appended.popleft() for _ in range(rest)))
 
 
 class OpenJob:
@@ -157,8 +158,8 @@ class OpenJob:
     Attributes:
         job: the job.
         session: session of the workers that have its judge.
-        open: grasps to be judged one by one.
-        unscreened: grasps that wait for each screen.
+        to_judge: grasps to be judged one by one.
+        to_screen: queue of each screen.
         batches: batch size of each screen.
         crashes_in_a_row: number of grasps that killed their workers since one was judged.
         failed: whether the job is given up; later results are ignored.
@@ -172,57 +173,57 @@ class OpenJob:
             TimeLimit(limits.build, limits.wall),
             limits.false_starts,
         )
-        self.open = GraspQueue(job.candidates)
+        self.to_judge = GraspQueue(job.candidates)
         self.batches: tuple[int, ...] = ()
-        self.unscreened: list[GraspQueue] = []
+        self.to_screen: list[GraspQueue] = []
         self.crashes_in_a_row = 0
         self.failed = False
 
     @property
     def waiting(self) -> int:
         """Number of grasps not handed to a worker."""
-        return len(self.open) + sum(map(len, self.unscreened))
+        return len(self.to_judge) + sum(map(len, self.to_screen))
 
     def set_screens(self, batches: tuple[int, ...]) -> None:
-        """Sets the screens once the first worker reports them; until then all grasps are open."""
-        if not self.unscreened and batches:
+        """Sets the screens once the first worker reports them; until then no grasp is screened."""
+        if not self.to_screen and batches:
             self.batches = batches
-            self.unscreened = [self.open, *(GraspQueue() for _ in batches[1:])]
-            self.open = GraspQueue()
+            self.to_screen = [self.to_judge, *(GraspQueue() for _ in batches[1:])]
+            self.to_judge = GraspQueue()
 
-    def next_work(self) -> tuple[tuple[Grasp, ...], bool]:
-        """Grasps to work on next, and whether they are to be screened (all by the same screen).
+    def next_work(self) -> tuple[tuple[PendingGrasp, ...], bool]:
+        """Grasps to work on next, and whether a screen (the same for all) takes them.
 
         Grasps are screened when few are left to judge. The last screen comes first, unless too few
         grasps wait for it. Screening and judging thus alternate, so that the rate of verdicts
         predicts the remaining time.
         """
-        if len(self.open) < GRASPS_PER_TASK:
+        if len(self.to_judge) < GRASPS_PER_TASK:
             for k in reversed(range(len(self.batches))):
-                waiting = self.unscreened[k]
-                if len(waiting) >= self.batches[k] or (waiting and not any(self.unscreened[:k])):
-                    return waiting.take(self.batches[k]), True
-        return self.open.take(GRASPS_PER_TASK), False
+                queue = self.to_screen[k]
+                if len(queue) >= self.batches[k] or (queue and not any(self.to_screen[:k])):
+                    return queue.take(self.batches[k]), True
+        return self.to_judge.take(GRASPS_PER_TASK), False
 
-    def store_screen_answers(
-        self, grasps: Sequence[Grasp], answers: Sequence[ScreenAnswers]
+    def sort_screened(
+        self, grasps: Sequence[PendingGrasp], states: Sequence[JudgingState]
     ) -> list[tuple[Candidate, Verdict]]:
-        """Stores the answers of a screen; returns the verdicts of grasps that it rejected."""
+        """Queues the grasps that a screen passed on; returns the verdicts of rejected grasps."""
         verdicts = []
-        for (candidate, _), answer in zip(grasps, answers, strict=True):
-            if answer.outcome is not None:
-                verdicts.append((candidate, answer.verdict()))
+        for (candidate, _), state in zip(grasps, states, strict=True):
+            if state.outcome is not None:
+                verdicts.append((candidate, state.verdict()))
                 continue
-            asked = len(answer.decisions)
-            last = asked == len(self.batches)
-            (self.open if last else self.unscreened[asked]).append((candidate, answer))
+            screened = len(state.decisions)
+            queue = self.to_screen[screened] if screened < len(self.batches) else self.to_judge
+            queue.append((candidate, state))
         return verdicts
 
     def give_up(self) -> None:
         """Marks the job as failed and drops its remaining grasps."""
         self.failed = True
-        self.open = GraspQueue()
-        self.unscreened = []
+        self.to_judge = GraspQueue()
+        self.to_screen = []
 
 
 @dataclass(eq=False)
@@ -240,7 +241,7 @@ class AssignedWork:
 
     slot: WorkerSlot
     job: OpenJob
-    grasps: tuple[Grasp, ...]
+    grasps: tuple[PendingGrasp, ...]
     screening: bool = False
     future: WorkerFuture[Any] | None = None
     stage: Stage = Stage.CLEAR
@@ -256,9 +257,9 @@ class WorkerSlot:
 
     Attributes:
         number: index in the pool.
-        job: its current or last job.
+        job: current or last job of the worker.
         assigned: work that it has not finished yet.
-        started: whether it was ever given work.
+        started: whether the worker was ever given work.
     """
 
     number: int
@@ -267,8 +268,8 @@ class WorkerSlot:
     started: bool = False
 
 
-Answer = tuple[Job, Candidate, Verdict]
-"""A job, one of its grasps, and the verdict."""
+JudgedGrasp = tuple[Job, Candidate, Verdict]
+"""A job, one of its grasps, and the verdict on the grasp."""
 
 
 class JudgePool:
@@ -276,7 +277,7 @@ class JudgePool:
 
     Attributes:
         count: largest number of workers.
-        limits: their limits.
+        limits: limits of the workers.
         slots: the workers.
         jobs: jobs in progress.
         stopped: whether `stop` was called.
@@ -293,18 +294,18 @@ class JudgePool:
         self._workers: WorkerPool | None = None
         self._done: SimpleQueue[AssignedWork] = SimpleQueue()
         self._screens: dict[str, tuple[int, ...]] = {}
-        self._coming: Iterator[Job | None] = iter(())
+        self._remaining_jobs: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
 
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
-    ) -> Generator[Answer, None, None]:
+    ) -> Generator[JudgedGrasp, None, None]:
         """Judges all grasps of all jobs; see `Executor.judge`.
 
         Idle workers stay for another call; an error or closing the generator ends all workers.
         """
-        self._coming, self._on_failure = iter(jobs), on_failure
-        self.open()
+        self._remaining_jobs, self._on_failure = iter(jobs), on_failure
+        self.create_workers()
         try:
             while not self.stopped:
                 self.assign_work()
@@ -320,7 +321,7 @@ class JudgePool:
             self.kill()
             raise
 
-    def open(self) -> None:
+    def create_workers(self) -> None:
         """Creates the worker pool if there is none; processes start when there is work."""
         if self._workers is None:
             self._workers = WorkerPool(self.count)
@@ -336,29 +337,29 @@ class JudgePool:
         self.jobs = [job for job in open_jobs if job.waiting or self.worker_count_of(job)]
 
     def worker_count_of(self, job: OpenJob) -> int:
-        """Number of workers on a job."""
+        """Number of workers that work on a job."""
         return sum(bool(slot.assigned) and slot.job is job for slot in self.slots)
 
     def choose_job(self, slot: WorkerSlot) -> OpenJob | None:
         """Chooses the job for an idle worker; None if there is none."""
-        built = self.judges_of(slot)
+        built = self.built_judges(slot)
         if slot.job is not None and slot.job.waiting:
             return slot.job
-        for job in self._coming:
+        for job in self._remaining_jobs:
             if job is None:  # none is ready yet; asked again when something has happened
                 break
             if job.candidates:
                 self.jobs.append(OpenJob(job, self.limits))
                 return self.jobs[-1]
-        share = {
+        priorities = {
             job: (job.job.key in built, job.waiting / (1 + self.worker_count_of(job)))
             for job in self.jobs
             if job.waiting
             > (0 if job.job.key in built else GRASPS_PER_TASK * self.worker_count_of(job))
         }
-        return max(share, key=share.__getitem__) if share else None
+        return max(priorities, key=priorities.__getitem__) if priorities else None
 
-    def judges_of(self, slot: WorkerSlot) -> tuple[str, ...]:
+    def built_judges(self, slot: WorkerSlot) -> tuple[str, ...]:
         """Keys of the judges that a worker has built."""
         assert self._workers is not None
         return self._workers.sessions(slot.number)
@@ -366,7 +367,7 @@ class JudgePool:
     def give_work(self, slot: WorkerSlot, job: OpenJob) -> None:
         """Gives a worker grasps of a job, or has it build the judge first."""
         slot.job, slot.started = job, True
-        if job.job.key not in self.judges_of(slot) or job.job.key not in self._screens:
+        if job.job.key not in self.built_judges(slot) or job.job.key not in self._screens:
             build: Task[Any] = Task(_screen_batches, session=job.session)
             self.submit(slot, [(AssignedWork(slot, job, ()), build)])
             return
@@ -378,12 +379,12 @@ class JudgePool:
             task: Task[Any] = Task(screen_grasps, (grasps,), {}, job.session, limit, retries=0)
             self.submit(slot, [(work, task)])
             return
-        each = [AssignedWork(slot, job, (grasp,)) for grasp in grasps]
+        works = [AssignedWork(slot, job, (grasp,)) for grasp in grasps]
         tasks = [
-            Task(judge_grasp, one.grasps[0], {}, job.session, limit, one.begin_stage)
-            for one in each
+            Task(judge_grasp, work.grasps[0], {}, job.session, limit, work.begin_stage)
+            for work in works
         ]
-        self.submit(slot, list(zip(each, tasks, strict=True)))
+        self.submit(slot, list(zip(works, tasks, strict=True)))
 
     def submit(self, slot: WorkerSlot, tasks: list[tuple[AssignedWork, Task[Any]]]) -> None:
         """Sends tasks to a worker; `run` receives each result."""
@@ -399,7 +400,7 @@ class JudgePool:
     def _note_done(self, work: AssignedWork, future: object) -> None:
         self._done.put(work)
 
-    def handle_result(self, work: AssignedWork) -> Iterator[Answer]:
+    def handle_result(self, work: AssignedWork) -> Iterator[JudgedGrasp]:
         """Handles the result of a piece of work; yields the verdicts in it."""
         job, future = work.job, work.future
         assert future is not None
@@ -413,9 +414,9 @@ class JudgePool:
         elif work.screening:
             if error is not None:  # judged one by one, to find the grasp that kills the worker
                 for grasp in work.grasps:
-                    job.open.append(grasp)
+                    job.to_judge.append(grasp)
                 return
-            for candidate, verdict in job.store_screen_answers(work.grasps, future.result()):
+            for candidate, verdict in job.sort_screened(work.grasps, future.result()):
                 yield job.job, candidate, verdict
         elif error is None:
             job.crashes_in_a_row = 0
@@ -423,8 +424,11 @@ class JudgePool:
         else:
             yield from self.handle_crash(work, error)
 
-    def handle_crash(self, work: AssignedWork, error: BaseException) -> Iterator[Answer]:
-        """Handles a grasp that has killed its workers."""
+    def handle_crash(self, work: AssignedWork, error: BaseException) -> Iterator[JudgedGrasp]:
+        """Yields `simulation_failed` for a grasp that killed its workers.
+
+        Gives the job up after too many such grasps in a row.
+        """
         job, candidate = work.job, work.grasps[0][0]
         reason, interrupted = one_line(error), False
         if isinstance(error, WorkerDied):
@@ -435,11 +439,7 @@ class JudgePool:
         yield job.job, candidate, verdict
         job.crashes_in_a_row += 1
         if job.crashes_in_a_row >= self.limits.hopeless:
-            why = (
-                f"{self.limits.hopeless} grasps in a row could not be simulated; the"
-                f" reason of the last one: {reason}"
-            )
-            self.fail_job(job, SimulationError(why))
+            self.fail_job(job, hopeless_error(self.limits, reason))
 
     def fail_job(self, job: OpenJob, error: BurgError) -> None:
         """Gives a job up, and reports it once."""
@@ -449,9 +449,7 @@ class JudgePool:
         for work in [work for slot in self.slots for work in slot.assigned if work.job is job]:
             if work.future is not None:
                 work.future.interrupt()
-        if self._on_failure is None:
-            raise error
-        self._on_failure(JobFailed(job.job, error))
+        report_failure(JobFailed(job.job, error), self._on_failure)
 
     def release(self) -> None:
         """Shuts down idle workers and kills busy ones."""
@@ -472,6 +470,26 @@ class JudgePool:
             workers.kill_workers()
         self.slots.clear()
         self.jobs.clear()
+
+
+def report_failure(failure: JobFailed, on_failure: OnFailure | None) -> None:
+    """Passes the failure of a job to `on_failure`; raises its error if that is None."""
+    if on_failure is None:
+        raise failure.error
+    on_failure(failure)
+
+
+def hopeless_error(limits: WorkerLimits, reason: str) -> SimulationError:
+    """Error of a job that is given up after `WorkerLimits.hopeless` failed grasps in a row.
+
+    Args:
+        limits: limits of the workers.
+        reason: why the last grasp failed.
+    """
+    return SimulationError(
+        f"{limits.hopeless} grasps in a row could not be simulated; the reason of the last one:"
+        f" {reason}"
+    )
 
 
 def _build_error(error: BaseException) -> BurgError:
@@ -515,7 +533,7 @@ class LocalExecutor:
 
     Attributes:
         workers: number of processes.
-        limits: their limits.
+        limits: limits of the workers.
     """
 
     workers: int

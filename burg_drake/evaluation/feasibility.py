@@ -50,7 +50,7 @@ from burg_drake.evaluation.judge import (
     arm_reach,
     arm_screen,
     arm_settings,
-    hand_alone,
+    build_hand_clearance,
     hand_screen,
 )
 from burg_drake.evaluation.results_table import Columns, columns_of_verdicts, pose_columns
@@ -119,7 +119,7 @@ class PlanFolder:
     """A folder of plans.
 
     Attributes:
-        path: its path.
+        path: path of the folder.
         document: inputs and settings of the plans.
     """
 
@@ -275,7 +275,7 @@ def reach(
 
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
-        grasps: in the frames of their objects. A set goes to the instances that its column
+        grasps: grasps in their objects' frames. A set goes to the instances that its column
             `instance` names, or else to all instances of its objects; a mapping has sets by
             instance, as `read_grasps` returns.
         motion: approach, retreat and lift of the hand; the station's if None.
@@ -348,7 +348,7 @@ def plan_into_folder(
     workers: int | None,
     reporter: Reporter,
     *,
-    retry_failed: bool = False,
+    retry_failed: bool,
 ) -> dict[str, Verdict]:
     """Judges the grasps that a folder of plans lacks, and writes their plans.
 
@@ -393,13 +393,13 @@ def _judge_grasps(
     event = Progress(
         STARTING_PHASE, done, total, outcomes=outcomes, counted_outcome=Outcome.REACHABLE
     )
-    pace = ProgressMeter(reporter.show, event, "judging")
+    meter = ProgressMeter(reporter.show, event, "judging")
     with closing(judge_all(left, factory, workers=workers)) as judged:
         for candidate, verdict in judged:
             verdicts[candidate.id] = verdict
             if journal is not None:
                 journal.append(candidate.id, verdict)
-            pace.step(outcome=verdict.outcome)
+            meter.step(outcome=verdict.outcome)
     return verdicts
 
 
@@ -414,7 +414,7 @@ class ReachJudge:
         from burg_drake.motion import Planner
 
         scene, station = factory.scene, factory.station
-        hand, X_WO = hand_alone(scene, station)
+        hand, X_WO = build_hand_clearance(scene, station)
         arm = arm_reach(scene, station, factory.motion, exact=factory.exact)
         with_plans = factory.plans is not None
         self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=with_plans))

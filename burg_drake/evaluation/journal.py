@@ -73,7 +73,7 @@ def is_locked(path: Path) -> bool:
 
 @contextmanager
 def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
-    """Keeps other processes from writing the folder whose lock file this is; they may read it.
+    """Keeps other processes from writing the folder of a lock file; they may read it.
 
     Args:
         path: the lock file. Nothing is locked if it does not exist, or on a file system without
@@ -215,18 +215,18 @@ def journal_lines(
     if not path.exists():
         return
     with open_regular(path) as stream:
-        place = stream.seek(begin)
+        end_of_line = stream.seek(begin)
         for line in iter(lambda: stream.readline(MAX_JOURNAL_LINE), b""):
-            here, place = place, place + len(line)
+            line_begin, end_of_line = end_of_line, end_of_line + len(line)
             if not line.endswith(b"\n"):  # torn, or too long: cut off when the run goes on
                 continue
-            if end is not None and place > end:
+            if end is not None and end_of_line > end:
                 return
             try:
                 id, verdict = decode_verdict(line)
             except (ValueError, KeyError, TypeError, AttributeError):
                 continue
-            yield here, id, verdict
+            yield line_begin, id, verdict
 
 
 COMPLETED_RANK = 3  # `JournalIndex.rank` of a trial that came to an end.
@@ -237,12 +237,12 @@ class JournalIndex:
     """Position and outcome of the last verdict of each of N grasps, in 11 bytes per grasp.
 
     Attributes:
-        place: (N,) byte of the journal at which the line begins; -1 for grasps without a verdict.
-        outcome: (N,) index in `Outcome`; -1 for grasps without a verdict.
+        line_begin: (N,) byte of the journal at which the line begins; -1 without a verdict.
+        outcome: (N,) index in `Outcome`; -1 without a verdict.
         interrupted, judged_again: (N,) see `Verdict`.
     """
 
-    place: NDArray[np.int64]
+    line_begin: NDArray[np.int64]
     outcome: NDArray[np.int8]
     interrupted: NDArray[np.bool_]
     judged_again: NDArray[np.bool_]
@@ -307,26 +307,26 @@ def index_journal(
         np.zeros(count, dtype=bool),
         np.zeros(count, dtype=bool),
     )
-    outcomes = {outcome: place for place, outcome in enumerate(Outcome)}
+    outcomes = {outcome: k for k, outcome in enumerate(Outcome)}
     lines = journal_lines(path)
     while batch := list(islice(lines, 4096)):
         rows = rows_of([id for _, id, _ in batch]).tolist()
-        for row, (place, _, verdict) in zip(rows, batch, strict=True):
+        for row, (line_begin, _, verdict) in zip(rows, batch, strict=True):
             if row >= 0:
-                index.place[row], index.outcome[row] = place, outcomes[verdict.outcome]
+                index.line_begin[row], index.outcome[row] = line_begin, outcomes[verdict.outcome]
                 index.interrupted[row] = verdict.interrupted
                 index.judged_again[row] = bool(verdict.judged_again)
     return index
 
 
-def read_verdicts(path: Path, places: Sequence[int]) -> list[Verdict]:
+def read_verdicts(path: Path, line_begins: Sequence[int]) -> list[Verdict]:
     """Reads the verdicts in the lines of a journal that begin at the given bytes."""
     verdicts: list[Verdict] = []
-    if not places:
+    if not line_begins:
         return verdicts
     with open_regular(path) as stream:
-        for place in places:
-            stream.seek(place)
+        for line_begin in line_begins:
+            stream.seek(line_begin)
             verdicts.append(decode_verdict(stream.readline(MAX_JOURNAL_LINE))[1])
     return verdicts
 

@@ -112,7 +112,7 @@ class Screen(NamedTuple):
     """A stage that takes many grasps at once; its decisions do not depend on the batch.
 
     Attributes:
-        stage: its name.
+        stage: name of the stage.
         ask: returns the decision for each grasp.
         batch: batch size beyond which the cost per grasp hardly falls.
     """
@@ -127,7 +127,7 @@ Decide = Callable[[Candidate, "ArmPath | Plan | None"], Decision]
 
 
 class Judge(Protocol):
-    """Stages in the order in which a grasp passes them; the last one always decides."""
+    """Stages in the order in which a grasp passes them; the last stage always decides."""
 
     @property
     def screens(self) -> Sequence[Screen]:
@@ -139,12 +139,12 @@ class Judge(Protocol):
 
 
 @dataclass(frozen=True)
-class ScreenAnswers:
-    """Decisions of a judge's stages so far on a grasp; all but the last pass the grasp on.
+class JudgingState:
+    """Decisions on a grasp by the stages so far; all but the last pass the grasp on.
 
     Attributes:
         decisions: the decisions.
-        cpu: their CPU time by stage; an equal share if grasps were screened together [s].
+        cpu: CPU time by stage [s]; an equal share if grasps were screened together.
     """
 
     decisions: tuple[Decision, ...] = ()
@@ -152,30 +152,30 @@ class ScreenAnswers:
 
     @property
     def outcome(self) -> Outcome | None:
-        """Outcome of the grasp; None if it is passed on."""
+        """Outcome of the grasp; None if the last stage passes it on."""
         return self.decisions[-1].outcome if self.decisions else None
 
     def verdict(self) -> Verdict:
         """The verdict; only valid if the last decision has an outcome."""
         return _make_verdict(self.decisions, list(self.cpu)[-1], self.cpu)
 
-    def with_decision(self, stage: Stage, decision: Decision, cpu: float) -> ScreenAnswers:
+    def with_decision(self, stage: Stage, decision: Decision, cpu: float) -> JudgingState:
         """Copy with one more decision."""
-        return ScreenAnswers((*self.decisions, decision), {**self.cpu, stage: cpu})
+        return JudgingState((*self.decisions, decision), {**self.cpu, stage: cpu})
 
 
 def screen_grasps(
-    judge: Judge, grasps: Sequence[tuple[Candidate, ScreenAnswers]]
-) -> list[ScreenAnswers]:
+    judge: Judge, grasps: Sequence[tuple[Candidate, JudgingState]]
+) -> list[JudgingState]:
     """Sends many grasps through their next screen at once.
 
     Args:
         judge: the stages.
-        grasps: grasps with their answers so far; all have been through the same screens.
+        grasps: grasps and the decisions on them so far; all have passed the same screens.
 
     Returns:
-        Answers of each grasp with the new one. On an error each grasp is screened alone, and those
-        that cause it end in `simulation_failed`.
+        State of each grasp with the new decision. On an error each grasp is screened alone, and the
+        grasps that cause the error end in `simulation_failed`.
     """
     if not grasps:
         return []
@@ -185,7 +185,7 @@ def screen_grasps(
         decisions = screen.ask([candidate for candidate, _ in grasps])
     except Exception as error:
         if len(grasps) > 1:
-            return [answers for grasp in grasps for answers in screen_grasps(judge, [grasp])]
+            return [state for grasp in grasps for state in screen_grasps(judge, [grasp])]
         decisions = [Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))]
     share = (time.process_time() - start) / len(grasps)
     return [
@@ -197,7 +197,7 @@ def screen_grasps(
 def judge_grasp(
     judge: Judge,
     candidate: Candidate,
-    screened: ScreenAnswers | None = None,
+    screened: JudgingState | None = None,
     announce: Callable[[Stage], None] = report_progress,
 ) -> Verdict:
     """Sends a grasp through the stages.
@@ -205,31 +205,31 @@ def judge_grasp(
     Args:
         judge: the stages.
         candidate: the grasp.
-        screened: answers of screens that have been asked already.
+        screened: decisions of the screens that the grasp has passed already.
         announce: called with each stage before it begins; a worker reports it as progress.
 
     Returns:
         The verdict. An error inside a stage ends in `simulation_failed` with its message.
     """
-    answers = screened or ScreenAnswers()
-    for screen in judge.screens[len(answers.decisions) :]:
-        if answers.outcome is None:
+    state = screened or JudgingState()
+    for screen in judge.screens[len(state.decisions) :]:
+        if state.outcome is None:
             announce(screen.stage)
-            (answers,) = screen_grasps(judge, [(candidate, answers)])
+            (state,) = screen_grasps(judge, [(candidate, state)])
     for stage, decide in judge.stages:
-        if answers.outcome is not None:
+        if state.outcome is not None:
             break
         announce(stage)
-        motion = next((d.motion for d in reversed(answers.decisions) if d.motion), None)
+        motion = next((d.motion for d in reversed(state.decisions) if d.motion), None)
         start = time.process_time()
         try:
-            decision = decide(_with_found_lift(candidate, answers.decisions), motion)
+            decision = decide(_with_found_lift(candidate, state.decisions), motion)
         except Exception as error:  # any error of Drake becomes the outcome of this grasp
             decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
-        answers = answers.with_decision(stage, decision, time.process_time() - start)
-    if answers.outcome is None:
+        state = state.with_decision(stage, decision, time.process_time() - start)
+    if state.outcome is None:
         raise ValueError("the last stage of a judge has to decide")
-    return answers.verdict()
+    return state.verdict()
 
 
 def _with_found_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
@@ -260,8 +260,8 @@ def trial_verdict(result: TrialResult) -> Verdict:
     return _make_verdict([trial_decision(result)], Stage.EXECUTED, {})
 
 
-class LiftRoom:
-    """Free lift lengths of the hand alone, for motions that allow less than the whole lift.
+class FreeLift:
+    """Collision-free lift of the hand alone, for motions that allow less than the whole lift.
 
     Checks the swept volume of the hand in a scene: geometry only, no arm, no time steps.
 
@@ -277,10 +277,10 @@ class LiftRoom:
         self._sweep = HandSweep(scene, station, motion)
         self._heights = lift_heights(motion.shortest, motion.lift_height)
 
-    def length(self, instance: str, X_WG: Array, width: Array) -> Array:
-        """(N,) lengths of lifts without a collision of the hand holding the target [m].
+    def lengths(self, instance: str, X_WG: Array, width: Array) -> Array:
+        """(N,) lengths of collision-free lifts of the hand with the target [m].
 
-        The shortest allowed lift if even that one is not free; the trial then finds the collision.
+        The shortest allowed lift if even that one collides; the trial then finds the collision.
 
         Args:
             instance: the target.
@@ -300,14 +300,14 @@ class LiftRoom:
 
 
 def hand_screen(
-    clearance: HandClearance, X_WO: Mapping[str, Array], room: LiftRoom | None = None
+    clearance: HandClearance, X_WO: Mapping[str, Array], free_lift: FreeLift | None = None
 ) -> Screen:
     """Screen of the stage `clear`.
 
     Args:
         clearance: clearance of the open hand in the scene.
         X_WO: (4, 4) poses of the free instances by name.
-        room: finds the lift lengths of clear hands, if no later stage does.
+        free_lift: finds the lift lengths of clear hands, if no later stage does.
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
@@ -317,17 +317,17 @@ def hand_screen(
         decisions = [Decision()] * len(grasps)
         for instance, chosen in by_instance.items():
             X_WG = grasps_in_world([grasps[k] for k in chosen], X_WO)
-            found = clearance.check_all(instance, X_WG)
+            results = clearance.check_all(instance, X_WG)
             lifts = np.full(len(chosen), np.nan)
-            clear = np.flatnonzero([answer.outcome is None for answer in found])
-            if room is not None and len(clear):
+            clear = np.flatnonzero([result.outcome is None for result in results])
+            if free_lift is not None and len(clear):
                 width = np.array([grasps[chosen[k]].width for k in clear])
-                lifts[clear] = room.length(instance, X_WG[clear], width)
-            for k, answer, lift in zip(chosen, found, lifts.tolist(), strict=True):
-                margins = {"overlap": answer.overlap, "clearance": answer.clearance}
+                lifts[clear] = free_lift.lengths(instance, X_WG[clear], width)
+            for k, result, lift in zip(chosen, results, lifts.tolist(), strict=True):
+                margins = {"overlap": result.overlap, "clearance": result.clearance}
                 if math.isfinite(lift):
                     margins[MarginNames.lift_height] = lift
-                decisions[k] = Decision(answer.outcome, blocker=answer.blocker, margins=margins)
+                decisions[k] = Decision(result.outcome, blocker=result.blocker, margins=margins)
         return decisions
 
     return Screen(Stage.CLEAR, ask, 512)  # a grasp takes about 0.025 ms in such a batch
@@ -343,12 +343,12 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
-        found = reach.check_all(
+        results = reach.check_all(
             [grasp.instance for grasp in grasps],
             grasps_in_world(grasps, X_WO),
             np.array([grasp.width for grasp in grasps]),
         )
-        return [_reach_decision(answer, motions) for answer in found]
+        return [_reach_decision(result, motions) for result in results]
 
     return Screen(Stage.REACHABLE, ask, 128)  # as many as `ArmReach` judges together
 
@@ -361,24 +361,24 @@ def grasps_in_world(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> A
     return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
 
 
-def _reach_decision(answer: Reach, motions: bool) -> Decision:
+def _reach_decision(result: Reach, motions: bool) -> Decision:
     margins = {
-        "arm_clearance": answer.clearance,
-        "joint_excess": answer.excess,
-        MarginNames.lift_height: answer.lift,
+        "arm_clearance": result.clearance,
+        "joint_excess": result.excess,
+        MarginNames.lift_height: result.lift,
     }
     return Decision(
-        answer.outcome,
-        blocker=answer.blocker,
+        result.outcome,
+        blocker=result.blocker,
         margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
-        q_grasp=() if answer.q_grasp is None else tuple(answer.q_grasp.tolist()),
-        q_pregrasp=() if answer.q_pregrasp is None else tuple(answer.q_pregrasp.tolist()),
-        motion=answer.path if motions else None,
+        q_grasp=() if result.q_grasp is None else tuple(result.q_grasp.tolist()),
+        q_pregrasp=() if result.q_pregrasp is None else tuple(result.q_pregrasp.tolist()),
+        motion=result.path if motions else None,
     )
 
 
-def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
-    """Arguments of `hand_screen`, for judges without a trial of the hand to take them from."""
+def build_hand_clearance(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
+    """Clearance of the open hand, and poses of the instances; the arguments of `hand_screen`."""
     from burg_drake.grasping import HandClearance
     from burg_drake.station import build_station_diagram
 
@@ -442,8 +442,8 @@ class HandJudge(StationJudge):
         motion = self._trial.motion
         X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
         shortened = mode == "hand" and motion.shortest < motion.lift_height
-        room = LiftRoom(scene, station, motion) if shortened else None
-        screens = [hand_screen(self._trial.clearance, X_WO, room)]
+        free_lift = FreeLift(scene, station, motion) if shortened else None
+        screens = [hand_screen(self._trial.clearance, X_WO, free_lift)]
         if mode == "reach":
             screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
         super().__init__(screens, [(Stage.EXECUTED, self._execute)])
@@ -467,7 +467,7 @@ class ArmJudge(StationJudge):
         from burg_drake.motion import Planner
         from burg_drake.simulation import ArmTrial
 
-        hand, X_WO = hand_alone(scene, station)
+        hand, X_WO = build_hand_clearance(scene, station)
         self._trial = ArmTrial(scene, station, engine=engine, settings=settings, clearance=hand)
         reach = arm_reach(scene, station, self._trial.motion)
         self._planner = Planner(reach)

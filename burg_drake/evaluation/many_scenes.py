@@ -49,7 +49,6 @@ from burg_drake.evaluation.candidates import INSTANCE_COLUMN
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.grasp_sets.mistake_search import campaign_hints
 from burg_drake.evaluation.journal import WriterLock
-from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.report.pages import renew_report
 from burg_drake.evaluation.run_document import (
     CampaignDocument,
@@ -66,7 +65,6 @@ from burg_drake.evaluation.run_preparation import (
     require_scenes_judged,
 )
 from burg_drake.evaluation.scene_tasks import (
-    Preparer,
     PrepareTask,
     SceneJudging,
     SceneOutputs,
@@ -121,7 +119,7 @@ def read_scenes(
                 if isinstance(reference, Scene)
                 else resolve_reference(reference, "scenes")
             )
-            entries.append(reader.entry(scene))
+            entries.append(reader.read_entry(scene))
             given.append(scene)
         except BurgError as error:
             problems.append(str(error))
@@ -133,8 +131,8 @@ def read_scenes(
             if len(references) > 1
             else problems[0]
         )
-    _require_different(entries)
-    named = _distinct_names(entries)
+    _refuse_repeated(entries)
+    named = _rename_distinctly(entries)
     names = [entry.name for entry in named]
     return SceneList(tuple(named), dict(zip(names, given, strict=True)), reader.hashes)
 
@@ -172,16 +170,16 @@ class _SceneReader:
         self._libraries: dict[tuple[str, Path | None], ObjectLibrary] = {}
         self.hashes: dict[str, str] = {}
 
-    def entry(self, scene: Scene | Path) -> SceneEntry:
+    def read_entry(self, scene: Scene | Path) -> SceneEntry:
         """Entry of a scene, under its own name."""
         if isinstance(scene, Scene):
-            return self._entry(scene, "")
+            return self._make_entry(scene, "")
         path = input_reference(scene, "scenes")
         file = hashlib.sha256(read_bytes(scene, FileLimits.document.size)).hexdigest()
         known = self._known.get((path, file))
         if known is not None and self._is_unchanged(known.library):
             return known
-        return self._entry(load_scene(scene, library=self.library), file)
+        return self._make_entry(load_scene(scene, library=self.library), file)
 
     def library(self, reference: str, base: Path | None) -> ObjectLibrary:
         """A library, loaded once."""
@@ -189,7 +187,7 @@ class _SceneReader:
             self._libraries[reference, base] = load_library(reference, base)
         return self._libraries[reference, base]
 
-    def _entry(self, scene: Scene, file: str) -> SceneEntry:
+    def _make_entry(self, scene: Scene, file: str) -> SceneEntry:
         root = str(scene.library.root.resolve())
         if root not in self.hashes:
             self.hashes[root] = content_hash(scene.library.content)
@@ -211,7 +209,7 @@ class _SceneReader:
         return self._known_libraries.get(root) == self.hashes[root]
 
 
-def _require_different(entries: Sequence[SceneEntry]) -> None:
+def _refuse_repeated(entries: Sequence[SceneEntry]) -> None:
     """Refuses a scene that is given twice, as its grasps would count twice."""
     seen: dict[str, SceneEntry] = {}
     for entry in entries:
@@ -224,7 +222,7 @@ def _require_different(entries: Sequence[SceneEntry]) -> None:
             )
 
 
-def _distinct_names(entries: Sequence[SceneEntry]) -> list[SceneEntry]:
+def _rename_distinctly(entries: Sequence[SceneEntry]) -> list[SceneEntry]:
     """Makes the names of entries unique, ignoring case; the second scene of a name gets `_2`."""
     counts = Counter(entry.name.casefold() for entry in entries)
     taken = {name for name, count in counts.items() if count == 1}
@@ -276,13 +274,13 @@ def evaluate_scenes(
         if before is None or document != before.document:
             save_campaign(campaign)
         call = _CampaignCall(campaign, scenes, request, executor, reporter)
-        judged = call.run()
-        if call.judged:
-            hints = campaign_hints(judged)
-            judged = save_campaign(replace(judged, document=replace(judged.document, hints=hints)))
-        renew_report(judged)
-        require_scenes_judged(judged)
-        return judged
+        campaign = call.run()
+        if call.judged_count:
+            document = replace(campaign.document, hints=campaign_hints(campaign))
+            campaign = save_campaign(replace(campaign, document=document))
+        renew_report(campaign)
+        require_scenes_judged(campaign)
+        return campaign
 
 
 def campaign_document(scenes: SceneList, request: RunRequest) -> CampaignDocument:
@@ -314,21 +312,20 @@ class _CampaignCall:
 
     def __post_init__(self) -> None:
         self.folder = self.campaign.path
-        self.ledger = SceneStates(self.folder)
+        self.scene_states = SceneStates(self.folder)
         self.judging: dict[str, SceneJudging] = {}
-        # the shard of the grasps of each scene, not of the scenes
+        # a shard of the grasps of each scene, not a shard of the scenes
         self.scene_request = replace(self.request, shard=self.campaign.document.shard_of_grasps)
-        self.judged = 0
+        self.judged_count = 0
         asked = self.request.settings.scene_reports
-        self.reports = self.campaign.document.has_few_scenes if asked is None else asked
+        self.reports = self.campaign.document.writes_scene_reports if asked is None else asked
 
     def run(self) -> Campaign:
         """Judges all unfinished scenes; returns the updated run."""
         left = [name for name in self.campaign.names if not self._is_done(name)]
         campaign = Campaign(self.folder, self.campaign.document)
         outputs = SceneOutputs(campaign, self.request.settings.table, self.reports)
-        preparer = Preparer(self.scene_request)
-        with SceneProcesses(preparer, outputs, self.executor.workers) as processes:
+        with SceneProcesses(self.scene_request, outputs, self.executor.workers) as processes:
             if left:
                 self._judge_scenes(left, processes)
             processes.close()
@@ -340,7 +337,7 @@ class _CampaignCall:
         done = sum(n for name, n in self.expected.items() if name not in left)
         known = self._known_outcomes()
         event = Progress(STARTING_PHASE, done, sum(self.expected.values()), outcomes=known)
-        self.pace = ProgressMeter(self.reporter.show, event, "judging")
+        self.meter = ProgressMeter(self.reporter.show, event, "judging")
         session = begin_session(self.executor.workers, known.total())
         save_campaign(Campaign(self.folder, add_session(document, session)))
         begun = time.monotonic()
@@ -352,7 +349,7 @@ class _CampaignCall:
         finally:
             for judging in list(self.judging.values()):
                 judging.close()
-            session = session.finish(self.judged, begun)
+            session = session.finish(self.judged_count, begun)
             save_campaign(Campaign(self.folder, add_session(document, session)))
 
     def _jobs(
@@ -381,14 +378,14 @@ class _CampaignCall:
     ) -> Job | None:
         """Records that a scene is prepared; returns its job, or None if no grasps are open."""
         if scene is None:
-            self.ledger.note(SceneState(scene=item.name, state="empty"))
+            self.scene_states.note(SceneState(scene=item.name, state="empty"))
             self._set_expected(item.name, 0)
             return None
         if isinstance(scene, BaseException):
             self._note_failure(item.name, scene)
             return None
         judging = SceneJudging(item.name, item.folder, self.scene_request, self.executor.workers)
-        self.ledger.note(judging.state("open"))
+        self.scene_states.note(judging.state("open"))
         if not judging.left:
             self._finish_scene(judging, processes)
             return None
@@ -396,18 +393,14 @@ class _CampaignCall:
         self._set_expected(item.name, judging.assigned_count)
         self.judging[item.name] = judging
         if judging.known_count:
-            self.pace.skip(judging.known_count, note=self._progress_note())
-        request = self.request
-        factory = StationJudgeFactory(
-            scene, request.station, request.engine, request.mode, request.phases
-        )
-        return Job(item.name, factory, judging.left)
+            self.meter.skip(judging.known_count, note=self._progress_note())
+        return Job(item.name, self.request.judge_factory(scene), judging.left)
 
     def _take_verdict(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
         judging = self.judging[job.key]
         judging.add_verdict(id, verdict)
-        self.judged += 1
-        self.pace.step(outcome=verdict.outcome, note=self._progress_note())
+        self.judged_count += 1
+        self.meter.step(outcome=verdict.outcome, note=self._progress_note())
         if judging.is_done:
             del self.judging[job.key]
             self._finish_scene(judging, processes)
@@ -415,17 +408,17 @@ class _CampaignCall:
             processes.write_rows(job.key)
 
     def _note_failed_job(self, failed: JobFailed) -> None:
-        """Records a scene whose job failed, for example as its judge cannot be built."""
+        """Records a scene whose job failed, such as one whose judge cannot be built."""
         self.judging.pop(failed.job.key).close()
         self._note_failure(failed.job.key, failed.error)
 
     def _finish_scene(self, judging: SceneJudging, processes: SceneProcesses) -> None:
-        self.ledger.note(judging.state("done"))
+        self.scene_states.note(judging.state("done"))
         processes.finish(judging.name)
 
     def _note_failure(self, name: str, error: BaseException) -> None:
         why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"
-        self.ledger.note(SceneState(scene=name, state="failed", why=why))
+        self.scene_states.note(SceneState(scene=name, state="failed", why=why))
         self._set_expected(name, 0)
 
     def _known_outcomes(self) -> Counter[Outcome]:
@@ -438,15 +431,15 @@ class _CampaignCall:
 
     def _set_expected(self, name: str, grasps: int) -> None:
         self.expected[name] = grasps
-        self.pace.expect(sum(self.expected.values()))
+        self.meter.expect(sum(self.expected.values()))
 
     def _progress_note(self) -> str:
-        done = sum(s.state != "open" for s in self.ledger.states.values())
+        done = sum(s.state != "open" for s in self.scene_states.states.values())
         return f"{done:,} of {len(self.campaign.names):,} scenes"
 
     def _is_done(self, name: str) -> bool:
         """Whether a scene is finished, from its recorded state and its files."""
-        state = self.ledger.states.get(name)
+        state = self.scene_states.states.get(name)
         if state is None or state.state != "done" or state.interrupted:
             return False
         if self.request.retry_failed and state.failed:

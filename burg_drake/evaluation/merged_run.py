@@ -55,7 +55,7 @@ class JournalChoice:
 
     Attributes:
         index: index of the chosen verdicts.
-        source: (N,) number of the journal that each is in.
+        source: (N,) number of the journal that has each chosen verdict.
     """
 
     index: JournalIndex
@@ -65,7 +65,7 @@ class JournalChoice:
 def choose_verdicts(
     journals: Sequence[Path], candidates: Candidates, chosen: NDArray[np.int64]
 ) -> JournalChoice:
-    """Chooses a verdict for each grasp: the first of those with the highest `JournalIndex.rank`.
+    """Chooses for each grasp the first verdict with the highest `JournalIndex.rank`.
 
     Args:
         journals: journals of the runs; in each the last verdict on a grasp counts.
@@ -75,24 +75,24 @@ def choose_verdicts(
     Raises:
         InvalidInputError: two runs have different verdicts on a grasp, other than in CPU time.
     """
-    taken: JournalIndex | None = None
+    best: JournalIndex | None = None
     source = np.zeros(len(chosen), np.int32)
     for number, journal in enumerate(journals):
         index = index_journal(journal, len(candidates), candidates.rows).select(chosen)
-        if taken is None:
-            taken = index
+        if best is None:
+            best = index
             continue
-        both = (index.rank == COMPLETED_RANK) & (taken.rank == COMPLETED_RANK)
+        both = (index.rank == COMPLETED_RANK) & (best.rank == COMPLETED_RANK)
         for known in np.unique(source[both]).tolist():
             rows = np.flatnonzero(both & (source == known))
             ids = [candidates.id[row] for row in chosen[rows].tolist()]
-            first = (journals[known], taken.place[rows].tolist())
-            _require_same_verdicts(ids, first, (journal, index.place[rows].tolist()))
-        better = index.rank > taken.rank
+            first = (journals[known], best.line_begin[rows].tolist())
+            _require_same_verdicts(ids, first, (journal, index.line_begin[rows].tolist()))
+        better = index.rank > best.rank
         source[better] = number
-        taken.replace_rows(better, index)
-    assert taken is not None
-    return JournalChoice(taken, source)
+        best.replace_rows(better, index)
+    assert best is not None
+    return JournalChoice(best, source)
 
 
 def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[bytes]:
@@ -102,7 +102,7 @@ def chosen_lines(journals: Sequence[Path], choice: JournalChoice) -> Iterator[by
         for k in np.flatnonzero(choice.index.judged).tolist():
             stream = streams[choice.source[k]]
             assert stream is not None
-            stream.seek(int(choice.index.place[k]))
+            stream.seek(int(choice.index.line_begin[k]))
             yield stream.readline(MAX_JOURNAL_LINE)
 
 

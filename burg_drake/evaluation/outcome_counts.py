@@ -47,7 +47,7 @@ class ShortLifts:
 
     Attributes:
         grasps: number of grasps with room for at least the shortest allowed lift.
-        short: number of these without room for the whole lift.
+        short: number of grasps without room for the whole lift.
         whole: length of the whole lift [m].
         median, least: median and smallest length of the shortened lifts [m].
     """
@@ -200,7 +200,7 @@ class Pushes:
 
     Attributes:
         trials: number of trials with a simulated approach.
-        pushed: number of these in which any free object, also the target, moved by more than
+        pushed: number of trials in which any free object, also the target, moved by more than
             `MIN_PUSH`.
         largest: largest displacement of an object [m].
         target_pushed, target_largest: the same for the target alone.

@@ -26,6 +26,7 @@ from burg_drake.evaluation.table_parts import (
     arrow_table,
     column_names,
     empty_column,
+    last_line_end,
     line_end,
     open_part,
     read_part,
@@ -33,7 +34,6 @@ from burg_drake.evaluation.table_parts import (
     segment_of,
     select_columns,
     valid_segments,
-    whole_lines,
     write_part,
 )
 
@@ -44,8 +44,8 @@ class StoredResults(Protocol):
     """A run of one scene or of many, whose rows are kept in parts.
 
     Attributes:
-        path: its folder, with the parts.
-        places: runs of its scenes, in the order of their rows.
+        path: folder of the run, with the parts.
+        stored_runs: runs of the scenes, in the order of the rows.
         instances: names of the free objects of all scenes; all parts have columns for them.
     """
 
@@ -53,7 +53,7 @@ class StoredResults(Protocol):
     def path(self) -> Path: ...
 
     @property
-    def places(self) -> Sequence[StoredRun]: ...
+    def stored_runs(self) -> Sequence[StoredRun]: ...
 
     @property
     def instances(self) -> Sequence[str]: ...
@@ -61,7 +61,7 @@ class StoredResults(Protocol):
 
 @dataclass(eq=False)
 class PartIndex:
-    """Parts in a folder, and the journal segments that they are made from.
+    """Parts in a folder, and the journal segments that the parts are made from.
 
     Attributes:
         parts: intact parts, sorted by number.
@@ -84,13 +84,13 @@ class PartIndex:
                 index.parts.append(part)
         return index
 
-    def drop(self, part: TablePart) -> None:
+    def mark_damaged(self, part: TablePart) -> None:
         """Moves a part to the damaged ones."""
         self.parts = [other for other in self.parts if other is not part]
         self.damaged.append(part.path)
 
     def segments(self) -> dict[str, list[tuple[JournalSegment, TablePart, int]]]:
-        """Segments by scene, each with its part and the first of its rows in the part."""
+        """Segments by scene, each with its part and the row of the part at which it begins."""
         found: dict[str, list[tuple[JournalSegment, TablePart, int]]] = defaultdict(list)
         for part in self.parts:
             row = 0
@@ -116,7 +116,7 @@ def read_rows(run: StoredResults, names: Sequence[str] | None) -> StoredRows:
         found = _read_tables(index, run, names)
         if isinstance(found, StoredRows):
             return found
-        index.drop(found)
+        index.mark_damaged(found)
 
 
 def segment_table(run: Run, begin: int, end: int) -> Any:
@@ -153,13 +153,13 @@ def _read_tables(
     segments = index.segments()
     pieces: list[list[tuple[TablePart, int, int]]] = []
     tails: list[Any | None] = []
-    for place in run.places:
-        located = segments.get(place.scene, [])
-        valid = valid_segments([segment for segment, _, _ in located], place.journal)
+    for stored in run.stored_runs:
+        located = segments.get(stored.scene, [])
+        valid = valid_segments([segment for segment, _, _ in located], stored.journal)
         where = {segment: (part, row, segment.rows) for segment, part, row in located}
         pieces.append([where[segment] for segment in valid])
-        tail = _read_tail(place, valid[-1].end if valid else 0)
-        tails.append(None if tail is None else with_instances(tail, run.instances))
+        tail = _read_tail(stored, valid[-1].end if valid else 0)
+        tails.append(None if tail is None else with_instance_columns(tail, run.instances))
     used = {part.path: part for piece in pieces for part, _, _ in piece}
     if names is None:
         names = _all_names(list(used.values()), tails)
@@ -170,53 +170,58 @@ def _read_tables(
         if table is None:
             return part
         tables[path] = table
-    runs: list[Any] = []
+    sources: list[Any] = []
     for piece, tail in zip(pieces, tails, strict=True):
         if tail is None and len(piece) == 1:
-            runs.append(piece[0])
+            sources.append(piece[0])
             continue
         slices = [tables[part.path].slice(row, rows) for part, row, rows in piece]
         if tail is not None:
             slices.append(select_columns(tail, wanted))
-        runs.append(merge_tables(slices) if len(slices) > 1 else slices[0] if slices else None)
-    counts = np.array([_row_count(run) for run in runs], dtype=np.int64)
-    filled = [table for table in _concatenate_runs(runs, tables) if table.num_rows]
+        sources.append(merge_tables(slices) if len(slices) > 1 else slices[0] if slices else None)
+    counts = np.array([_row_count(source) for source in sources], dtype=np.int64)
+    filled = [table for table in _run_tables(sources, tables) if table.num_rows]
     empty = arrow.table({name: empty_column(name, 0) for name in wanted})
     whole = arrow.concat_tables(filled, promote_options="permissive") if filled else empty
     return StoredRows(whole.select(list(names)), counts)
 
 
-def _row_count(run: Any) -> int:
-    """Number of rows of a run, given as a slice of a part, as a table, or as None."""
-    return 0 if run is None else run[2] if isinstance(run, tuple) else run.num_rows
+def _row_count(source: Any) -> int:
+    """Number of rows of a run; `source` is a slice of a part, a table, or None."""
+    return 0 if source is None else source[2] if isinstance(source, tuple) else source.num_rows
 
 
-def _concatenate_runs(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterator[Any]:
-    """Yields the tables of runs in order; adjacent slices of a part are joined to one."""
+def _run_tables(sources: Sequence[Any], tables: Mapping[Path, Any]) -> Iterator[Any]:
+    """Yields the tables of runs in order; adjacent slices of a part are joined to one.
+
+    Args:
+        sources: slice of a part, table or None for each run.
+        tables: tables of the parts, by file.
+    """
     k = 0
-    while k < len(runs):
-        if isinstance(runs[k], tuple):
-            part, begin, rows = runs[k]
+    while k < len(sources):
+        if isinstance(sources[k], tuple):
+            part, begin, rows = sources[k]
             while (
-                k + 1 < len(runs)
-                and isinstance(runs[k + 1], tuple)
-                and runs[k + 1][:2] == (part, begin + rows)
+                k + 1 < len(sources)
+                and isinstance(sources[k + 1], tuple)
+                and sources[k + 1][:2] == (part, begin + rows)
             ):
-                k, rows = k + 1, rows + runs[k + 1][2]
+                k, rows = k + 1, rows + sources[k + 1][2]
             yield tables[part.path].slice(begin, rows)
-        elif runs[k] is not None:
-            yield runs[k]
+        elif sources[k] is not None:
+            yield sources[k]
         k += 1
 
 
-def _read_tail(place: StoredRun, begin: int) -> Any | None:
+def _read_tail(stored: StoredRun, begin: int) -> Any | None:
     """Reads the rows of a journal that are not in parts yet; None if there are none."""
-    end = whole_lines(place.journal)
-    return segment_table(load_run(place.folder), begin, end) if end > begin else None
+    end = last_line_end(stored.journal)
+    return segment_table(load_run(stored.folder), begin, end) if end > begin else None
 
 
 def _all_names(parts: Sequence[TablePart], tails: Sequence[Any | None]) -> list[str]:
-    """Names of the columns of all tables, in their order."""
+    """Names of the columns of all tables, each once."""
     names: dict[str, None] = {}
     for part in parts:
         names |= dict.fromkeys(column_names(part))
@@ -226,7 +231,7 @@ def _all_names(parts: Sequence[TablePart], tails: Sequence[Any | None]) -> list[
     return list(names)
 
 
-def with_instances(table: Any, instances: Sequence[str]) -> Any:
+def with_instance_columns(table: Any, instances: Sequence[str]) -> Any:
     """Table with columns for all instances, inserted at the first column of each kind."""
     if not instances:
         return table
@@ -252,11 +257,11 @@ class PartWriter:
     """Writes the parts of a run; only for the process that holds the run's lock."""
 
     def __init__(self, run: StoredResults) -> None:
-        """Reads the existing parts; removes damaged parts and outdated segments."""
+        """Reads the existing parts; removes damaged parts and stale segments."""
         self._folder = run.path / PARTS_FOLDER
         self._instances = list(run.instances)
         self._pending: list[tuple[Any, JournalSegment]] = []
-        self._places = {place.scene: place for place in run.places}
+        self._stored_runs = {stored.scene: stored for stored in run.stored_runs}
         self._folder.mkdir(parents=True, exist_ok=True)
         remove_unfinished(self._folder)
         self._index = PartIndex.of(run.path)
@@ -270,8 +275,8 @@ class PartWriter:
         """Scenes whose journals have lines that are not in parts yet."""
         return [
             scene
-            for scene, place in self._places.items()
-            if place.journal.exists() and place.journal.stat().st_size > self._ends.get(scene, 0)
+            for scene, stored in self._stored_runs.items()
+            if stored.journal.exists() and stored.journal.stat().st_size > self._ends.get(scene, 0)
         ]
 
     def add_new_rows(self, scenes: Iterable[str] | None = None) -> None:
@@ -281,16 +286,16 @@ class PartWriter:
 
     def add_rows(self, scene: str, run: Run | None = None) -> None:
         """Adds the new rows of the journal of a scene; full parts are written."""
-        place = self._places[scene]
-        begin, end = self._ends.get(scene, 0), whole_lines(place.journal)
+        stored = self._stored_runs[scene]
+        begin, end = self._ends.get(scene, 0), last_line_end(stored.journal)
         if end > begin and run is None:
-            run = load_run(place.folder)
+            run = load_run(stored.folder)
         while begin < end:
             assert run is not None
-            batch_end = min(end, line_end(place.journal, min(end, begin + BATCH_BYTES)))
+            batch_end = min(end, line_end(stored.journal, min(end, begin + BATCH_BYTES)))
             table = segment_table(run, begin, batch_end)
-            segment = segment_of(scene, place.journal, begin, batch_end, table.num_rows)
-            self._pending.append((with_instances(table, self._instances), segment))
+            segment = segment_of(scene, stored.journal, begin, batch_end, table.num_rows)
+            self._pending.append((with_instance_columns(table, self._instances), segment))
             self._ends[scene] = begin = batch_end
             if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
                 self.flush()
@@ -319,10 +324,11 @@ class PartWriter:
     def _scenes_judged_again(self) -> list[str]:
         """Scenes with several rows of one grasp."""
         segments = self._index.segments()
-        several = [scene for scene, found in segments.items() if len(found) > 1]
         repeated = []
-        for scene in several:
-            rows = [_candidates(part)[row : row + s.rows] for s, part, row in segments[scene]]
+        for scene, found in segments.items():
+            if len(found) == 1:
+                continue
+            rows = [_candidate_rows(part)[row : row + s.rows] for s, part, row in found]
             if len(np.unique(np.concatenate(rows))) < sum(map(len, rows)):
                 repeated.append(scene)
         return repeated
@@ -334,17 +340,17 @@ class PartWriter:
     def _remove_stale_segments(self) -> None:
         stale: set[JournalSegment] = set()
         for scene, found in self._index.segments().items():
-            place = self._places.get(scene)
+            stored = self._stored_runs.get(scene)
             segments = [segment for segment, _, _ in found]
-            held = valid_segments(segments, place.journal) if place else []
-            stale |= {*segments} - {*held}
-            self._ends[scene] = held[-1].end if held else 0
+            valid = valid_segments(segments, stored.journal) if stored else []
+            stale |= {*segments} - {*valid}
+            self._ends[scene] = valid[-1].end if valid else 0
         self._rewrite_without(stale)
 
     def _rewrite_without(self, stale: set[JournalSegment]) -> None:
         """Rewrites parts without their stale segments.
 
-        Also drops segments that a newer part has, left by a process that was killed while doing so.
+        Also drops segments that a newer part has: a process was killed while it rewrote the older.
         """
         seen: set[JournalSegment] = set()
         for part in sorted(self._index.parts, key=lambda part: -part.number):
@@ -362,12 +368,12 @@ class PartWriter:
                         slices.append(table.slice(row, segment.rows))
                     row += segment.rows
                 self._write(arrow.concat_tables(slices).combine_chunks(), kept)
-            for segment in kept if table is None else ():  # damaged: made again
+            for segment in kept if table is None else ():  # the part is damaged: rows made again
                 self._ends[segment.scene] = min(self._ends[segment.scene], segment.begin)
             part.path.unlink(missing_ok=True)
 
 
-def _candidates(part: TablePart) -> Any:
+def _candidate_rows(part: TablePart) -> Any:
     table = read_part(part, [CANDIDATE_COLUMN])
     return np.empty(0) if table is None else table.column(CANDIDATE_COLUMN).to_numpy()
 
@@ -398,21 +404,21 @@ FAILED_OUTCOME = Outcome.SIMULATION_FAILED.value.encode()
 
 
 @dataclass
-class JournalTail:
-    """Counts of a journal, updated as it grows.
+class JournalCounts:
+    """Counts of the verdicts in a journal, updated as the journal grows.
 
     Attributes:
         path: the journal.
-        place: number of bytes that were counted.
-        lines: number of grasps with a verdict.
+        counted_bytes: number of bytes that were counted.
+        judged: number of grasps with a verdict.
         outcomes: number of grasps by outcome.
         failed: ids of grasps that could not be simulated, which may be judged again.
         modified: date of the last verdict, seconds since 1970; 0 if there is none.
     """
 
     path: Path
-    place: int = 0
-    lines: int = 0
+    counted_bytes: int = 0
+    judged: int = 0
     outcomes: Counter[bytes] = field(default_factory=Counter)
     failed: set[bytes] = field(default_factory=set)
     modified: float = 0.0
@@ -423,27 +429,27 @@ class JournalTail:
             status = os.stat(self.path)
         except OSError:
             return
-        if status.st_size < self.place:  # the journal was started anew
-            self.place, self.lines, self.outcomes, self.failed = 0, 0, Counter(), set()
+        if status.st_size < self.counted_bytes:  # the journal was started anew
+            self.counted_bytes, self.judged, self.outcomes, self.failed = 0, 0, Counter(), set()
         self.modified = status.st_mtime if status.st_size else 0.0
-        if status.st_size == self.place:
+        if status.st_size == self.counted_bytes:
             return
         with open_regular(self.path) as stream:
-            stream.seek(self.place)
+            stream.seek(self.counted_bytes)
             while data := stream.read(1 << 22):
                 whole = data.rfind(b"\n") + 1
                 if not whole:
                     return
                 self._count(data[:whole])
-                self.place += whole
-                stream.seek(self.place)
+                self.counted_bytes += whole
+                stream.seek(self.counted_bytes)
 
     def _count(self, data: bytes) -> None:
         found = JOURNAL_LINE_PATTERN.findall(data)
-        self.lines += len(found)
+        self.judged += len(found)
         self.outcomes.update(outcome for _, outcome in found)
         again = PREVIOUS_OUTCOME_PATTERN.findall(data)
-        self.lines -= len(again)
+        self.judged -= len(again)
         self.outcomes.subtract(again)
         if not self.failed and self.outcomes[FAILED_OUTCOME] == 0:
             return
@@ -451,39 +457,39 @@ class JournalTail:
             if id in self.failed:  # judged again
                 self.failed.discard(id)
                 self.outcomes[FAILED_OUTCOME] -= 1
-                self.lines -= 1
+                self.judged -= 1
             if outcome == FAILED_OUTCOME:
                 self.failed.add(id)
 
 
-def read_journal_tails(run: StoredResults) -> dict[str, JournalTail]:
-    """Counts of the journals of a run by scene, as far as its parts have their rows."""
-    tails = {place.scene: JournalTail(place.journal) for place in run.places}
+def read_journal_counts(run: StoredResults) -> dict[str, JournalCounts]:
+    """Counts by scene of the journal lines whose rows are in the parts of a run."""
+    counts = {stored.scene: JournalCounts(stored.journal) for stored in run.stored_runs}
     if not (run.path / PARTS_FOLDER).is_dir() or find_spec("pyarrow") is None:
-        return tails
+        return counts
     index = PartIndex.of(run.path)
     names = ["id", "outcome", CANDIDATE_COLUMN]
     tables: dict[Path, Any] = {part.path: read_part(part, names) for part in index.parts}
     segments = index.segments()
-    for place in run.places:
-        where = {s: (part, row) for s, part, row in segments.get(place.scene, [])}
-        found = valid_segments(list(where), place.journal)
+    for stored in run.stored_runs:
+        where = {s: (part, row) for s, part, row in segments.get(stored.scene, [])}
+        found = valid_segments(list(where), stored.journal)
         whole = [segment for segment in found if tables[where[segment][0].path] is not None]
         if found and found == whole:
             pieces = [(*where[segment], segment.rows) for segment in found]
             slices = [tables[part.path].slice(row, rows) for part, row, rows in pieces]
-            _count_rows(tails[place.scene], slices)
-            tails[place.scene].place = found[-1].end
-    return tails
+            _count_rows(counts[stored.scene], slices)
+            counts[stored.scene].counted_bytes = found[-1].end
+    return counts
 
 
-def _count_rows(tail: JournalTail, slices: Sequence[Any]) -> None:
-    """Sets the counts of a journal from rows of Arrow tables."""
+def _count_rows(counts: JournalCounts, slices: Sequence[Any]) -> None:
+    """Sets the counts of a journal from the rows of Arrow tables."""
     table = merge_tables(slices) if len(slices) > 1 else slices[0]
     column = table.column("outcome")
-    counts = {item["values"]: item["counts"] for item in column.value_counts().to_pylist()}
-    tail.lines = table.num_rows
-    tail.outcomes = Counter({str(text).encode(): n for text, n in counts.items()})
-    if tail.outcomes[FAILED_OUTCOME]:
-        pairs = zip(table.column("id").to_pylist(), column.to_pylist(), strict=True)
-        tail.failed = {id.encode() for id, text in pairs if text == FAILED_OUTCOME.decode()}
+    pairs = [(item["values"], item["counts"]) for item in column.value_counts().to_pylist()]
+    counts.judged = table.num_rows
+    counts.outcomes = Counter({str(text).encode(): n for text, n in pairs})
+    if counts.outcomes[FAILED_OUTCOME]:
+        ids = zip(table.column("id").to_pylist(), column.to_pylist(), strict=True)
+        counts.failed = {id.encode() for id, text in ids if text == FAILED_OUTCOME.decode()}

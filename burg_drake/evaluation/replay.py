@@ -35,7 +35,7 @@ from burg_drake.simulation import TrialResult
 from burg_drake.station import GraspMotion, Station, load_station
 
 Document = TypeVar("Document", Scene, Station)
-FilePlace = tuple[str, Callable[[], Document]]
+DocumentSource = tuple[str, Callable[[], Document]]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TrialInputs:
 
     Attributes:
         scene, station: the scene and station that were found.
-        notes: differences from the recorded ones, in words; empty if there are none.
+        notes: differences from the recorded documents, in words; empty if there are none.
     """
 
     scene: Scene
@@ -74,11 +74,11 @@ def find_inputs(
         InvalidInputError: a document is missing, or has another content; the message says which
             one is needed.
     """
-    scenes: list[FilePlace[Scene]]
-    stations: list[FilePlace[Station]]
-    text, word = scene or origin.scene, station or origin.station
-    scenes = [(text, lambda: load_scene(_existing_file(text, "scenes")))]
-    stations = [(word, lambda: load_station(_existing_file(word, "stations")))]
+    scenes: list[DocumentSource[Scene]]
+    stations: list[DocumentSource[Station]]
+    scene_path, station_path = scene or origin.scene, station or origin.station
+    scenes = [(scene_path, lambda: load_scene(_existing_file(scene_path, "scenes")))]
+    stations = [(station_path, lambda: load_station(_existing_file(station_path, "stations")))]
     if origin.run and (folder / RUN_FILE).exists():
         run = load_run(folder)
         if run.document.hash == origin.run:
@@ -107,7 +107,7 @@ def _existing_file(reference: str, kind: str) -> Path:
 
 
 def _find_document(
-    kind: str, origin: TrialOrigin, places: Sequence[FilePlace[Any]], force: bool
+    kind: str, origin: TrialOrigin, sources: Sequence[DocumentSource[Any]], force: bool
 ) -> Any:
     """Finds the document with the recorded content.
 
@@ -118,7 +118,7 @@ def _find_document(
     content = origin.scene_content if kind == "scene" else origin.station_content
     problems: list[str] = []
     other = None
-    for place, load in places:
+    for name, load in sources:
         try:
             document = load()
         except BurgError as error:
@@ -126,7 +126,7 @@ def _find_document(
             continue
         if document.content.startswith(content):
             return document, ""
-        problems.append(f"{place} has content {document.content[:HASH_DIGITS]}")
+        problems.append(f"{name} has content {document.content[:HASH_DIGITS]}")
         other = other or document
     found = "; ".join(problems)
     if other is not None and force:
@@ -145,7 +145,7 @@ class Difference:
 
     Attributes:
         name: name of the result.
-        recorded, now: its values; NaN or an empty text if there is none.
+        recorded, now: values of the result; NaN or an empty text if there is none.
     """
 
     name: str
@@ -157,9 +157,8 @@ class Difference:
         """Whether rounding by a program that rewrote the table explains the difference."""
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
-        return math.isclose(
-            self.recorded, self.now, rel_tol=1e-14
-        )  # a spreadsheet writes 15 digits
+        spreadsheet_tolerance = 1e-14  # Spreadsheets write 15 digits.
+        return math.isclose(self.recorded, self.now, rel_tol=spreadsheet_tolerance)
 
     def __str__(self) -> str:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"

@@ -31,20 +31,20 @@ class ResultRows(Mapping[str, ColumnValues]):
 
     Attributes:
         candidates: all grasps of the run.
-        places: (N,) rows of the judged candidates.
+        candidate_rows: (N,) rows of the judged candidates.
         chunks: packed values of `CHUNK_ROWS` rows each, by column; None for columns that are
             computed from the candidates.
     """
 
     candidates: Candidates
-    places: NDArray[np.int64]
+    candidate_rows: NDArray[np.int64]
     chunks: Sequence[Mapping[str, ColumnValues | TextValues | None]]
 
     @classmethod
     def of(
         cls,
         candidates: Candidates,
-        places: NDArray[np.int64],
+        candidate_rows: NDArray[np.int64],
         verdicts_of: Callable[[NDArray[np.int64]], Sequence[Verdict]],
         origin: TrialOrigin,
         *,
@@ -55,13 +55,13 @@ class ResultRows(Mapping[str, ColumnValues]):
 
         Args:
             candidates: the grasps.
-            places: (N,) rows of the judged candidates, ascending.
+            candidate_rows: (N,) rows of the judged candidates, ascending.
             verdicts_of: reads the verdicts on the candidates in given rows.
             origin, instances, joints: see `make_columns`.
         """
         chunks = []
-        for begin in range(0, max(1, len(places)), CHUNK_ROWS):
-            rows = places[begin : begin + CHUNK_ROWS]
+        for begin in range(0, max(1, len(candidate_rows)), CHUNK_ROWS):
+            rows = candidate_rows[begin : begin + CHUNK_ROWS]
             columns = arrange_columns(
                 dict.fromkeys(grasp_columns(candidates, rows[:0])),
                 verdicts_of(rows),
@@ -71,12 +71,12 @@ class ResultRows(Mapping[str, ColumnValues]):
             )
             kept = {n: None if values is None else _pack(values) for n, values in columns.items()}
             chunks.append(kept)
-        return cls(candidates=candidates, places=places, chunks=chunks)
+        return cls(candidates=candidates, candidate_rows=candidate_rows, chunks=chunks)
 
     @property
     def count(self) -> int:
         """Number of rows."""
-        return len(self.places)
+        return len(self.candidate_rows)
 
     def __len__(self) -> int:
         return len(self.chunks[0])
@@ -89,19 +89,19 @@ class ResultRows(Mapping[str, ColumnValues]):
         if len(parts) > 1 and all(values.strides == (0,) for values in parts):
             first = parts[0][:1]
             if all((values[:1] == first).all() for values in parts):
-                return np.broadcast_to(first[0], len(self.places))
+                return np.broadcast_to(first[0], len(self.candidate_rows))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def codes(self, name: str) -> TextValues:
         """A column of texts as codes, and the texts in order of occurrence."""
-        places: dict[str, int] = {}
+        codes: dict[str, int] = {}
         found = []
         for k, chunk in enumerate(self.chunks):
             kept = chunk[name]
             values = kept if isinstance(kept, TextValues) else code_texts(self._cells(k, name))
-            merged = [places.setdefault(text, len(places)) for text in values.names]
-            found.append(np.array(merged, dtype=np.min_scalar_type(len(places)))[values.codes])
-        return TextValues(np.concatenate(found), tuple(places))
+            merged = [codes.setdefault(text, len(codes)) for text in values.names]
+            found.append(np.array(merged, dtype=np.min_scalar_type(len(codes)))[values.codes])
+        return TextValues(np.concatenate(found), tuple(codes))
 
     @property
     def run(self) -> NDArray[np.int64]:
@@ -127,7 +127,7 @@ class ResultRows(Mapping[str, ColumnValues]):
         """A column at the given rows (M,)."""
         rows = np.asarray(rows, dtype=np.int64)
         if self.chunks[0][name] is None:
-            return grasp_columns(self.candidates, self.places[rows], [name])[name]
+            return grasp_columns(self.candidates, self.candidate_rows[rows], [name])[name]
         chunk = rows // CHUNK_ROWS
         order = np.argsort(chunk, kind="stable")
         parts = [
@@ -146,7 +146,7 @@ class ResultRows(Mapping[str, ColumnValues]):
         """A column of a chunk."""
         kept = self.chunks[k][name]
         if kept is None:
-            rows = self.places[k * CHUNK_ROWS : (k + 1) * CHUNK_ROWS]
+            rows = self.candidate_rows[k * CHUNK_ROWS : (k + 1) * CHUNK_ROWS]
             return grasp_columns(self.candidates, rows, [name])[name]
         if isinstance(kept, TextValues):
             texts: ColumnValues = np.array(kept.names, dtype=np.str_)[kept.codes]

@@ -42,7 +42,7 @@ class RecordedTrial:
     Attributes:
         id: id of the grasp, or of this trial of it.
         instance: name of the target in the scene.
-        object: its name in the library.
+        object: name of the target in the library.
         X_OG: (4, 4) grasp in the target's frame.
         width: distance between the contacts [m].
         score: score of the sampler.
@@ -190,15 +190,15 @@ class TextValues(NamedTuple):
 
     def equal(self, text: str) -> NDArray[np.bool_]:
         """(N,) whether each row has this text."""
-        equal: NDArray[np.bool_] = self.codes == self.place(text)
+        equal: NDArray[np.bool_] = self.codes == self.code_of(text)
         return equal
 
-    def place(self, text: str) -> int:
-        """Index of a text; -1 if it does not occur."""
+    def code_of(self, text: str) -> int:
+        """Code of a text; -1 if it does not occur."""
         return self.names.index(text) if text in self.names else -1
 
     def most_common(self, rows: NDArray[np.int64], most: int) -> tuple[tuple[str, int], ...]:
-        """The `most` most frequent texts of some rows, with counts; without empty texts."""
+        """The `most` most frequent texts of some rows (M,), with counts; without empty texts."""
         counts = np.bincount(self.codes[rows], minlength=len(self.names))
         ranked = np.argsort(-counts, kind="stable").tolist()
         found = [(self.names[k], int(counts[k])) for k in ranked if counts[k] and self.names[k]]
@@ -208,9 +208,9 @@ class TextValues(NamedTuple):
 def code_texts(values: NDArray[np.str_]) -> TextValues:
     """Encodes a column (N,) of few distinct texts."""
     texts = values.tolist()
-    places = {name: place for place, name in enumerate(dict.fromkeys(texts))}
-    codes = np.fromiter(map(places.__getitem__, texts), dtype=np.int64, count=len(texts))
-    return TextValues(codes, tuple(places))
+    code_of_text = {text: code for code, text in enumerate(dict.fromkeys(texts))}
+    codes = np.fromiter(map(code_of_text.__getitem__, texts), dtype=np.int64, count=len(texts))
+    return TextValues(codes, tuple(code_of_text))
 
 
 def make_columns(
@@ -239,7 +239,7 @@ def make_columns(
 def grasp_columns(
     candidates: Candidates, rows: NDArray[np.int64], names: Sequence[str] | None = None
 ) -> Columns:
-    """Columns of `make_columns` that do not depend on verdicts; only those named, if given."""
+    """Columns of `make_columns` that do not depend on verdicts; all if `names` is None."""
     grasps = candidates.grasps
     X_OG = grasps.X_OG[rows]
     poses: Columns = {}
@@ -293,7 +293,7 @@ def arrange_columns(
     origin: TrialOrigin,
     *,
     instances: Sequence[str],
-    joints: int = 0,
+    joints: int,
 ) -> dict[str, T | ColumnValues]:
     """Arranges the columns of a table in their order.
 
@@ -399,8 +399,8 @@ def best_rows(
 
     Ranked by the clearance of the open hand, in steps of 0.5 mm. Of all margins it best predicts
     how often a grasp is lifted if pose, mass and friction are perturbed, as in four of five
-    failures the open hand then hits something: its rank correlation with that share is 0.6, those
-    of the other margins are between -0.35 and 0.25 (`benchmarks/best.py`). Ties go to the smaller
+    failures the open hand then hits something: its rank correlation with that share is 0.6, that
+    of any other margin is between -0.35 and 0.25 (`benchmarks/best.py`). Ties go to the smaller
     disturbance, slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm, rounded to 0.1 mm and
     0.1 deg; then to the larger contact patch of the weaker pad, rounded to 1 mm2, to the higher
     score of the sampler, and by id. Contested grasps, and those without a known clearance, rank
@@ -417,11 +417,10 @@ def best_rows(
     """
     chosen = columns["outcome"] == Outcome.LIFTED
     if only:
-        only = list(only)
         chosen &= rows_of_names(only, "the table", columns["object"], columns["instance"])
     lifted = np.flatnonzero(chosen)
     lifted = _clearest_rows(columns, lifted, count, each=each)
-    room = _clearance_steps(columns, lifted)
+    clearance_steps = _clearance_steps(columns, lifted)
     penalty = (
         _round_to_step(columns["slip"][lifted], 1e-4) / 0.005
         + _round_to_step(columns["tilt"][lifted], float(np.deg2rad(0.1))) / 0.1
@@ -430,7 +429,7 @@ def best_rows(
     patch = _round_to_step(columns["patch_area"][lifted], 1e-6)
     score = np.nan_to_num(columns["score"][lifted], nan=-np.inf)
     # equal sums may differ in their last digits
-    order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -room))
+    order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -clearance_steps))
     ranked = lifted[order].tolist()
     if not each:
         return [int(row) for row in ranked[:count]]
@@ -467,9 +466,10 @@ def _clearest_rows(
         groups = [rows[objects == name] for name in set(objects.tolist())]
     kept = []
     for mine in groups:
-        room = _clearance_steps(columns, mine)
-        least = np.partition(room, len(room) - count)[-count] if 0 < count < len(room) else -np.inf
-        kept.append(mine[room >= least])
+        steps = _clearance_steps(columns, mine)
+        most = len(steps)
+        least = np.partition(steps, most - count)[-count] if 0 < count < most else -np.inf
+        kept.append(mine[steps >= least])
     return np.sort(np.concatenate(kept)) if kept else rows
 
 

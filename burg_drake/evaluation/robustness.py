@@ -235,7 +235,7 @@ class Robustness:
         grasps: results by grasp, in the order of the request.
         table_path: path of the table.
         failures: ids of probes that could not be simulated, with the reason.
-        interrupted: number of these whose worker process was killed from outside.
+        interrupted: number of failures whose worker process was killed from outside.
     """
 
     grasps: tuple[GraspRobustness, ...]
@@ -246,7 +246,7 @@ class Robustness:
 
 @dataclass(frozen=True, eq=False)
 class _EngineTests:
-    """Tests of the grasps that one engine has judged.
+    """Robustness tests of the grasps that one engine has judged.
 
     Attributes:
         factory: builds the judge of the probes.
@@ -294,7 +294,7 @@ def assess_robustness(
 ) -> Robustness:
     """Tests the robustness of lifted grasps of a run, and writes a table.
 
-    Each is tested with the engine that judged it: the run's, or the one that judged it again.
+    Each grasp is tested with the engine of its verdict: the run's, or the one that judged again.
 
     Args:
         run: the run, or its folder.
@@ -373,7 +373,7 @@ def _choose_grasps(
 def _tests_by_grasp(
     run: Run, chosen: Iterable[Candidate], settings: RobustnessSettings
 ) -> dict[str, _EngineTests]:
-    """Tests of each grasp, by id."""
+    """Tests by id of the grasp; grasps judged by the same engine share one object."""
     scene, station, origin = run.scene(), run.station(), origin_of(run.document)
     trial = origin.settings(f"{run.path / RUN_FILE}: trial")
     loaded = [test for test in settings.tests if test in LOADED_TESTS]
@@ -412,7 +412,7 @@ def _answer_probes(
     begin = Progress(
         STARTING_PHASE, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
-    pace = ProgressMeter(reporter.show, begin, "testing", work=work)
+    meter = ProgressMeter(reporter.show, begin, "testing", work=work)
     for engine in dict.fromkeys(tests.values()):
         test_by_id = {probe.id: probe.test for probe in todo if tests[probe.grasp] is engine}
         trials = [probe.trial for probe in todo if probe.id in test_by_id]
@@ -420,7 +420,7 @@ def _answer_probes(
         with closing(judge_all(trials, factory, workers=workers)) as answers:
             for trial, verdict in answers:
                 journal.append(trial.id, verdict)
-                pace.step(work=TEST_COSTS[test_by_id[trial.id]])
+                meter.step(work=TEST_COSTS[test_by_id[trial.id]])
 
 
 def _trial_time(run: Run, probes: Sequence[RobustnessProbe]) -> float:

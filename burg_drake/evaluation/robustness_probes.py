@@ -107,7 +107,7 @@ def make_probes(
 
     Args:
         grasp: the grasp.
-        scene: has mass and friction of the target.
+        scene: scene with mass and friction of the target.
         settings: settings of the tests.
         context: JSON values that determine the answers, besides the settings.
     """
@@ -152,7 +152,7 @@ def known_answers(
         grasp: id of the grasp.
         answers: verdicts in the journal, by the id of the probe.
         settings: only answers with these settings count, whatever their tests and repeats.
-        context: as for `make_probes`.
+        context: see `make_probes`.
 
     Returns:
         Answers in the order of `ROBUSTNESS_TESTS`; repeats up to the first missing one.

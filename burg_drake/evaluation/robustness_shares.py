@@ -29,7 +29,7 @@ def lifted_shares(
         path: path of the table.
         runs: hashes of the accepted runs.
         ids: ids of all grasps, if there is one run. A table without a column `run`, as earlier
-            releases wrote it, is then accepted if all its grasps are among them.
+            releases wrote it, is then accepted if it has no other grasps.
 
     Raises:
         InvalidInputError: the table cannot be read, has no such shares, or is of another run.
@@ -42,15 +42,15 @@ def lifted_shares(
         )
     grasps, shares = columns["id"].tolist(), columns["success"].tolist()
     if "run" in columns:
-        of = columns["run"].tolist()
-        if grasps and not set(of) & set(runs):
+        run_of_row = columns["run"].tolist()
+        if grasps and not set(run_of_row) & set(runs):
             raise InvalidInputError(
-                f"{path} is of run {list_names(sorted(set(of)))}, not of "
+                f"{path} is of run {list_names(sorted(set(run_of_row)))}, not of "
                 f"{list_names(sorted(runs))}; give the table of the run that is compared"
             )
     else:
-        of = [_require_one_run(path, runs, ids, grasps)] * len(grasps)
-    rows = zip(of, grasps, shares, strict=True)
+        run_of_row = [_require_one_run(path, runs, ids, grasps)] * len(grasps)
+    rows = zip(run_of_row, grasps, shares, strict=True)
     return {(run, id): share for run, id, share in rows if np.isfinite(share)}
 
 

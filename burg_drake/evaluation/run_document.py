@@ -22,11 +22,11 @@ HASH_DIGITS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Input:
-    """A scene or station that was used.
+    """Record of the scene or station of a run.
 
     Attributes:
         name: name of the scene or station.
-        path: its file, or the name of a built-in one.
+        path: file of the document, or the name of a built-in one.
         content: hash of its content, with objects and robot models.
     """
 
@@ -37,11 +37,11 @@ class Input:
 
 @dataclass(frozen=True, kw_only=True)
 class Library:
-    """The object library of a run. It is not copied.
+    """Record of the object library of a run. The library is not copied.
 
     Attributes:
         name: name of the library.
-        path: its folder, absolute, or as `package://`.
+        path: folder of the library, absolute, or as `package://`.
         objects: build hash of each object of the scene.
     """
 
@@ -52,7 +52,7 @@ class Library:
 
 @dataclass(frozen=True, kw_only=True)
 class Grasps:
-    """The grasps of a run; they are in `grasps.npz`.
+    """Record of the grasps of a run; the grasps are in `grasps.npz`.
 
     Attributes:
         origin: whether the grasps were sampled or given.
@@ -93,7 +93,7 @@ class Grasps:
 
 @dataclass(frozen=True, kw_only=True)
 class WorkSession:
-    """One call that worked on the run.
+    """Work session: one call that worked on the run.
 
     Attributes:
         started: date and time, ISO 8601 with time zone.
@@ -119,7 +119,7 @@ class RunDocument:
     """A run of `burg-drake evaluate` or `reach` over one scene (`run.yaml`).
 
     Attributes:
-        hash: hash of all that decides about the results; column `run` of the table.
+        hash: hash of everything that affects the results; column `run` of the table.
         command: command line, or Python script, that began the run.
         scene: the scene.
         station: the station.
@@ -134,7 +134,7 @@ class RunDocument:
         shard: share of the grasps evaluated here, as `K/N`; empty for all.
         table: format of the results table.
         versions: versions of the software and the machine.
-        stretches: the calls that worked on the run, in order.
+        stretches: work sessions of the run, one a call, in order.
         hints: usual mistakes that the given grasps show, each with a command that corrects it.
     """
 
@@ -157,7 +157,7 @@ class RunDocument:
     hints: tuple[str, ...] = ()
 
 
-MAX_SCENES = 100
+MAX_SCENES_WITH_REPORTS = 100
 """With more scenes, each gets a report only on request."""
 
 
@@ -198,7 +198,7 @@ class CampaignDocument:
     """A run of `burg-drake evaluate` or `reach` over many scenes (`campaign.yaml`).
 
     Attributes:
-        hash: hash of all that decides about the results.
+        hash: hash of everything that affects the results.
         command: command line, or Python script, that began the run.
         station: the station.
         grasps: the grasps of each scene.
@@ -214,7 +214,7 @@ class CampaignDocument:
         scenes: all scenes of the run, in every shard.
         libraries: hash of each object library, by folder.
         versions: versions of the software and the machine.
-        stretches: the calls that worked on the run, in order.
+        stretches: work sessions of the run, one a call, in order.
         hints: usual mistakes that the given grasps show, each with a command that corrects it.
     """
 
@@ -243,7 +243,7 @@ class CampaignDocument:
         shard = as_shard(self.shard or None)
         if shard is None or not shard.divides_scenes(len(self.scenes)):
             return self.scenes
-        return tuple(entry for place, entry in enumerate(self.scenes) if shard.has(place))
+        return tuple(entry for k, entry in enumerate(self.scenes) if shard.has(k))
 
     @property
     def shard_of_grasps(self) -> Shard | None:
@@ -253,9 +253,9 @@ class CampaignDocument:
         return None if divides else shard
 
     @property
-    def has_few_scenes(self) -> bool:
-        """Whether each scene gets a report by default."""
-        return len(self.scenes) <= MAX_SCENES
+    def writes_scene_reports(self) -> bool:
+        """Whether each scene gets a report unless the settings say otherwise."""
+        return len(self.scenes) <= MAX_SCENES_WITH_REPORTS
 
     @property
     def instances(self) -> list[str]:

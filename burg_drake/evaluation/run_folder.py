@@ -62,7 +62,7 @@ class StoredRun:
     """Folder of a run whose rows are stored in parts.
 
     Attributes:
-        scene: name of its scene in the parts; empty for a run of one scene.
+        scene: name of the scene in the parts; empty for a run of one scene.
         folder: folder of the run.
     """
 
@@ -71,7 +71,7 @@ class StoredRun:
 
     @property
     def journal(self) -> Path:
-        """Path of its journal."""
+        """Path of the journal."""
         return self.folder / JOURNAL_FILE
 
 
@@ -86,7 +86,7 @@ class Run:
             print(id, run.verdicts[id].outcome, run.verdicts[id].margins)
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         document: contents of run.yaml.
     """
 
@@ -116,7 +116,7 @@ class Run:
 
     @property
     def assigned_ids(self) -> Sequence[str]:
-        """Ids of the grasps assigned to this run: all, or those of its shard."""
+        """Ids of the grasps assigned to this run: all, or the grasps of its shard."""
         return select_share(self.candidates.id, self.document.shard)
 
     @property
@@ -137,8 +137,8 @@ class Run:
         return not len(self.left)
 
     @property
-    def places(self) -> list[StoredRun]:
-        """Folder of the run of its one scene; see `Campaign.places`."""
+    def stored_runs(self) -> list[StoredRun]:
+        """The run itself, under an empty scene name; see `Campaign.stored_runs`."""
         return [StoredRun("", self.path)]
 
     @property
@@ -164,7 +164,7 @@ class Run:
         return ResultRows.of(
             self.candidates,
             np.flatnonzero(index.judged),
-            lambda rows: read_verdicts(journal, index.place[rows].tolist()),
+            lambda rows: read_verdicts(journal, index.line_begin[rows].tolist()),
             **self.table_settings,
         )
 
@@ -212,7 +212,7 @@ class Run:
         return run
 
     def with_document(self, document: RunDocument) -> Run:
-        """Copy with another document on the same grasps; keeps data that was read."""
+        """Copy with another document on the same grasps; keeps the data read so far."""
         run = Run(self.path, document)
         run.__dict__.update(self.__dict__ | {"document": document})
         return run
@@ -231,9 +231,9 @@ class Run:
     def contested(self) -> list[str]:
         """Ids of the executed grasps whose verdict is contested, see `Verdict.contested`."""
         rows = self.rows()
-        settled = self.index.judged_again[rows.places]
+        settled = self.index.judged_again[rows.candidate_rows]
         contested = np.zeros(len(self.candidates), dtype=bool)
-        contested[rows.places] = contested_rows(rows["confidence"], settled)
+        contested[rows.candidate_rows] = contested_rows(rows["confidence"], settled)
         return self._ids_where(contested & self.is_assigned)
 
     def _ids_where(self, chosen: NDArray[np.bool_]) -> list[str]:
@@ -246,10 +246,10 @@ class Run:
         Raises:
             UnknownNameError: there is no judged grasp with this id; the message names similar ids.
         """
-        (place,) = self.candidates.rows([id]).tolist()
+        (candidate_row,) = self.candidates.rows([id]).tolist()
         rows = self.rows()
-        found = np.flatnonzero(rows.places == place)
-        if place < 0 or not len(found):
+        found = np.flatnonzero(rows.candidate_rows == candidate_row)
+        if candidate_row < 0 or not len(found):
             raise self._unknown_grasp_error(id)
         return table_row(rows.columns(list(rows), found), 0)
 
@@ -271,8 +271,8 @@ class Run:
             UnknownNameError: the run has no such grasp; the message names similar ids.
         """
         candidate = self.candidate(id)
-        place = int(self.index.place[self.candidates.rows([id])[0]])
-        found = read_verdicts(self.path / JOURNAL_FILE, [place] if place >= 0 else [])
+        line_begin = int(self.index.line_begin[self.candidates.rows([id])[0]])
+        found = read_verdicts(self.path / JOURNAL_FILE, [line_begin] if line_begin >= 0 else [])
         return RecordedTrial(
             id=id,
             instance=candidate.instance,
@@ -296,7 +296,7 @@ class Run:
         """
         rows = self.rows()
         best = best_rows(rows, count, each=each, only=only)
-        return [self.candidates.id[row] for row in rows.places[best].tolist()]
+        return [self.candidates.id[row] for row in rows.candidate_rows[best].tolist()]
 
     def scene(self) -> Scene:
         """The scene of the run.
@@ -367,11 +367,11 @@ def load_run(path: str | Path) -> Run:
         print(len(run.verdicts), run.results["outcome"])
 
     Args:
-        path: its folder.
+        path: folder of the run.
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its run.yaml does not fit the schema.
+        DocumentError: run.yaml does not fit the schema.
     """
     path = Path(path)
     if path.is_file():
@@ -439,7 +439,7 @@ def require_run_folder(folder: Path) -> None:
 
 
 def refuse_other_files(folder: Path, own: Collection[str] = ()) -> None:
-    """Refuses a folder with files other than hidden ones and those named in `own`."""
+    """Refuses a folder with files that are neither hidden nor named in `own`."""
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
     if foreign := sorted(names.difference(own)):
         raise InvalidInputError(

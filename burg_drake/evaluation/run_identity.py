@@ -225,7 +225,7 @@ def _origin_words(grasps: Grasps) -> str:
 
 
 def _all_settings(document: AnyRunDocument) -> dict[str, object]:
-    """Settings of engine, trial and arm by name, without those that have their own topic."""
+    """Settings of engine, trial and arm by name, without settings with a topic of their own."""
     return vars(document.engine) | other_numbers(document.trial) | other_numbers(document.arm)
 
 

@@ -21,14 +21,14 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation.campaign_folder import (
     CAMPAIGN_LOCK_FILE,
-    LEDGER_FILE,
+    SCENE_STATES_FILE,
     SCENES_FOLDER,
     Campaign,
     SceneState,
     is_campaign,
-    ledger_text,
     open_results,
     save_campaign,
+    scene_states_text,
 )
 from burg_drake.evaluation.candidates import share_rows
 from burg_drake.evaluation.journal import JOURNAL_FILE, WriterLock, hold_unchanged
@@ -68,7 +68,7 @@ class MissingFromMerge:
 
 
 def read_merge_note(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
-    """Reads the note of an unfinished merge of these runs; None if the folder has none."""
+    """Reads the note of an unfinished merge of the runs `sources`; None if there is none."""
     try:
         stored = json.loads(_merge_note_path(folder, sources).read_text(encoding="utf-8"))
         return MissingFromMerge(stored["missing"], tuple(stored["scenes"]), tuple(stored["shards"]))
@@ -99,13 +99,13 @@ def lock_file(folder: Path) -> Path:
 
 def _finish_campaign(campaign: Campaign) -> None:
     document = campaign.document
-    reports = document.has_few_scenes
-    for place in campaign.places:
-        if not (place.folder / RUN_FILE).exists():
+    reports = document.writes_scene_reports
+    for stored in campaign.stored_runs:
+        if not (stored.folder / RUN_FILE).exists():
             continue
-        size = place.journal.stat().st_size
-        if not is_finished(place.folder, size, document.table, report=reports):
-            finish_run(load_run(place.folder), document.table, report=reports)
+        size = stored.journal.stat().st_size
+        if not is_finished(stored.folder, size, document.table, report=reports):
+            finish_run(load_run(stored.folder), document.table, report=reports)
     update_parts(campaign)
     write_campaign_report(campaign)
 
@@ -142,7 +142,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
     for name in merged.names:
         merge.add_scene(name)
     merge.copy_parts()
-    atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
+    atomic_write(staging / SCENE_STATES_FILE, scene_states_text(merge.states))
     save_campaign(merged)
     return MissingFromMerge(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 
@@ -152,7 +152,7 @@ class _Merge:
 
     Attributes:
         states: progress of the merged scenes.
-        copied: by number of the run, scenes that were copied from it unchanged.
+        copied: scenes that were copied unchanged from each run, by the number of the run.
         missing: number of grasps without a verdict.
         not_begun: scenes that no run has begun.
     """
@@ -193,7 +193,7 @@ class _Merge:
         self._note_state(name, runs[0], choice)
 
     def copy_parts(self) -> None:
-        """Copies parts whose scenes were all copied; other rows will be read from journals."""
+        """Copies parts whose scenes were all copied; the journals have the rows of other parts."""
         number = 0
         parts = self._merged.path / PARTS_FOLDER
         parts.mkdir()
@@ -352,7 +352,7 @@ def _distinct_folders(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def _staging_folder(folder: Path) -> Path:
-    """Creates an empty folder beside another, and removes those of killed merges."""
+    """Creates an empty folder beside another, and removes such folders of killed merges."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise InvalidInputError(f"{folder} exists already; choose another folder").about("out")
     parent = ensure_writable_folder(folder.absolute().parent)

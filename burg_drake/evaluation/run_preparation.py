@@ -47,6 +47,7 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import correction_of
 from burg_drake.evaluation.grasp_sets.sampling import sample_on_scene
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.judge import (
+    StationJudgeFactory,
     arm_settings,
     mode_for,
     require_engine_for,
@@ -168,8 +169,8 @@ class RunRequest:
             retry_failed=retry_failed,
         )
 
-    def given_grasps(self, scene: Scene) -> ByInstance | None:
-        """The user's grasps on the instances of a scene; None if grasps are sampled.
+    def given_candidates(self, scene: Scene) -> Candidates | None:
+        """The user's grasps on a scene as candidates; None if grasps are sampled.
 
         Raises:
             BurgError: the grasps do not fit the scene.
@@ -178,12 +179,11 @@ class RunRequest:
             return None
         found = self.grasps(scene) if callable(self.grasps) else self.grasps
         found = group_by_names(scene, found) if isinstance(found, GraspSet) else found
-        return select_instances(scene, found, self.only)
+        return given_candidates(scene, select_instances(scene, found, self.only))
 
-    def given_candidates(self, scene: Scene) -> Candidates | None:
-        """The user's grasps as candidates; None if grasps are sampled."""
-        given = self.given_grasps(scene)
-        return None if given is None else given_candidates(scene, given)
+    def judge_factory(self, scene: Scene) -> StationJudgeFactory:
+        """Builds the judges of a scene in worker processes."""
+        return StationJudgeFactory(scene, self.station, self.engine, self.mode, self.trial_settings)
 
     def narrow_to_scene(self, scene: Scene) -> RunRequest | None:
         """Narrows a request for many scenes to one of them.
@@ -259,9 +259,9 @@ class RunRequest:
             "command": current_command(),
             "station": input_of(self.station, "stations"),
             "engine": self.engine,
-            "trial": self.trial,
+            "trial": {**settings_numbers(self.trial_settings), **MEASURE_NUMBERS},
             "mode": self.mode,
-            "arm": self.arm,
+            "arm": {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion)),
             "seed": self.settings.seed,
             "shard": "" if self.shard is None else str(self.shard),
             "table": self.settings.table,
@@ -285,13 +285,8 @@ class RunRequest:
         )
 
     @property
-    def trial(self) -> dict[str, float]:
-        """Numbers of the trial's settings, and of the way its results are measured, by name."""
-        return {**settings_numbers(self.phases), **MEASURE_NUMBERS}
-
-    @property
-    def phases(self) -> TrialSettings:
-        """Settings of the trial's phases."""
+    def trial_settings(self) -> TrialSettings:
+        """Settings of the trials."""
         from burg_drake.simulation import TrialSettings
 
         return TrialSettings(
@@ -300,11 +295,6 @@ class RunRequest:
             slip_limit=self.settings.slip_limit_mm / 1000.0,
             approach=self.settings.approach,
         )
-
-    @property
-    def arm(self) -> dict[str, float]:
-        """Numbers of the settings of the arm's motion search, by name; empty without an arm."""
-        return {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion))
 
 
 def current_command() -> str:
@@ -350,12 +340,12 @@ def sample_requested(
         station: station with hand and arm.
         document: document of the run; without `Grasps.asked`, every object gets `per_object`
             ordinary grasps.
-        before: the run with its grasps so far; objects whose number of grasps does not change keep
-            theirs. None to sample all.
+        before: the run with the grasps so far; objects whose number of grasps does not change keep
+            their grasps. None to sample all.
     """
     grasps = document.grasps
     names = grasps.only or tuple(scene.instances)
-    kept = {} if before is None else _kept_grasps(scene, before, grasps)
+    kept = {} if before is None else _unchanged_grasps(scene, before, grasps)
     found: defaultdict[str, list[GraspSet]] = defaultdict(list, kept)
     for slippery in (False, True):
         by_count: defaultdict[int, list[str]] = defaultdict(list)
@@ -374,7 +364,7 @@ def sample_requested(
     return join_candidates({name: _join_sets(found[name]) for name in names})
 
 
-def _kept_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
+def _unchanged_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
     """Grasps of the instances whose requested number has not changed, by instance."""
     candidates = before.candidates
     provenance = candidates.grasps.provenance["parts"]
@@ -447,7 +437,7 @@ def open_run(
     scene: Scene,
     request: RunRequest,
     given: Candidates | None,
-    sampling: Callable[[], None] = lambda: None,
+    before_sampling: Callable[[], None] = lambda: None,
 ) -> Run:
     """Continues the run in a folder, or begins a new one there.
 
@@ -456,7 +446,7 @@ def open_run(
         scene: scene to judge.
         request: the request for the scene.
         given: the user's grasps; None to sample.
-        sampling: called before grasps are sampled.
+        before_sampling: called before grasps are sampled.
 
     Raises:
         InvalidInputError: the folder holds another run.
@@ -471,10 +461,10 @@ def open_run(
         write_copies(folder, scene, request.station)
         if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
             # killed after the grasps of a round were written, but before run.yaml
-            return _resample_run(run, run.document, scene, request.station)
+            return resample_run(run, run.document, scene, request.station)
         return run
     if candidates is None:
-        sampling()
+        before_sampling()
         start = time.process_time()
         candidates = sample_requested(scene, request.station, document)
         document = _record_grasps(document, scene, candidates, time.process_time() - start)
@@ -483,19 +473,14 @@ def open_run(
     return run if given is None else run.with_candidates(given)
 
 
-def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
-    """Samples the grasps that a run's new document asks for; they include the existing ones.
-
-    Writes the candidates before run.yaml: if the call is killed in between, `open_run` notices
-    their different hash and samples the grasps of run.yaml again.
-    """
-    return _resample_run(run, document, scene, station, before=run)
-
-
-def _resample_run(
+def resample_run(
     run: Run, document: RunDocument, scene: Scene, station: Station, before: Run | None = None
 ) -> Run:
-    """Samples the grasps of a document and writes both; see `sample_requested`."""
+    """Samples the grasps of a document and writes both; see `sample_requested`.
+
+    Writes the candidates before run.yaml: if the call is killed in between, `open_run` notices
+    the different hash of the candidates and samples the grasps of run.yaml again.
+    """
     start = time.process_time()
     candidates = sample_requested(scene, station, document, before)
     cpu = document.grasps.cpu + time.process_time() - start

@@ -156,9 +156,9 @@ def unclear_notes(
     outcomes: NDArray[np.str_],
     blockers: NDArray[np.str_],
     *,
-    given: bool = False,
+    given: bool,
 ) -> tuple[str, ...]:
-    """Notes on objects at all of whose grasps the open hand collides.
+    """Notes on objects without a grasp at which the open hand is clear.
 
     Args:
         objects, outcomes, blockers: (N,) object, outcome and blocker of each grasp.

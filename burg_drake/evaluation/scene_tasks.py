@@ -54,7 +54,7 @@ class SceneJudging:
 
     Attributes:
         name: name of the scene in the run.
-        left: grasps to judge when the scene was opened.
+        left: grasps that had to be judged when the scene was opened.
         assigned_count: number of grasps assigned to this run (or shard).
         known_count: number of assigned grasps that need not be judged.
     """
@@ -73,14 +73,14 @@ class SceneJudging:
         self.left: Sequence[Candidate] = run.candidates.at(left)
         self.assigned_count = len(run.assigned_ids)
         self.known_count = self.assigned_count - len(left)
-        self._before = int(index.judged.sum())
+        self._judged_before = int(index.judged.sum())
         failed = np.setdiff1d(np.flatnonzero(index.failed), left).tolist()
         ids = run.candidates.id
         self._failed = {ids[row]: bool(index.interrupted[row]) for row in failed}
         self._judged = 0
         self._workers = workers
-        self._count = len(self._run.candidates)
-        self._missing = "; ".join(run_shortfall_notes(self._run))
+        self._candidate_count = len(self._run.candidates)
+        self._shortfall_notes = "; ".join(run_shortfall_notes(self._run))
         self._run = Run(folder, self._run.document)
 
     @property
@@ -90,7 +90,7 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Records in the run's document that a session begins."""
-        self._session = begin_session(self._workers, self._before)
+        self._session = begin_session(self._workers, self._judged_before)
         self._begun = time.monotonic()
         self._save(self._session)
 
@@ -116,7 +116,7 @@ class SceneJudging:
             self._save(self._session.finish(self._judged, self._begun))
 
     def state(self, state: Literal["open", "done"]) -> SceneState:
-        """Progress to record for the scene; closes it if `done`."""
+        """Progress to record for the scene; closes the journal if `done`."""
         document = self._run.document
         if state == "done":
             self.close()
@@ -125,13 +125,13 @@ class SceneJudging:
             scene=self.name,
             state=state,
             run=document.hash,
-            grasps=self._count,
+            grasps=self._candidate_count,
             mine=self.assigned_count,
             sampling=document.grasps.cpu,
             size=journal.stat().st_size if state == "done" else 0,
             failed=len(self._failed) if state == "done" else 0,
             interrupted=sum(self._failed.values()) if state == "done" else 0,
-            missing=self._missing,
+            missing=self._shortfall_notes,
         )
 
     def _save(self, session: WorkSession) -> None:
@@ -243,8 +243,7 @@ class SceneResultsWriter:
             BurgError: a file cannot be written.
         """
         if work is None:
-            if self.writer.scenes_with_new_rows():
-                self.writer.add_new_rows()
+            self.writer.add_new_rows()
             self.writer.close()
             return
         run = load_run(self._outputs.campaign.folder(work.name))
@@ -270,16 +269,16 @@ def preparer_count(workers: int) -> int:
 class SceneProcesses:
     """Processes that prepare scenes and write their outputs; a context that ends them."""
 
-    def __init__(self, preparer: Preparer, outputs: SceneOutputs, workers: int) -> None:
+    def __init__(self, request: RunRequest, outputs: SceneOutputs, workers: int) -> None:
         """Sets up the pools; processes start when there is work.
 
         Args:
-            preparer: prepares scenes.
+            request: the request for all scenes.
             outputs: outputs to write for each scene.
             workers: number of workers that judge.
         """
         self._pools: list[WorkerPool] = []
-        self._preparer, self._preparers = preparer, self._add_pool(preparer_count(workers))
+        self._request, self._preparers = request, self._add_pool(preparer_count(workers))
         self._finisher = self._add_pool(1)
         self._finishing: deque[tuple[FinishTask | None, WorkerFuture[None]]] = deque()
         self._session = Session("finish", partial(SceneResultsWriter, outputs))
@@ -289,8 +288,8 @@ class SceneProcesses:
 
     def prepare(self, work: Iterable[PrepareTask]) -> None:
         """Starts preparing scenes, in the given order."""
-        session = Session("prepare", partial(Preparer, self._preparer.request))
-        self._ahead: Prefetcher[PrepareTask, Scene | None] = Prefetcher(
+        session = Session("prepare", partial(Preparer, self._request))
+        self._prefetcher: Prefetcher[PrepareTask, Scene | None] = Prefetcher(
             self._preparers,
             iter(work),
             lambda item: Task(Preparer.__call__, (item,), session=session),
@@ -298,15 +297,15 @@ class SceneProcesses:
 
     def ready(self) -> bool:
         """Whether `next_prepared` returns at once."""
-        return self._ahead.ready()
+        return self._prefetcher.ready()
 
     def next_prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
         """Waits for the next prepared scene; None if there are no more.
 
         Returns:
-            Its task and the scene, an error if it cannot be judged, or None if it has no grasps.
+            The task, and the scene, an error if it cannot be judged, or None without grasps.
         """
-        return self._ahead.take()
+        return self._prefetcher.take()
 
     def finish(self, name: str) -> None:
         """Starts writing table, report and rows of a judged scene."""
@@ -322,13 +321,14 @@ class SceneProcesses:
         Raises:
             BurgError: an output cannot be written.
         """
-        if self._used:
-            self._submit(None)
-            self._collect_finished(wait=True)
-        for work in self._failed or (() if self._used else (None,)):
-            self._local_writer(work)  # raises if it fails again
-        if self._failed:
+        if not self._used:
             self._local_writer(None)
+            return
+        self._submit(None)
+        self._collect_finished(wait=True)
+        if self._failed:
+            for work in (*self._failed, None):
+                self._local_writer(work)  # raises if it fails again
 
     def __enter__(self) -> SceneProcesses:
         return self

@@ -189,14 +189,14 @@ def _judge_scenes(
 ) -> Campaign:
     """Judges the contested grasps of each scene again, and updates tables, reports and parts."""
     with WriterLock(campaign.path / CAMPAIGN_LOCK_FILE):
-        document, ledger = campaign.document, SceneStates(campaign.path)
-        done = {name for name, state in ledger.states.items() if state.state == "done"}
+        document, scene_states = campaign.document, SceneStates(campaign.path)
+        done = {name for name, state in scene_states.states.items() if state.state == "done"}
         contested = {g.name: g.contested for g in summarize(campaign).scenes if g.name in done}
         reports = {name: (campaign.folder(name) / REPORT_FILE).exists() for name in contested}
         folders = {name: campaign.folder(name) for name in contested}
 
         def is_settled(name: str) -> bool:
-            size, table = ledger.states[name].size, document.table
+            size, table = scene_states.states[name].size, document.table
             return is_finished(folders[name], size, table, report=reports[name])
 
         names = [name for name, n in contested.items() if n or not is_settled(name)]
@@ -205,7 +205,7 @@ def _judge_scenes(
             name = run.path.name
             finish_run(run, document.table, report=reports[name])
             size = (run.path / JOURNAL_FILE).stat().st_size
-            ledger.note(replace(ledger.states[name], size=size))
+            scene_states.note(replace(scene_states.states[name], size=size))
 
         runs = (load_run(campaign.folder(name)) for name in names)
         session, begun = begin_session(executor.workers, sum(contested.values())), time.monotonic()
@@ -236,7 +236,7 @@ def _judge_contested(
         finish: called once for each run, when all of its verdicts are written.
     """
     opened: dict[str, _ContestedRun] = {}
-    pace = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
+    meter = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
     judged = 0
 
     def jobs() -> Iterator[Job]:
@@ -252,8 +252,8 @@ def _judge_contested(
         with closing(executor.judge(jobs())) as verdicts:
             for job, candidate, verdict in verdicts:
                 settling = opened[job.key]
-                judged += settling.write_answer(candidate, verdict)
-                pace.step(outcome=verdict.outcome)
+                judged += settling.write_verdict(candidate, verdict)
+                meter.step(outcome=verdict.outcome)
                 if not settling.open:
                     finish(opened.pop(job.key).close())
     finally:
@@ -267,7 +267,7 @@ class _ContestedRun:
 
     Attributes:
         left: grasps that are judged again.
-        open: number of these without an answer so far.
+        open: number of grasps in `left` without a new verdict so far.
     """
 
     def __init__(self, run: Run, engine: str, workers: int) -> None:
@@ -300,8 +300,8 @@ class _ContestedRun:
         factory = StationJudgeFactory(run.scene(), run.station(), engine, mode, settings)
         return Job(str(run.path), factory, self.left)
 
-    def write_answer(self, candidate: Candidate, verdict: Verdict) -> bool:
-        """Writes an answer to the journal; returns False if the simulation failed."""
+    def write_verdict(self, candidate: Candidate, verdict: Verdict) -> bool:
+        """Writes a new verdict to the journal; returns False if the simulation failed."""
         self.open -= 1
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             return False

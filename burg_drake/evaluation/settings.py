@@ -146,9 +146,9 @@ class Shard:
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
 
-    def has(self, place: int) -> bool:
+    def has(self, index: int) -> bool:
         """Whether the item with this index, from 0, belongs to the shard."""
-        return place % self.count == self.number - 1
+        return index % self.count == self.number - 1
 
     def divides_scenes(self, scenes: int) -> bool:
         """Whether the shards divide scenes, as they do if there are enough; else their grasps."""

@@ -16,7 +16,7 @@ from burg_drake.evaluation.campaign_folder import (
     open_results,
 )
 from burg_drake.evaluation.journal import JOURNAL_FILE, is_locked
-from burg_drake.evaluation.part_store import JournalTail, read_journal_tails
+from burg_drake.evaluation.part_store import JournalCounts, read_journal_counts
 from burg_drake.evaluation.run_document import WorkSession
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.settings import select_share
@@ -27,7 +27,7 @@ class Status:
     """Progress of a run.
 
     Attributes:
-        path: its folder.
+        path: folder of the run.
         kind: `run` for one scene, `campaign` for many.
         working: whether a process is working on it.
         judged: number of grasps with a verdict.
@@ -75,11 +75,11 @@ class RunWatch:
 
         Raises:
             InvalidInputError: there is no run.
-            DocumentError: its document does not fit the schema.
+            DocumentError: run.yaml or campaign.yaml does not fit the schema.
         """
         self._date = _document_time(Path(path))
         self._result = result = open_results(path)
-        self._tails = read_journal_tails(result)
+        self._counts = read_journal_counts(result)
         self._history: list[tuple[float, int]] = []
 
     def look(self) -> Status:
@@ -88,11 +88,11 @@ class RunWatch:
         if isinstance(result, Campaign):
             return self._look_at_scenes(result)
         document = result.document
-        tail = self._refresh_tail("")
+        counts = self._refresh_counts("")
         total = len(select_share(range(document.grasps.count), document.shard))
-        judged = min(tail.lines, total)
+        judged = min(counts.judged, total)
         status = self._make_status(
-            result.path / JOURNAL_FILE, judged, total, tail.outcomes, tail.modified
+            result.path / JOURNAL_FILE, judged, total, counts.outcomes, counts.modified
         )
         under_way = () if judged == total else (document.scene.name,)
         return replace(status, kind="run", done=int(judged == total), under_way=under_way)
@@ -100,12 +100,12 @@ class RunWatch:
     def _look_at_scenes(self, campaign: Campaign) -> Status:
         states = {name: s for name, s in campaign.states.items() if name in set(campaign.names)}
         begun = [n for n in campaign.names if n in states and states[n].state in ("open", "done")]
-        tails = [self._refresh_tail(name) for name in begun]
+        scene_counts = [self._refresh_counts(name) for name in begun]
         outcomes: Counter[bytes] = Counter()
-        for tail in tails:
-            outcomes.update(tail.outcomes)
-        judged = sum(tail.lines for tail in tails)
-        last = max((tail.modified for tail in tails), default=0.0)
+        for counts in scene_counts:
+            outcomes.update(counts.outcomes)
+        judged = sum(counts.judged for counts in scene_counts)
+        last = max((counts.modified for counts in scene_counts), default=0.0)
         lock = campaign.path / CAMPAIGN_LOCK_FILE
         total = max(judged, campaign.expected)
         return replace(
@@ -146,10 +146,10 @@ class RunWatch:
         self._date = date
         return open_results(path)
 
-    def _refresh_tail(self, name: str) -> JournalTail:
-        tail = self._tails[name]
-        tail.refresh()
-        return tail
+    def _refresh_counts(self, name: str) -> JournalCounts:
+        counts = self._counts[name]
+        counts.refresh()
+        return counts
 
     def _judging_rate(
         self, judged: int, sessions: tuple[WorkSession, ...], working: bool
@@ -189,6 +189,6 @@ def read_status(path: str | Path) -> Status:
 
     Raises:
         InvalidInputError: there is no run.
-        DocumentError: its document does not fit the schema.
+        DocumentError: run.yaml or campaign.yaml does not fit the schema.
     """
     return RunWatch(path).look()

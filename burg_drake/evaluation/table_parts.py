@@ -42,8 +42,8 @@ class JournalSegment:
         scene: name of the journal's scene in the run; empty in a run of one scene.
         begin, end: range of bytes of the journal.
         rows: number of rows in the part.
-        whole, last: hashes of these bytes, and of the last `SEGMENT_TAIL` of them.
-        modified: date of the journal when the part was made [ns]; 0 if it was longer.
+        whole, last: hash of these bytes, and of the last `SEGMENT_TAIL` bytes.
+        modified: date of the journal when the part was made [ns]; 0 if the journal went on.
     """
 
     scene: str
@@ -79,14 +79,14 @@ def _follow_segments(segments: Sequence[JournalSegment], stream: BinaryIO) -> li
     size, modified = status.st_size, status.st_mtime_ns
     untouched = any(s.end == size and s.modified == modified for s in segments)
     found: list[JournalSegment] = []
-    place = 0
+    begin = 0
     while True:
-        following = [s for s in segments if s.begin == place and place < s.end <= size]
+        following = [s for s in segments if s.begin == begin and begin < s.end <= size]
         following = [s for s in following if _matches_journal(s, stream, untouched=untouched)]
         if not following:
             return found
         found.append(max(following, key=lambda s: s.end))
-        place = found[-1].end
+        begin = found[-1].end
 
 
 def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bool) -> bool:
@@ -97,8 +97,8 @@ def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bo
     return _stream_hash(stream, segment.begin, segment.end) == segment.whole
 
 
-def whole_lines(journal: Path) -> int:
-    """Number of bytes up to the end of the last complete line of a journal."""
+def last_line_end(journal: Path) -> int:
+    """Byte at which the last complete line of a journal ends; 0 if there is none."""
     if not journal.exists():
         return 0
     with open_regular(journal) as stream:
@@ -113,11 +113,11 @@ def whole_lines(journal: Path) -> int:
     return 0
 
 
-def line_end(journal: Path, place: int) -> int:
-    """End of the journal line that contains the byte at `place`."""
+def line_end(journal: Path, byte: int) -> int:
+    """End of the journal line that contains a byte."""
     with open_regular(journal) as stream:
-        stream.seek(place)
-        return place + len(stream.readline())
+        stream.seek(byte)
+        return byte + len(stream.readline())
 
 
 def _stream_hash(stream: BinaryIO, begin: int, end: int) -> str:
@@ -275,7 +275,8 @@ def column_names(part: TablePart) -> list[str]:
 def to_numpy(name: str, column: Any) -> NDArray[Any]:
     """Converts an Arrow column to an array; nulls become NaN or empty texts."""
     arrow = require_arrow("a columnar table")
-    if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or _is_text(column.type):
+    text_types = (arrow.string(), arrow.large_string())
+    if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or column.type in text_types:
         if not arrow.types.is_dictionary(column.type):
             if column.type == arrow.null() or not len(column):
                 return np.full(len(column), "", dtype=np.str_)
@@ -305,18 +306,13 @@ def _arrow_column(name: str, values: NDArray[Any]) -> Any:
     arrow = require_arrow("a columnar table")
     if values.dtype.kind == "U":
         if len(values) and values.strides == (0,):  # one text for all rows
-            places = np.zeros(len(values), dtype=np.int32)
-            return arrow.DictionaryArray.from_arrays(places, arrow.array([str(values[0])]))
+            codes = np.zeros(len(values), dtype=np.int32)
+            return arrow.DictionaryArray.from_arrays(codes, arrow.array([str(values[0])]))
         column = arrow.array(values.tolist(), arrow.string())
         return column if name in UNIQUE_TEXT_COLUMNS else column.dictionary_encode()
     if values.dtype.kind == "O":
         return arrow.array(values.tolist(), arrow.int64())
     return arrow.array(values, from_pandas=True)
-
-
-def _is_text(kind: Any) -> bool:
-    arrow = require_arrow("a columnar table")
-    return bool(arrow.types.is_string(kind) or arrow.types.is_large_string(kind))
 
 
 def _footer_hash(data: bytes) -> str:
@@ -401,7 +397,7 @@ def results_frame(
 
 
 def _fill_null(codes: Any, texts: Sequence[str]) -> tuple[Any, Sequence[str]]:
-    """Replaces the code of null by that of an empty text."""
+    """Replaces the code of null by the code of an empty text."""
     if not (codes < 0).any():
         return codes, texts
     if "" not in texts:
@@ -413,8 +409,8 @@ def _category_column(name: str, codes: Any, texts: Sequence[str]) -> Any:
     """Categorical of codes; categories are the allowed texts if fixed, else the sorted texts."""
     pandas = _pandas()
     members = list(COLUMN_MEMBERS.get(name, texts if name == "name" else sorted(texts)))
-    place = np.array([members.index(text) for text in texts], dtype=np.int64)
-    codes = place[codes] if len(texts) else codes
+    member_of_text = np.array([members.index(text) for text in texts], dtype=np.int64)
+    codes = member_of_text[codes] if len(texts) else codes
     return pandas.Categorical.from_codes(codes, categories=members, ordered=name == "stage")
 
 

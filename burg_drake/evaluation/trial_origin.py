@@ -97,13 +97,13 @@ def read_motion(values: Mapping[str, float]) -> GraspMotion:
 
 
 def without_motion(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers without those of the motion."""
+    """Recorded numbers without the numbers of the motion."""
     known = {field.name for field in fields(GraspMotion)}.union(DIRECTION_NUMBERS)
     return {name: value for name, value in values.items() if name not in known}
 
 
 def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers without those of the motion, the limits, the approach and the measures."""
+    """Recorded numbers without motion, limits, approach and measures."""
     known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
 
@@ -117,7 +117,7 @@ def motion_text(motion: GraspMotion) -> str:
     parts.append(f"lift {least}{_mm(motion.lift_height)} mm")
     x, y, z = motion.lift_direction
     if (x, y) != (0.0, 0.0) or z < 0.0:
-        parts[-1] += f" along [{', '.join(map(_rounded_key, motion.lift_direction))}]"
+        parts[-1] += f" along [{', '.join(map(_twelve_digits, motion.lift_direction))}]"
     return ", ".join(parts)
 
 
@@ -143,11 +143,11 @@ def _millimetres(length: float) -> str:
 
 
 def _mm(length: float) -> str:
-    return _rounded_key(1e3 * length)
+    return _twelve_digits(1e3 * length)
 
 
-def _rounded_key(value: float) -> str:
-    """A number with 12 digits, without rounding errors."""
+def _twelve_digits(value: float) -> str:
+    """A number with 12 digits, which hide rounding errors."""
     return f"{value:.12g}"
 
 
@@ -340,7 +340,7 @@ def _read_pairs(text: str, where: str) -> dict[str, str]:
 
 
 def _restore_booleans(values: Mapping[str, float], schema: type[Any]) -> dict[str, object]:
-    """Recorded numbers with those of boolean fields as `true` or `false`."""
+    """Recorded numbers; numbers of boolean fields become `true` or `false`."""
     flags = {field.name for field in fields(schema) if field.type in (bool, "bool")}
     return {k: str(bool(v)).lower() if k in flags else v for k, v in values.items()}
 

@@ -22,6 +22,7 @@ from typing import Any
 from burg_drake.core import InvalidInputError, Outcome, Stage
 from burg_drake.evaluation import Candidate, Decide, Decision, Screen
 
+JUDGE_FACTORY = "burg_drake.evaluation.run_preparation.StationJudgeFactory"
 TOPPLED = 0.0185
 """What is moved by more than this lies afterwards [m]."""
 
@@ -277,8 +278,7 @@ class DieOnStart:
 def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause: float = 0) -> None:
     """Replaces the simulation of `evaluate` in this process by `KnownJudge`."""
     judge = Make(KnownJudge(log, pause))
-    for module in ("cascade", "many_scenes"):
-        setattr(f"burg_drake.evaluation.{module}.StationJudgeFactory", lambda *_: judge)
+    setattr(JUDGE_FACTORY, lambda *_: judge)
     for module in ("cascade", "scene_tasks"):
         setattr(f"burg_drake.evaluation.{module}.require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this

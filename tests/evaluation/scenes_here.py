@@ -9,6 +9,7 @@ from burg_drake.evaluation import (
     FinishTask,
     Preparer,
     PrepareTask,
+    RunRequest,
     SceneOutputs,
     SceneResultsWriter,
 )
@@ -18,8 +19,8 @@ from burg_drake.scene import Scene
 class ScenesHere:
     """Takes the place of `SceneProcesses`."""
 
-    def __init__(self, preparer: Preparer, outputs: SceneOutputs, workers: int) -> None:
-        self._preparer, self._finisher = preparer, SceneResultsWriter(outputs)
+    def __init__(self, request: RunRequest, outputs: SceneOutputs, workers: int) -> None:
+        self._preparer, self._finisher = Preparer(request), SceneResultsWriter(outputs)
         self._work: Iterator[PrepareTask] = iter(())
 
     def prepare(self, work: Iterable[PrepareTask]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from asked import asked
 from inline_executor import Inline
-from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
+from known_judge import JUDGE_FACTORY, KnownJudge, Make, ShortOfMemory, expected, install
 
 from burg_drake.core import GraspSet, InvalidInputError, Progress, UnknownNameError, make_pose
 from burg_drake.evaluation import (
@@ -188,7 +188,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
 
     def judge(known: KnownJudge, out: str, **options: Any) -> Run:
         make = Make(known)
-        monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: make)
+        monkeypatch.setattr(JUDGE_FACTORY, lambda *_: make)
         options |= {"grasps_per_object": 10, "blind": True, "progress": False}
         judging = {"workers": 1} if isinstance(known, ShortOfMemory) else {"executor": Inline()}
         return evaluate(scene, station, tmp_path / out, **asked(**judging, **options))
@@ -216,7 +216,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     assert judged("failed") == [crashing] and run.failures == []
     assert same_results(run, whole)
     assert read_table(run.table_path)["outcome"].tolist() == whole.results["outcome"].tolist()
-    assert [stretch.judged for stretch in run.document.stretches] == [30, 1, 1, 1]
+    assert [session.judged for session in run.document.stretches] == [30, 1, 1, 1]
 
 
 @pytest.mark.thorough

@@ -13,9 +13,9 @@ from burg_drake.core import MarginNames, Margins, Outcome, Stage
 from burg_drake.evaluation import (
     Candidate,
     Decision,
+    JudgingState,
     SamplingSettings,
     Screen,
-    ScreenAnswers,
     judge_grasp,
     sample_candidates,
     screen_grasps,
@@ -86,13 +86,13 @@ def test_an_error_is_the_outcome_of_the_stage_it_came_from() -> None:
 def test_what_was_screened_before_is_not_asked_again() -> None:
     judge = Scripted([ValueError("asked"), Decision(), Decision(), Decision(Outcome.LIFTED)])
     asked: list[Stage] = []
-    passed = ScreenAnswers().with_decision(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
+    passed = JudgingState().with_decision(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
     verdict = judge_grasp(judge, GRASP, passed, asked.append)
     assert asked == list(Stage)[1:]
     assert verdict.outcome is Outcome.LIFTED and verdict.margins == {"overlap": 0.0}
     assert list(verdict.cpu) == list(Stage) and verdict.cpu[Stage.CLEAR] == 2.5e-5
 
-    rejected = ScreenAnswers().with_decision(
+    rejected = JudgingState().with_decision(
         Stage.CLEAR, Decision(Outcome.COLLISION_TABLE, blocker="table"), 2.5e-5
     )
     verdict = judge_grasp(judge, GRASP, rejected, asked.append)
@@ -142,7 +142,7 @@ class Picky(Scripted):
 
 def test_an_error_while_screening_is_that_of_one_grasp() -> None:
     ids = ("cube-0", "cube-1", "cube-2")
-    grasps = [(Candidate(id, "cube", np.eye(4)), ScreenAnswers()) for id in ids]
+    grasps = [(Candidate(id, "cube", np.eye(4)), JudgingState()) for id in ids]
     screened = screen_grasps(Picky([]), grasps)
     assert [s.outcome for s in screened] == [None, Outcome.SIMULATION_FAILED, None]
     verdict = screened[1].verdict()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from asked import asked
 from inline_executor import Inline
-from known_judge import expected, refuse
+from known_judge import JUDGE_FACTORY, expected, refuse
 from known_many import OPTIONS, run_all, same
 from page_reading import read_page
 
@@ -87,7 +87,7 @@ def test_an_interrupted_call_goes_on(
     again = run_all(scenes, station, tmp_path / "again", executor=rest)
     assert rest.judged == 40 - 17
     assert same(whole.results, again.results)
-    assert [stretch.judged for stretch in again.document.stretches] == [17, 23]
+    assert [session.judged for session in again.document.stretches] == [17, 23]
     nothing = Inline()
     files = {p: p.stat().st_mtime_ns for p in again.path.rglob("*") if p.is_file()}
     run_all(scenes, station, tmp_path / "again", executor=nothing)
@@ -144,17 +144,17 @@ def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
     def judge(scene: Scene, *_):
         return refuse if scene.name == "moved" else made(scene)
 
-    from burg_drake.evaluation import many_scenes, scene_tasks
+    from burg_drake.evaluation import run_preparation, scene_tasks
 
-    made, sound = many_scenes.StationJudgeFactory, scene_tasks.require_sound
+    made, sound = run_preparation.StationJudgeFactory, scene_tasks.require_sound
     monkeypatch.setattr("burg_drake.evaluation.scene_tasks.require_sound", unsound)
-    monkeypatch.setattr("burg_drake.evaluation.many_scenes.StationJudgeFactory", judge)
+    monkeypatch.setattr(JUDGE_FACTORY, judge)
     campaign = run_all(scenes, station, tmp_path / "all")
     assert campaign.failed == {"cubes": "two cubes overlap", "moved": "no such model"}
     assert not campaign.complete and campaign.run("three").complete
     assert summarize(campaign).notes == ("2 scenes could not be judged: cubes, moved",)
     monkeypatch.setattr("burg_drake.evaluation.scene_tasks.require_sound", sound)
-    monkeypatch.setattr("burg_drake.evaluation.many_scenes.StationJudgeFactory", made)
+    monkeypatch.setattr(JUDGE_FACTORY, made)
     mended = run_all(scenes, station, tmp_path / "all", executor=(executor := Inline()))
     assert mended.complete and not mended.failed and executor.judged == 25
 
@@ -165,7 +165,7 @@ def test_of_many_scenes_only_who_asks_gets_reports(
     def reports() -> list[bool]:
         return [run.report_path.exists() for run in campaign.runs]
 
-    monkeypatch.setattr("burg_drake.evaluation.run_document.MAX_SCENES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.run_document.MAX_SCENES_WITH_REPORTS", 2)
     campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
     assert campaign.complete and reports() == [False] * 3
     assert all(run.table_path.exists() for run in campaign.runs)

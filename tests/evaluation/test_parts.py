@@ -45,7 +45,7 @@ def campaign(whole: Campaign, tmp_path: Path, monkeypatch) -> Campaign:
 
 
 def from_journals(campaign: Campaign) -> Columns:
-    tables = [load_run(place.folder).results for place in campaign.places]
+    tables = [load_run(stored.folder).results for stored in campaign.stored_runs]
     names = ("id", "outcome", "slip", "X_OG", "run")
     return {name: np.concatenate([table[name] for table in tables]) for name in names}
 

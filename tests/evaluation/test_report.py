@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_judge import TOPPLED, CrashingJudge, Make
+from known_judge import JUDGE_FACTORY, TOPPLED, CrashingJudge, Make
 from page_reading import part, read_page
 
 from burg_drake.core import Outcome
@@ -70,7 +70,7 @@ def test_failures_are_listed_and_escaped(
     scene, station, tmp_path: Path, judged_here: None, monkeypatch, run: Run
 ) -> None:
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
+    monkeypatch.setattr(JUDGE_FACTORY, lambda *_: judge)
     name = "<script>alert(1)</script> & co"
     moved = dataclasses.replace(scene, path=tmp_path / f"{name}.yaml")
     failed = evaluate(

@@ -32,7 +32,7 @@ from burg_drake.evaluation import (
     evaluate,
     load_campaign,
     part_store,
-    read_journal_tails,
+    read_journal_counts,
     read_status,
     save_run,
 )
@@ -111,9 +111,9 @@ def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatc
     writer = PartWriter(campaign)
     writer.add_new_rows(["cubes", "moved"])
     writer.flush()
-    tails = read_journal_tails(campaign)
+    counts = read_journal_counts(campaign)
     for name in ("cubes", "moved"):
-        assert tails[name].place == (campaign.folder(name) / JOURNAL_FILE).stat().st_size
+        assert counts[name].counted_bytes == (campaign.folder(name) / JOURNAL_FILE).stat().st_size
     told = read_status(campaign.path)
     assert told.outcomes == Counter(campaign.columns(["outcome"])["outcome"].tolist())
     assert told.judged == 40 and told.outcomes["simulation_failed"] == 1

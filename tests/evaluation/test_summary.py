@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_judge import CrashingJudge, Make, expected
+from known_judge import JUDGE_FACTORY, CrashingJudge, Make, expected
 from rich.console import Console
 
 from burg_drake.core import Outcome, Stage, format_duration, wilson_interval
@@ -68,7 +68,7 @@ def test_a_failed_simulation_is_neither_executed_nor_lost_from_the_counts(
     scene, station, tmp_path: Path, judged_here: None, monkeypatch, run: Run
 ) -> None:
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
+    monkeypatch.setattr(JUDGE_FACTORY, lambda *_: judge)
     failed = evaluate(
         scene,
         station,

@@ -51,7 +51,7 @@ class Bundle:
         name: SHA-256 of `data`.
         data: a zip.
         content: `world_content` of scene and station.
-        scene_content, station_content: hash of each, to name the one that differs.
+        scene_content, station_content: hashes of scene and of station, to name what differs.
     """
 
     name: str
@@ -65,7 +65,7 @@ def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundl
     """Packs a scene and a station.
 
     Args:
-        scene, station: what to pack.
+        scene, station: scene and station to pack.
         looks: include materials and textures, which only images need.
 
     Raises:
@@ -141,8 +141,8 @@ def require_same_content(bundle: Bundle, scene: Scene, station: Station) -> None
     """Refuses a scene and station that differ from the packed ones.
 
     Args:
-        bundle: with the hashes; the data are not needed.
-        scene, station: unpacked.
+        bundle: bundle with the hashes; its data are not needed.
+        scene, station: unpacked scene and station.
 
     Raises:
         InvalidInputError: they differ; the message says which.
@@ -215,7 +215,7 @@ class _BundleTree:
         return cls(name(anchor), {name(file): file for file in files}, folders)
 
     def with_visual_files(self) -> _BundleTree:
-        """A copy with the materials and textures that its meshes refer to."""
+        """A copy with the materials and textures that the meshes refer to."""
         beside = {
             (PurePosixPath(name).parent / file.relative_to(path.parent).as_posix()).as_posix(): file
             for name, path in self.files.items()
@@ -258,7 +258,7 @@ class BundledJudgeFactory:
     """A `StationJudgeFactory` whose scene and station are in an unpacked bundle.
 
     Attributes:
-        bundle: its name and hashes, without data.
+        bundle: name and hashes of the bundle, without data.
         engine, mode, settings: as in `StationJudgeFactory`.
         folder: where the bundle is unpacked; set by the worker.
     """

@@ -35,7 +35,7 @@ class DaskExecutor:
     """The workers of a cluster; see `executor.Executor`.
 
     Attributes:
-        client: of `distributed`.
+        client: client of `distributed`.
         limits: limits of the workers' children.
         maintain: called from time to time during the work.
     """

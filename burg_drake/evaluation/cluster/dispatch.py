@@ -34,11 +34,11 @@ def send_bundle(
     """Sends a bundle to workers.
 
     Args:
-        client: of Dask.
-        bundle: with its data.
+        client: client of Dask.
+        bundle: bundle with its data.
         what: purpose of the bundle, for messages.
         deliveries: number of deliveries by the worker's address; updated.
-        addresses: of the workers.
+        addresses: addresses of the workers.
 
     Raises:
         ClusterError: a worker cannot unpack the bundle, or lacks it after several attempts; or the
@@ -74,10 +74,10 @@ class Dispatch:
     """Work of one run on a cluster.
 
     Attributes:
-        client: of Dask.
+        client: client of Dask.
         cluster: the workers.
         chunks_per_thread: chunks that a worker holds per thread, including waiting ones.
-        name: of the plugin that runs tasks on a worker.
+        name: name of the plugin that runs tasks on a worker.
         jobs: jobs with unfinished work.
         sent: chunks that workers have, by the key of their future.
     """
@@ -92,7 +92,7 @@ class Dispatch:
         self.jobs: list[ClusterJob] = []
         self.sent: dict[str, SentChunk] = {}
         self._maintain = maintain
-        self._coming: Iterator[ClusterJob | None] = iter(())
+        self._remaining_jobs: Iterator[ClusterJob | None] = iter(())
         self._exhausted = False
         self._answering: set[str] = set()
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -109,7 +109,7 @@ class Dispatch:
         Raises:
             ClusterError: a worker has other software versions, or the scheduler is lost.
         """
-        self._coming = jobs
+        self._remaining_jobs = jobs
         self.begin()
         try:
             while True:
@@ -130,7 +130,7 @@ class Dispatch:
         meanwhile are ignored.
 
         Raises:
-            ClusterError: as `ClusterWorkers.update`.
+            ClusterError: see `ClusterWorkers.update`.
         """
         retry_interval = 1.0  # Seconds between attempts.
         for attempt in range(1, DELIVERY_ATTEMPTS + 1):
@@ -190,7 +190,7 @@ class Dispatch:
         """Gives workers as many chunks as they have room for, the least loaded workers first.
 
         Args:
-            addresses: of the workers; others are left alone.
+            addresses: addresses of the workers; other workers get no chunks.
 
         Yields:
             Results of items that cannot be sent.
@@ -226,7 +226,7 @@ class Dispatch:
 
     def open_next_job(self) -> ClusterJob | None:
         """The next job, if one is ready."""
-        for job in self._coming:
+        for job in self._remaining_jobs:
             if job is not None:  # None: no job is ready yet
                 self.jobs.append(job)
             return job
@@ -319,7 +319,7 @@ class Dispatch:
         """The answer of a task that has ended; None if it was cancelled.
 
         Raises:
-            KilledWorker: its worker was lost.
+            KilledWorker: the worker of the chunk was lost.
             OSError: the answer does not arrive within the time-out; see `retry_answer`.
             ClusterError: the task failed.
         """

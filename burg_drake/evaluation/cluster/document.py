@@ -178,7 +178,7 @@ def require_safe_address(address: str, prefix: str = "") -> None:
     """Refuses an address at which others could eavesdrop or run code.
 
     Args:
-        address: where a scheduler or a worker listens.
+        address: address at which a scheduler or a worker listens.
         prefix: names the connected scheduler or worker in messages; an `inproc://` address is
             accepted with it.
 
@@ -223,8 +223,8 @@ def start_jobqueue(document: ClusterDocument, security: Any) -> Any:
     """Starts a scheduler here and asks the batch system for workers.
 
     Args:
-        document: with a `jobqueue`.
-        security: of the document's TLS files; None for temporary certificates.
+        document: document with a `jobqueue`.
+        security: security with the document's TLS files; None for temporary certificates.
 
     Returns:
         The cluster of dask-jobqueue.

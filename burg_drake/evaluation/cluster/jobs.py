@@ -21,7 +21,15 @@ from burg_drake.evaluation.cluster.worker_tasks import (
     ClusterTask,
     GraspChunk,
 )
-from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, WorkerLimits
+from burg_drake.evaluation.executor import (
+    Job,
+    JobFailed,
+    JudgedGrasp,
+    OnFailure,
+    WorkerLimits,
+    hopeless_error,
+    report_failure,
+)
 
 
 class ChunkSettings:
@@ -36,10 +44,10 @@ class ClusterWorker:
     """A worker.
 
     Attributes:
-        address: its network address.
+        address: network address of the worker.
         threads: number of chunks that it processes at a time.
         chunks: chunks sent to it, oldest first.
-        job: its current job.
+        job: current job of the worker.
     """
 
     address: str
@@ -62,7 +70,7 @@ class SentChunk:
         items: grasps, or the argument of the call.
         losses: workers lost so far at the chunk's only item.
         worker: the worker.
-        future: of Dask.
+        future: future of Dask.
         done: whether the worker has finished; the answer is lost if the worker is lost now.
     """
 
@@ -84,7 +92,7 @@ class ClusterJob(ABC):
         suspects: items at which a worker was lost, with the number of lost workers; each is sent
             alone.
         sent: number of chunks held by workers.
-        failed: whether it is given up.
+        failed: whether the job is given up.
         deliveries: number of deliveries of the bundle by the worker's address.
     """
 
@@ -158,8 +166,8 @@ class ClusterJob(ABC):
 
         Args:
             chunk: the worker's chunk.
-            items: those of the chunk; all if None.
-            what: what the last workers did, as the failure's reason names it.
+            items: items of the chunk to take back; all if None.
+            what: verb phrase for what the last workers did, for the reason of the failure.
 
         Yields:
             Results of items at which too many workers were lost.
@@ -209,7 +217,7 @@ class GraspJob(ClusterJob):
         """See `ClusterJob.task`."""
         return GraspChunk(run, self._recipe.bundle, self._recipe, tuple(items), self._limits)
 
-    def read_answer(self, chunk: SentChunk, answer: ChunkAnswers) -> Iterator[Answer]:
+    def read_answer(self, chunk: SentChunk, answer: ChunkAnswers) -> Iterator[JudgedGrasp]:
         """See `ClusterJob.read_answer`; the job fails after too many crashes in a row."""
         judged = set()
         for place, verdict in answer.verdicts:
@@ -217,18 +225,13 @@ class GraspJob(ClusterJob):
             yield self.job, chunk.items[place], verdict
             self.crashes_in_a_row = self.crashes_in_a_row + 1 if place in answer.crashing else 0
             if self.crashes_in_a_row >= self._limits.hopeless:
-                self.fail(
-                    SimulationError(
-                        f"{self._limits.hopeless} grasps in a row could not be simulated;"
-                        f" the reason of the last one: {verdict.reason}"
-                    )
-                )
+                self.fail(hopeless_error(self._limits, verdict.reason))
         if answer.error is not None:
             self.fail(answer.error)
-        open_ones = [grasp for k, grasp in enumerate(chunk.items) if k not in judged]
-        yield from self.retry_alone(chunk, open_ones, "gave no answer about it")
+        left = [grasp for k, grasp in enumerate(chunk.items) if k not in judged]
+        yield from self.retry_alone(chunk, left, "gave no answer about it")
 
-    def failure(self, item: Candidate, error: BurgError) -> Answer:
+    def failure(self, item: Candidate, error: BurgError) -> JudgedGrasp:
         """See `ClusterJob.failure`."""
         failed = Outcome.SIMULATION_FAILED
         return self.job, item, Verdict(failed, Stage.CLEAR, reason=str(error), interrupted=True)
@@ -238,13 +241,6 @@ class GraspJob(ClusterJob):
         if not self.failed:
             self.give_up()
             report_failure(JobFailed(self.job, error), self._on_failure)
-
-
-def report_failure(failure: JobFailed, on_failure: OnFailure | None) -> None:
-    """Passes the failure of a job to `on_failure`; raises its error if that is None."""
-    if on_failure is None:
-        raise failure.error
-    on_failure(failure)
 
 
 def grasp_jobs(

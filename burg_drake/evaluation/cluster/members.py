@@ -169,7 +169,7 @@ def lost_scheduler_error(client: Any) -> ClusterError:
 
 
 def check_versions(client: Any, addresses: Iterable[str]) -> list[str]:
-    """Checks the versions of workers; returns the addresses of those that still run.
+    """Checks the versions of workers; returns the addresses of the workers that still run.
 
     Raises:
         ClusterError: a worker has other versions, or the scheduler is lost.

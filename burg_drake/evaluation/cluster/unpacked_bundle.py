@@ -94,12 +94,12 @@ def _remove_unused(every: Path) -> None:
 
 @dataclass(frozen=True)
 class JudgeRecipe:
-    """Builds a judge; a factory that is unpickled where it is called.
+    """Pickled factory of a judge, unpickled where it is called.
 
     Attributes:
         make_judge: a factory, pickled.
         bundle: name of the bundle that the factory needs; empty if none.
-        folder: the bundle's folder on this machine.
+        folder: folder of the bundle on this machine.
     """
 
     make_judge: bytes

@@ -30,7 +30,7 @@ class TaskAnswer:
         missing: whether the task was not run because the bundle is not on this machine.
         ended: whether the task was not run to its end because the worker closes or the run has
             ended.
-        error: what the call raised, how its process ended, or why the judge could not be built.
+        error: error of the call, end of its process, or reason why the judge could not be built.
     """
 
     missing: bool = False
@@ -43,7 +43,7 @@ class ChunkAnswers(TaskAnswer):
     """Verdicts of a chunk.
 
     Attributes:
-        verdicts: in the order of completion, with the index of the grasp in the chunk.
+        verdicts: index in the chunk and verdict of each grasp, in the order of completion.
         crashing: indices of the grasps at which the child crashes.
     """
 
@@ -147,7 +147,7 @@ class Supervisor(WorkerPlugin):
     They end with the run, or after a while without work.
 
     Attributes:
-        name: of the run.
+        name: name of the plugin; see `Dispatch.name`.
     """
 
     def __init__(self, name: str) -> None:

@@ -32,7 +32,7 @@ from burg_drake.evaluation.grasp_sets.sampling import (
     approach_cone_from_above,
     shortfall_note,
 )
-from burg_drake.evaluation.judge import arm_reach, hand_alone
+from burg_drake.evaluation.judge import arm_reach, build_hand_clearance
 from burg_drake.evaluation.settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
 from burg_drake.motion import Reach, reach_without_objects
 from burg_drake.objects import ObjectLibrary
@@ -63,12 +63,12 @@ def object_grasps(
     `sample_grasps` with fewer tries; uses the user's cache.
 
     Args:
-        library: has the object.
-        object: its name.
-        X_WO: (4, 4) its pose; position and turn about the vertical do not matter.
-        station: has hand and table.
+        library: library with the object.
+        object: name of the object.
+        X_WO: (4, 4) pose of the object; position and turn about the vertical do not matter.
+        station: station with hand and table.
         n: number of grasps.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
 
     Raises:
         InvalidInputError: n is below 1.
@@ -95,8 +95,9 @@ def object_grasps(
 
 
 def _upright_pose(down_O: Array, height: float) -> Array:
-    """(4, 4) pose of an object whose direction (3,) points straight down; its turn about the
-    vertical is arbitrary but fixed.
+    """(4, 4) pose of an object in which the direction `down_O` (3,) points straight down.
+
+    The turn about the vertical is arbitrary but fixed.
     """
     turn, _ = Rotation.align_vectors([(0.0, 0.0, -1.0)], [down_O])
     return make_pose(turn.as_matrix(), (0.0, 0.0, height))
@@ -111,19 +112,19 @@ def _sample_alone(
     placed = Instance(object=object, X_SO=Pose.from_matrix(X_WO))
     document = SceneDocument(name=object, library=str(library.root), instances=(placed,))
     alone = Scene(document, library, library.root)
-    screen, _ = hand_alone(alone, bare)
+    screen, _ = build_hand_clearance(alone, bare)
     # 40 antipodal grasps are tried for each wanted one, which bounds the time to a second
     sampler = ObjectSampler(library, station, 40 * n, seed, SamplingSettings())
-    tried = sampler(object, approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG))
-    test = sampler.clear_test(object, screen, object, X_WO)
+    tried = sampler.sample(object, approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG))
+    accept = sampler.clearance_filter(object, screen, object, X_WO)
     rows = np.empty(0, dtype=np.intp)
     first = 0
     while len(rows) < n and first < len(tried):
-        some = tried.X_OG[first : first + 256]
-        rows = np.append(rows, first + np.flatnonzero(test(some)))
-        first += len(some)
+        batch = tried.X_OG[first : first + 256]
+        rows = np.append(rows, first + np.flatnonzero(accept(batch)))
+        first += len(batch)
     rows = rows[:n]
-    provenance = {**tried.provenance, "tried": first, "blocked": dict(test.blocked)}
+    provenance = {**tried.provenance, "tried": first, "blocked": dict(accept.blocked)}
     note = shortfall_note(object, n, {**provenance, "target": object}, len(rows)).encode()
     return {
         "X_OG": tried.X_OG[rows],
@@ -146,9 +147,9 @@ class GraspCount:
         sampled: sampled grasps, free of collisions when the object stands alone on the table.
         clear: sampled grasps at which the open hand overlaps nothing in the scene.
         reachable: clear grasps that the arm can execute all the way; None if it was not checked.
-        in_the_way: counts of the other grasps by blocker, most first: instances, obstacles of the
-            station, `table`, or `ARM_LIMITS`. Of several blockers, the one counts that would also
-            block in an emptier scene.
+        in_the_way: counts of the blocked grasps by blocker, most frequent first: instances,
+            obstacles of the station, `table`, or `ARM_LIMITS`. Of several blockers of a grasp, the
+            one counts that would also block in an emptier scene.
         note: reason for fewer sampled grasps than requested; "" if there are enough.
     """
 
@@ -160,7 +161,7 @@ class GraspCount:
 
     @property
     def good(self) -> int:
-        """Reachable grasps; clear grasps if no arm was checked."""
+        """Number of reachable grasps; of clear grasps if no arm was checked."""
         return self.clear if self.reachable is None else self.reachable
 
 
@@ -187,7 +188,7 @@ def count_grasps(
         motion: approach and retreat of the hand; the station's if None.
         exact: whether Drake's collision checker confirms each reachable grasp. Without this it
             takes half the time, and about one grasp in a hundred is counted wrong. See `reach`.
-        seed: of the samples.
+        seed: seed of the samples.
 
     Returns:
         Counts by instance, in the scene's order.
@@ -224,8 +225,9 @@ def grasp_counts(
     exact: bool = True,
     seed: int = 0,
 ) -> Iterator[tuple[str, GraspCount]]:
-    """Yields the hand's counts of all objects first, with `reachable` None; then the counts of each
-    object again after the arm was checked.
+    """Yields the counts of each object for the hand, then again for hand and arm.
+
+    The counts for the hand of all objects come first, with `reachable` None.
 
     Args:
         scene, station, grasps_per_object, reach, motion, exact, seed: see `count_grasps`.
@@ -236,13 +238,13 @@ def grasp_counts(
 
     Raises:
         InvalidInputError, UnknownNameError, MeshError: see `count_grasps`; a collision of the arm
-            at home is found after the hand's counts.
+            at home is found after the counts for the hand.
     """
     if grasps_per_object < 1:
         raise InvalidInputError(f"grasps per object is {grasps_per_object}; give 1 or more")
     if not names:
         return
-    hand, X_WO = hand_alone(scene, station)
+    hand, X_WO = build_hand_clearance(scene, station)
     placed = []
     for name in names:
         object = scene.instance(name).object
@@ -258,13 +260,13 @@ def grasp_counts(
     for name, grasps, X_WG, blocker in placed:
         clear = np.flatnonzero(blocker == "")
         verdicts = arm.check_all([name] * len(clear), X_WG[clear], grasps.width[clear])
-        hindrance = blocker.copy()
-        hindrance[clear] = [_blocker_of(verdict, others) for verdict in verdicts]
-        yield name, _count_object(grasps, blocker, hindrance)
+        any_blocker = blocker.copy()
+        any_blocker[clear] = [_blocker_of(verdict, others) for verdict in verdicts]
+        yield name, _count_object(grasps, blocker, any_blocker)
 
 
 def _blocker_of(verdict: Reach, others: set[str]) -> str:
-    """The body or limit that hinders the arm; "" if none."""
+    """The body or limit that blocks the arm; "" if none."""
     if verdict.outcome is None:
         return ""
     body = verdict.blocker.rpartition(" vs ")[2]
@@ -272,16 +274,20 @@ def _blocker_of(verdict: Reach, others: set[str]) -> str:
 
 
 def _count_object(
-    grasps: ObjectGrasps, blocker: Blockers, hindrance: Blockers | None
+    grasps: ObjectGrasps, hand_blocker: Blockers, any_blocker: Blockers | None
 ) -> GraspCount:
-    """Counts from the blockers of the hand (N,) and the hindrances of the arm (N,); the latter None
-    if the arm was not checked.
+    """Counts grasps by what blocks them.
+
+    Args:
+        grasps: N grasps of the object.
+        hand_blocker: (N,) blocker of the hand; "" if none.
+        any_blocker: (N,) blocker of hand or arm; None if the arm was not checked.
     """
-    last = blocker if hindrance is None else hindrance
+    last = hand_blocker if any_blocker is None else any_blocker
     return GraspCount(
-        sampled=len(blocker),
-        clear=int((blocker == "").sum()),
-        reachable=None if hindrance is None else int((hindrance == "").sum()),
+        sampled=len(hand_blocker),
+        clear=int((hand_blocker == "").sum()),
+        reachable=None if any_blocker is None else int((any_blocker == "").sum()),
         in_the_way=dict(Counter(name for name in last.tolist() if name).most_common()),
         note=grasps.note,
     )
@@ -292,12 +298,12 @@ def within_reach(scene: SceneLike, station: StationLike) -> tuple[str, ...]:
 
     An object is within reach if the arm can execute one of 24 sampled grasps from home to the end
     of the lift, among the station's obstacles but without other objects; so the answer does not
-    change when others are moved. Collisions of the carried object are ignored. An object without
-    collision-free grasps is out of reach. `count_grasps` counts what other objects block.
+    change when other objects are moved. Collisions of the carried object are ignored. An object
+    without collision-free grasps is out of reach. `count_grasps` counts what other objects block.
 
     Args:
         scene: the scene; objects may overlap.
-        station: with an arm, which is prepared once per process for the same `Station`.
+        station: station with an arm; the arm is prepared once per process for the same `Station`.
 
     Returns:
         Names of free instances out of reach, in the scene's order.
@@ -322,8 +328,8 @@ def _is_within_reach(scene: Scene, object: str, X_WO: Array, station: Station) -
     grasps = object_grasps(scene.library, object, X_WO, station, 24)
     X_WG = X_WO @ grasps.X_OG
     # for most objects one of the first few is reachable
-    for some in (slice(0, 2), slice(2, 6), slice(6, 12), slice(12, 24)):
-        found = reach.check_all([""] * len(X_WG[some]), X_WG[some], grasps.width[some])
+    for batch in (slice(0, 2), slice(2, 6), slice(6, 12), slice(12, 24)):
+        found = reach.check_all([""] * len(X_WG[batch]), X_WG[batch], grasps.width[batch])
         if any(verdict.outcome is None for verdict in found):
             return True
     return False
@@ -336,7 +342,7 @@ def clear_grasp_counts(
 
     Args:
         scene: the scene; objects may overlap.
-        station: has the hand.
+        station: station with the hand.
         grasps_per_object: number of grasps sampled for each object.
 
     Returns:

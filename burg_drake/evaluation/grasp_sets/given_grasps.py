@@ -52,8 +52,8 @@ def require_near(
     """Refuses grasps if all grasps of an object are far from it.
 
     Args:
-        grasps: in the frames of their objects; objects missing from the library are ignored.
-        library: has the objects.
+        grasps: grasps in their objects' frames; objects missing from the library are ignored.
+        library: library with the objects.
         source: origin of the grasps, for the message.
         is_file: whether the origin is a file, whose object names the user can map.
 
@@ -123,11 +123,8 @@ def _distance_between_fingers(scene: Scene, name: str, X_SG: Array, gripper: Gri
     X_OG = inverse(scene.X_SO(name)) @ X_SG
     reach = gripper.opening[1] / 2.0
     nearest = np.full(len(X_OG), np.inf)
-    for height in (
-        0.0,
-        1.0,
-        -1.0,
-    ):  # grasp point, finger tips, and as far behind, in units of the tips' reach
+    # at the grasp point, at the finger tips, and as far behind, in units of `gripper.tip`
+    for height in (0.0, 1.0, -1.0):
         origins = X_OG[:, :3, 3] + height * gripper.tip * X_OG[:, :3, 2]
         for side in (1.0, -1.0):
             _, along = rays.first_hits(origins, side * X_OG[:, :3, 0], reach)
@@ -155,7 +152,7 @@ def group_by_instance(
     Args:
         scene: the scene.
         grasps: N grasps, whose own poses and objects are ignored.
-        X_SG: (N, 4, 4) their poses in the scene frame.
+        X_SG: (N, 4, 4) poses of the grasps in the scene frame.
         owner: (N,) names of instances.
     """
     sets = {}
@@ -174,8 +171,8 @@ def join_in_frame(scene: Scene, grasps: Mapping[str, GraspSet], X_SF: Array) -> 
 
     Args:
         scene: the scene.
-        grasps: in the frames of their objects, by name of an instance.
-        X_SF: (4, 4) the frame in the scene frame: of a camera, or the identity.
+        grasps: grasps in the frames of their objects, by name of an instance.
+        X_SF: (4, 4) pose of the frame F in the scene frame: of a camera, or the identity.
 
     Returns:
         The grasps with the column `instance`; `X_OG` holds poses in F.
@@ -236,9 +233,9 @@ def read_grasps(
 ) -> GivenGrasps:
     """Reads a grasp file and gives each grasp to an instance of the scene.
 
-    Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
-    are measured in the frame of their object go to every instance of it. Grasps in one common
-    frame, a camera's or a world's, go to the instance that they hold; see `held_instances`.
+    Grasps of a file that names instances, such as `grasps.npz` of a run, stay on these instances.
+    Grasps in the frame of their object go to every instance of the object. Grasps in one common
+    frame, of a camera or a world, go to the instance that they hold; see `held_instances`.
 
     Example::
 
@@ -252,12 +249,12 @@ def read_grasps(
         format: format of the file; None to detect it by content. A `FileReading` also corrects
             mistakes.
         objects: names of the scene's objects, or of its instances, by the names that the file has;
-            a name by the empty text is for all grasps.
+            a name under the empty text is for all grasps.
         frame: reference frame of the poses, in place of the format's.
         X_SF: (4, 4) pose of the file's camera, or of its world, in the scene frame; a world is the
             scene frame if None.
         object_ids: names of instances by the file's object ids.
-        scene_id: the one to take of a file of several scenes.
+        scene_id: scene whose grasps are read from a file of several scenes.
 
     Raises:
         InvalidInputError: the file cannot be read, or the objects of its grasps are unknown.
@@ -323,8 +320,8 @@ def group_by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
 
     Args:
         scene: the scene.
-        grasps: with a column `instance` they stay on the named instances; else they go to every
-            instance of their object.
+        grasps: grasps, which stay on the instances in their column `instance`; without that column
+            they go to every instance of their object.
 
     Returns:
         The grasps by name of an instance, for `given_candidates`.
@@ -337,7 +334,7 @@ def group_by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
 
 
 def _group_by_file_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
-    """As `group_by_names`, for grasps of a file with its names of objects."""
+    """Like `group_by_names`, for a file with its own names of objects."""
     on_instances = INSTANCE_COLUMN in grasps.columns and not names.given
     found = split_by_instance(grasps) if on_instances else _group_by_objects(grasps, names)
     require_instances(names.scene, found, names.path)
@@ -403,9 +400,9 @@ def _find_owners(
     names.require_used([""])
     among = names.instances_of("") if names.given else None
     owner = _named_owners(grasps, names, object_ids)
-    open_ = owner == ""
+    unnamed = owner == ""
     held = np.ones(len(owner), dtype=bool)
-    owner[open_], held[open_] = held_instances(names.scene, X_SG[open_], gripper, among)
+    owner[unnamed], held[unnamed] = held_instances(names.scene, X_SG[unnamed], gripper, among)
     return owner.astype(str), held
 
 
@@ -477,7 +474,7 @@ class SeenScene:
         X_SF: (4, 4) pose in the scene frame of the camera, or of a world that is not the scene
             frame.
         object_ids: names of instances by the file's object ids.
-        scene_id: the one to take of a file of several scenes.
+        scene_id: scene whose grasps are read from a file of several scenes.
         correction: corrections of mistakes in the file, see `pose_mistakes`.
     """
 
@@ -498,15 +495,15 @@ def read_in_frame(
     objects: Mapping[str, str] | None = None,
     seen: SeenScene | None = None,
 ) -> ImportedGrasps:
-    """Reads grasps and converts them to another frame, with a scene if necessary.
+    """Reads grasps, converted to another frame, with a scene if necessary.
 
     Args:
         path: the file, or the folder of a run.
         wanted: the new frame; in object frames, grasps get the column `instance`.
-        gripper: the hand that they are for.
-        format: of the file; None to tell by the content.
-        frame: reference frame of its poses, in place of the format's.
-        objects: new names of objects by the file's names; a name by the empty text is for all.
+        gripper: the hand that the grasps are for.
+        format: format of the file; None to detect it by content.
+        frame: reference frame of the poses in the file, in place of the format's.
+        objects: new names of objects by the file's names; a name under the empty text is for all.
         seen: the scene, as far as known.
 
     Raises:
@@ -554,8 +551,8 @@ def read_in_frame(
             for name, part in placed.by_instance.items()
         ]
         return ImportedGrasps(GraspSet.concatenate(named), wanted, placed.notes)
-    X_SX = make_pose() if seen.X_SF is None else seen.X_SF
-    grasps = _add_object_ids(join_in_frame(seen.scene, placed.by_instance, X_SX), seen.object_ids)
+    X_SF = make_pose() if seen.X_SF is None else seen.X_SF
+    grasps = _add_object_ids(join_in_frame(seen.scene, placed.by_instance, X_SF), seen.object_ids)
     return ImportedGrasps(grasps, wanted, placed.notes)
 
 

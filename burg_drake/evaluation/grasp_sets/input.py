@@ -50,7 +50,7 @@ def set_documents(
     """Documents, their content, and versions of the software, as JSON values.
 
     Args:
-        library: has the objects.
+        library: library with the objects.
         scene: scene of the objects, named in place of the library.
         station: station with the hand.
         objects: names of the objects with grasps.
@@ -294,8 +294,9 @@ class RankedGrasps:
 
 
 def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
-    """Ranks grasps of a run: lifted ones as in `Run.best`, then by outcome group in the order of
-    legends: held before lost before not executed.
+    """Ranks grasps of a run: lifted ones as in `Run.best`, then all others by outcome group.
+
+    The groups have the order of the legends: held, lost, not executed.
 
     Args:
         run: the run.
@@ -305,11 +306,11 @@ def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
     best = [row[id] for id in run.best(len(row))]
     outcomes = grasps.column("outcome").tolist()
     groups = [outcome_group(Outcome(text) if text else None) for text in outcomes]
-    places = [
+    ranks = [
         OUTCOME_GROUPS.index(group) if group in OUTCOME_GROUPS else len(OUTCOME_GROUPS)
         for group in groups
     ]
-    rest = np.argsort(places, kind="stable")
+    rest = np.argsort(ranks, kind="stable")
     order = np.concatenate([np.array(best, dtype=np.int64), rest[~np.isin(rest, best)]])
     return RankedGrasps(order, "outcome, lifted ones by the room around the hand")
 
@@ -325,12 +326,12 @@ def rank_by_score(grasps: GraspSet) -> RankedGrasps:
 
 
 def best_of_each(
-    holder: NDArray[np.str_], among: NDArray[np.bool_], ranking: RankedGrasps, most: int | None
+    owner: NDArray[np.str_], among: NDArray[np.bool_], ranking: RankedGrasps, most: int | None
 ) -> list[int]:
     """The best grasps of each object, best first; evenly spaced ones if there is no ranking.
 
     Args:
-        holder: (N,) object or instance of each grasp.
+        owner: (N,) object or instance of each grasp.
         among: (N,) which grasps to choose from.
         ranking: ranking of all N grasps.
         most: maximum number for each object; all if None.
@@ -339,11 +340,11 @@ def best_of_each(
         Indices of the grasps, object by object in the order of the set.
     """
     chosen: list[int] = []
-    for name in dict.fromkeys(holder[among].tolist()):
-        members = ranking.order[(among & (holder == name))[ranking.order]]
+    for name in dict.fromkeys(owner[among].tolist()):
+        members = ranking.order[(among & (owner == name))[ranking.order]]
         count = len(members) if most is None else min(len(members), most)
-        places = range(count) if ranking.by else (k * len(members) // count for k in range(count))
-        chosen += [int(members[k]) for k in places]
+        picked = range(count) if ranking.by else (k * len(members) // count for k in range(count))
+        chosen += [int(members[k]) for k in picked]
     return chosen
 
 

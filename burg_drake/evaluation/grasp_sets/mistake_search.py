@@ -55,7 +55,7 @@ class MistakeLimits:
     min_share_about = 0.9  # The same for turns about the closing direction, and above max_closing.
     min_gain = 2.5  # Minimum ratio of fitting grasps after to before the correction.
     min_gained = 10  # Minimum number that fit only after, where more fit before.
-    max_lost_share = 0.1  # Maximum ratio to that of grasps that fit only before.
+    max_lost_share = 0.1  # Maximum ratio of grasps that fit only before to those only after.
     max_closing = 0.4  # Above this share of closing pads, grasps may be right and only poor.
     min_fitting_closing = 8  # Minimum number that fit after the correction above max_closing.
     tie_ratio = 0.9  # Mistakes are equally good if the ratio of their counts is above this.
@@ -82,7 +82,7 @@ def find_mistake(
     """Finds the common pose mistake of a grasp set, if it has one.
 
     Args:
-        grasps: in the frames of their objects, by instance of the scene or by object of the
+        grasps: grasps in the frames of their objects, by instance of the scene or by object of the
             library. Their provenance says how a file was read.
         station: station with the hand.
         source: scene or library of the objects.
@@ -140,14 +140,15 @@ def mistake_notes(
 
 
 def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...]:
-    """The same notes for a run on given grasps, each with the command that evaluates the
-    corrected grasps on its own line; none for sampled grasps.
+    """The notes of `mistake_notes` on the given grasps of a run; none for sampled grasps.
+
+    A line below each note has the command that evaluates the corrected grasps.
 
     Pose mistakes are searched only if both fingers missed the object at more than a few grasps.
 
     Args:
-        run: of one scene.
-        asked: run of the repeated command, of this scene or of many; `run` if None.
+        run: run of one scene.
+        asked: run whose command is repeated, of this scene or of many; `run` if None.
     """
     if run.document.grasps.origin != "given":
         return ()
@@ -170,8 +171,10 @@ def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...
 
 
 def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
-    """The same notes for a run over many scenes with grasps from one file: those of the first scene
-    with a mistake, among a few scenes where the fingers often did not touch the object.
+    """The notes of `given_hints` on a run over many scenes with grasps from one file.
+
+    They are those of the first scene with a mistake, among the few scenes at which the fingers most
+    often missed the object.
     """
     if campaign.document.grasps.origin != "given":
         return ()
@@ -179,8 +182,8 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
     codes, texts = rows.codes("outcome")
     missed = ~np.isin(texts, CONTACT_OUTCOMES)[codes]
     by_scene = np.bincount(rows.run[missed], minlength=len(campaign.names))
-    for place in np.argsort(-by_scene, kind="stable")[: MistakeLimits.max_scenes].tolist():
-        name = campaign.names[place]
+    for k in np.argsort(-by_scene, kind="stable")[: MistakeLimits.max_scenes].tolist():
+        name = campaign.names[k]
         with contextlib.suppress(BurgError):
             hints = given_hints(load_run(campaign.folder(name)), campaign)
             if hints:
@@ -189,8 +192,9 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _repeat_command(run: Run | Campaign, options: Sequence[str]) -> str:
-    """The command that evaluates again with further options, into another folder, as the first one
-    keeps its verdicts.
+    """The command that evaluates again with further options.
+
+    It writes to another folder, as the first folder keeps its verdicts.
     """
     words = shlex.split(run.document.command)
     if not options or words[:2] != ["burg-drake", "evaluate"] or not _has_grasp_file(words):
@@ -279,7 +283,7 @@ class _MistakeSearch:
         return len(self._name)
 
     def mistakes(self) -> list[Mistake]:
-        """Mistakes that are possible for these grasps."""
+        """Mistakes that are possible for the examined grasps."""
         # A camera's optical frame (OpenCV) in its body frame (ROS, x forward).
         optical_rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
         found = usual_mistakes(self.format, self._gripper)
@@ -302,8 +306,11 @@ class _MistakeSearch:
         return found
 
     def fits(self, mistakes: Sequence[Mistake]) -> tuple[Fits, Fits | None]:
-        """(K + 1, N) which grasps fit their object as read and after each correction, and which of
-        these are also clear of the rest of the scene.
+        """Which grasps fit their object as read (row 0) and after each of K corrections.
+
+        Returns:
+            (K + 1, N) which grasps fit, and which also are clear of the rest of the scene; the
+            latter None without a scene.
         """
         meant = [self._X_MG, *(self._corrected_poses(mistake) for mistake in mistakes)]
         placed = self._in_object_frames(np.stack(meant))
@@ -338,7 +345,7 @@ class _MistakeSearch:
         return correct_poses(self._X_MG, self._X_GF, mistake.correction)
 
     def _in_object_frames(self, X_MG: Array) -> list[tuple[Owners, Array]]:
-        """Instances or objects of grasps (K, N, 4, 4) in M, and the grasps in their frames."""
+        """Instances or objects of grasps (K, N, 4, 4) in M, and the grasps in object frames."""
         if self._X_SM is None or self._scene is None:
             return [(self._name, X) for X in X_MG]
         X_SG = (self._X_SM @ X_MG).reshape(-1, 4, 4)
@@ -394,8 +401,8 @@ class _MistakeSearch:
         nearly_all = n >= MistakeLimits.min_share_about * self.count
         return enough and mistake.changes_reading and nearly_all
 
-    def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
-        """Titles of other formats with the grasp frame of the corrected grasps."""
+    def formats_alike(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
+        """Other formats with the grasp frame of the corrected grasps."""
         if not mistake.moves_frame:
             return ()
         X_GF = self.format.X_GF(self._gripper)
@@ -518,20 +525,20 @@ def _choose_mistake(
     chosen = good[0] if good else next(m for m in count if count[m] == best)
     reach = None
     if chosen.forward and chosen.moves_frame:
-        run = _adjacent_mistakes(chosen, count, MistakeLimits.tie_ratio * best)
-        known = [m for m in count if m in run and not m.step and m.forward]
-        middle = 0.5 * (run[0].forward + run[-1].forward)
-        chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))
-        reach = (run[0].forward, run[-1].forward)
-    likeness = search.likeness(chosen)
+        adjacent = _adjacent_mistakes(chosen, count, MistakeLimits.tie_ratio * best)
+        known = [m for m in count if m in adjacent and not m.step and m.forward]
+        middle = 0.5 * (adjacent[0].forward + adjacent[-1].forward)
+        chosen = known[0] if known else min(adjacent, key=lambda m: abs(m.forward - middle))
+        reach = (adjacent[0].forward, adjacent[-1].forward)
+    alike = search.formats_alike(chosen)
     return MistakeFound(
         chosen,
         before,
         count[chosen],
         search.count,
         search.total,
-        likeness=tuple(format.title for format in likeness),
-        format=_other_reader(search.format.name, [format.name for format in likeness]),
+        likeness=tuple(format.title for format in alike),
+        format=_other_reader(search.format.name, [format.name for format in alike]),
         alternatives=tuple(
             m.words
             for m in good
@@ -545,7 +552,7 @@ def _choose_mistake(
 def _adjacent_mistakes(
     chosen: Mistake, count: Mapping[Mistake, int], least: float
 ) -> list[Mistake]:
-    """Mistakes with the same turn and neighbouring distances that fit about as well."""
+    """Mistakes with the same turn and adjacent distances whose corrections fit about as well."""
     same = [m for m in count if m.moves_frame and m.turn == chosen.turn]
     line = sorted(same, key=lambda mistake: mistake.forward)
     low = high = line.index(chosen)
@@ -565,7 +572,7 @@ def _other_reader(name: str, others: Sequence[str]) -> str:
 
 
 def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str, GraspSet]:
-    """The grasps of one instance per object, as all instances of an object get the same grasps."""
+    """The grasps of one instance of each object, as all its instances get the same grasps."""
     chosen: dict[str, str] = {}
     for name in grasps:
         chosen.setdefault(scene.instance(name).object, name)
@@ -588,8 +595,10 @@ def _spread_rows(grasps: Mapping[str, GraspSet]) -> dict[str, NDArray[np.int64]]
 
 
 def _promising_rows(grasps: GraspSet) -> NDArray[np.int64]:
-    """Rows of promising grasps: successes if scores are 0 and 1, else the half with the highest
-    scores, if these are enough. Data sets contain failures, and networks predict poor grasps.
+    """Rows of promising grasps; data sets contain failures, and networks predict poor grasps.
+
+    Promising are the successes, if all scores are 0 or 1 and enough are 1; else the half with the
+    highest scores, but at least `MistakeLimits.max_grasps`.
     """
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
     success = score == 1.0

@@ -26,7 +26,7 @@ from burg_drake.core import (
 from burg_drake.evaluation.candidates import INSTANCE_COLUMN
 from burg_drake.evaluation.grasp_sets.input import object_files, set_documents
 from burg_drake.evaluation.grasp_sets.sampling import sample_library, sample_on_scene
-from burg_drake.evaluation.judge import hand_alone
+from burg_drake.evaluation.judge import build_hand_clearance
 from burg_drake.evaluation.settings import SamplingSettings
 from burg_drake.geometry import Surface
 from burg_drake.grasping import (
@@ -54,7 +54,7 @@ def sample_grasps(
     settings: SamplingSettings | None = None,
     only: Iterable[str] | None = None,
 ) -> GraspSet:
-    """Samples antipodal grasps on the free objects of a scene, or on those of a library.
+    """Samples antipodal grasps on the free objects of a scene, or on the objects of a library.
 
     Example::
 
@@ -110,7 +110,7 @@ def sampled_set(
 
     Args:
         sampled: grasps by name of the instance, or of the object without a scene; one or more.
-        library: has the objects.
+        library: library with the objects.
         scene: scene of the objects, if any; the set then has the column `instance`.
         station, n, seed, settings: arguments of `sample_on_scene` or `sample_library`.
 
@@ -168,8 +168,8 @@ def scored_set(
         best = scored.select(scored.score.argsort()[::-1][:10])
 
     Args:
-        grasps: in the frames of their objects.
-        library: has the objects.
+        grasps: grasps in the frames of their objects.
+        library: library with the objects.
         station: station with the hand.
         scene: scene of the objects. A grasp is on the instance in its column `instance`, or on the
             only instance of its object.
@@ -196,7 +196,8 @@ def scored_set(
     if by == "gravity_margin" and scene is None:
         raise InvalidInputError("gravity_margin depends on where up is; give a scene")
     objects = sorted(set(grasps.object.tolist()))
-    chosen = _friction_by_object(friction or {}, objects)
+    friction = friction or {}
+    _require_friction_names(friction, objects)
     jaws = jaws_of(station.hand, station.hand_model, station.packages)
     instance = None if scene is None else _instances(grasps, scene)
     X_WO = None
@@ -207,24 +208,24 @@ def scored_set(
     columns["force_closure"] = np.zeros(len(grasps), bool)
     payloads = {}
     with Reporter(progress) as reporter:
-        pace = ProgressMeter(reporter.show, Progress("scoring", total=len(grasps)))
+        meter = ProgressMeter(reporter.show, Progress("scoring", total=len(grasps)))
         for name in objects:
-            payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
+            payload = Payload.of(library.entry(name), friction.get(name, friction.get("")))
             payloads[name] = asdict(payload)
             surface = _surface(library, name)
-            for some in _batches(grasps.object == name):
-                up = None if X_WO is None else X_WO[some, 2, :3]
-                quality = grasp_quality(grasps.X_OG[some], surface, payload, jaws, up=up)
+            for batch in _batches(grasps.object == name):
+                up = None if X_WO is None else X_WO[batch, 2, :3]
+                quality = grasp_quality(grasps.X_OG[batch], surface, payload, jaws, up=up)
                 for metric in METRICS:
-                    columns[metric][some] = getattr(quality, metric)
-                pace.step(len(some))
+                    columns[metric][batch] = getattr(quality, metric)
+                meter.step(len(batch))
         how: dict[str, Any] = {
             "payloads": payloads,
             **set_documents(library, scene, station, objects),
         }
         if scene is not None and instance is not None and X_WO is not None:
-            pace = ProgressMeter(reporter.show, Progress("clearance", total=len(grasps)))
-            columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station, pace)
+            meter = ProgressMeter(reporter.show, Progress("clearance", total=len(grasps)))
+            columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station, meter)
             how["clearance_version"] = CLEARANCE_VERSION
     kept = {name: values for name, values in grasps.columns.items() if name not in SCENE_COLUMNS}
     provenance = {**grasps.provenance, "quality": quality_provenance(jaws, by, **how)}
@@ -233,20 +234,19 @@ def scored_set(
 
 
 def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Indices of the chosen rows (N,) in batches of 2000; the metrics do not depend on it."""
+    """Indices of the chosen rows (N,) in batches of 2000; metrics do not depend on the batches."""
     rows = np.flatnonzero(chosen)
     return [rows[k : k + 2000] for k in range(0, len(rows), 2000)]
 
 
-def _friction_by_object(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
-    """Coefficients by object, and under "" for all others."""
-    for name in given:
+def _require_friction_names(friction: Mapping[str, float], objects: list[str]) -> None:
+    """Refuses coefficients for objects without grasps."""
+    for name in friction:
         if name and name not in objects:
             raise UnknownNameError(
                 f"friction is given for {name!r}, but there are no grasps of it; "
                 f"{suggest_names(name, objects)}"
             )
-    return dict(given)
 
 
 def _surface(library: ObjectLibrary, name: str) -> Surface:
@@ -281,16 +281,16 @@ def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
 
 
 def _clearances(
-    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: ProgressMeter
+    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, meter: ProgressMeter
 ) -> dict[str, Any]:
-    screen, _ = hand_alone(scene, station)
+    screen, _ = build_hand_clearance(scene, station)
     columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
     for name in sorted(set(instance.tolist())):
-        for some in _batches(instance == name):
-            found = screen.measure(name, X_WG[some])
+        for batch in _batches(instance == name):
+            found = screen.measure(name, X_WG[batch])
             screened = np.where(found.clear, Stage.CLEAR.value, found.outcome)
             values = (found.clearance, found.nearest, screened, found.blocker)
             for column, value in zip(SCENE_COLUMNS, values, strict=True):
-                columns[column][some] = value
-            pace.step(len(some))
+                columns[column][batch] = value
+            meter.step(len(batch))
     return {n: v.astype(float if n == "clearance" else str) for n, v in columns.items()}

@@ -26,7 +26,7 @@ from burg_drake.evaluation.candidates import (
     drop_equal_grasps,
     join_candidates,
 )
-from burg_drake.evaluation.judge import hand_alone
+from burg_drake.evaluation.judge import build_hand_clearance
 from burg_drake.evaluation.settings import (
     DEFAULT_APPROACH_ANGLE_DEG,
     SLIPPERY_FRICTION_FACTOR,
@@ -66,8 +66,8 @@ def approach_half_space_of_arm(
 
     Args:
         X_WO: (4, 4) pose of the object.
-        p_WM: (3,) its middle [m].
-        station: has the arm.
+        p_WM: (3,) middle of the object [m].
+        station: station with the arm.
         name: name of the instance, for messages.
 
     Raises:
@@ -108,15 +108,15 @@ class ClearanceFilter:
     Args:
         screen: collision screen of the open hand.
         name: name of the object in the screen.
-        X_WO: (4, 4) its pose in the screen's world.
+        X_WO: (4, 4) pose of the object in the screen's world.
         surface: surface of the object.
         jaws: jaws of the hand.
         friction: coefficient between object and pads.
         settings: margin and mode of the screen.
 
     Attributes:
-        blocked: number of rejected grasps by the body that the open hand hits (maybe the object
-            itself), or under `PAD_CONTACT`.
+        blocked: number of rejected grasps by the body that the open hand hits, which may be the
+            object itself, or under `PAD_CONTACT`.
     """
 
     def __init__(
@@ -171,13 +171,13 @@ def sample_on_scene(
 ) -> Iterator[tuple[str, GraspSet]]:
     """Samples grasps on the instances of a scene, one after the other.
 
-    Sampled blind, instances of an object that lie on the same side and have the same limits get the
-    same grasps.
+    With `settings.blind`, instances of an object that lie on the same side and have the same limits
+    of the approach get the same grasps.
 
     Args:
         scene: the scene.
-        station: has the hand (opening and body) and the place of the arm.
-        n: grasps for each instance; fewer if (almost) no more exist, and `shortfall_note` says why.
+        station: station with the hand and the place of the arm.
+        n: grasps for each instance; fewer if (almost) no more exist; `shortfall_note` says why.
         seed: seed of the random numbers.
         settings: sampling settings.
         only: names of free instances, or of objects for all their instances; all if None.
@@ -197,17 +197,17 @@ def sample_on_scene(
     def sampled() -> Iterator[tuple[str, GraspSet]]:
         from burg_drake.station import instance_pose
 
-        draw = ObjectSampler(scene.library, station, n, seed, settings)
-        screen = None if settings.blind else hand_alone(scene, station)[0]
+        sampler = ObjectSampler(scene.library, station, n, seed, settings)
+        screen = None if settings.blind else build_hand_clearance(scene, station)[0]
         found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
         for name in names:
             object, X_WO = scene.instance(name).object, instance_pose(scene, station, name)
-            cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
+            cones = _approach_cones(sampler.surface(object), X_WO, station, name, settings)
             if screen is not None:
-                yield name, draw.clear(object, cones, screen, name, X_WO)
+                yield name, sampler.sample_clear(object, cones, screen, name, X_WO)
             else:
                 if (object, cones) not in found:
-                    found[object, cones] = draw(object, cones)
+                    found[object, cones] = sampler.sample(object, cones)
                 yield name, found[object, cones]
 
     return sampled()
@@ -225,7 +225,7 @@ def sample_library(
 
     Args:
         library: the library.
-        station: has the hand (opening and body).
+        station: station with the hand.
         n, seed, settings: as for `sample_on_scene`.
         objects: names in the library; all if None.
 
@@ -250,13 +250,13 @@ def sample_library(
     def sampled() -> Iterator[tuple[str, GraspSet]]:
         from burg_drake.grasping import hand_clearance_alone
 
-        draw = ObjectSampler(library, station, n, seed, settings)
+        sampler = ObjectSampler(library, station, n, seed, settings)
         for name in names:
             if settings.blind:
-                yield name, draw(name, ())
+                yield name, sampler.sample(name, ())
             else:
                 screen = hand_clearance_alone(library, name, station)
-                yield name, draw.clear(name, (), screen, name, np.eye(4))
+                yield name, sampler.sample_clear(name, (), screen, name, np.eye(4))
 
     return sampled()
 
@@ -287,10 +287,10 @@ class ObjectSampler:
             self._surfaces[object] = self._library.surface(object)
         return self._surfaces[object]
 
-    def __call__(
+    def sample(
         self, object: str, cones: tuple[ApproachCone, ...], accept: Accept | None = None
     ) -> GraspSet:
-        """Grasps of an object."""
+        """Samples grasps of an object; see `sample_antipodal`."""
         from burg_drake.grasping import AntipodalSettings, sample_antipodal
 
         settings = self._settings
@@ -312,12 +312,12 @@ class ObjectSampler:
             accept=accept,
             object=object,
         )
-        if settings.slippery:  # scores are shares of the sampler's friction: of the object's, then
+        if settings.slippery:  # from shares of the sampler's friction to shares of the object's
             score = 1.0 - SLIPPERY_FRICTION_FACTOR * (1.0 - grasps.score)
             grasps = dataclasses.replace(grasps, score=score).select(score < 0.0)
         return drop_equal_grasps(grasps)
 
-    def clear(
+    def sample_clear(
         self,
         object: str,
         cones: tuple[ApproachCone, ...],
@@ -325,18 +325,19 @@ class ObjectSampler:
         name: str,
         X_WO: Array,
     ) -> GraspSet:
-        """Collision-free grasps of an object, with this name and pose (4, 4) in the screen; their
-        provenance counts what `blocked` the others.
+        """Samples collision-free grasps of an object with this name and pose (4, 4) in the screen.
+
+        The provenance of the grasps has, under `blocked`, `ClearanceFilter.blocked`.
         """
-        test = self.clear_test(object, screen, name, X_WO)
-        grasps = self(object, cones, test)
-        notes = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
+        accept = self.clearance_filter(object, screen, name, X_WO)
+        grasps = self.sample(object, cones, accept)
+        notes = {"target": name, "blocked": dict(accept.blocked), "margin": self._settings.margin}
         return dataclasses.replace(grasps, provenance={**grasps.provenance, **notes})
 
-    def clear_test(
+    def clearance_filter(
         self, object: str, screen: HandClearance, name: str, X_WO: Array
     ) -> ClearanceFilter:
-        """The filter of collision-free grasps of an object; see `clear`."""
+        """The filter of `sample_clear`."""
         from burg_drake.geometry import Surface
         from burg_drake.grasping import jaws_of
 
@@ -409,7 +410,7 @@ def shortfall_note(name: str, asked: int, provenance: Mapping[str, Any], found: 
     Args:
         name: name of the instance or object.
         asked: number of requested grasps.
-        provenance: provenance of its grasps by `sample_on_scene` or `sample_library`.
+        provenance: provenance of the grasps by `sample_on_scene` or `sample_library`.
         found: number of sampled grasps.
     """
     if found >= asked:

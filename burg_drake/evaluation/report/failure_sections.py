@@ -63,9 +63,9 @@ class CauseRows:
 
     Attributes:
         outcomes: (N,) indices into `Outcome`.
-        objects, blockers: of each grasp.
+        objects, blockers: (N,) object and blocker of each grasp.
         margins: (N,) the available margins of `CAUSE_MARGINS` by name.
-        replay: the command that shows the grasp of a row.
+        replay: returns the command that shows the grasp of a row.
     """
 
     outcomes: NDArray[np.int8]
@@ -126,8 +126,8 @@ def find_causes(rows: CauseRows) -> list[Cause]:
     successes = (Outcome.LIFTED, Outcome.REACHABLE)  # Outcomes that are no failures.
     max_named = 3  # Number of objects and blockers listed for each outcome.
     found = []
-    for place, outcome in enumerate(Outcome):
-        mine = np.flatnonzero(rows.outcomes == place).astype(np.int64)
+    for code, outcome in enumerate(Outcome):
+        mine = np.flatnonzero(rows.outcomes == code).astype(np.int64)
         if len(mine) and outcome not in successes:
             objects = rows.objects.most_common(mine, max_named)
             blockers = rows.blockers.most_common(mine, max_named)
@@ -138,9 +138,7 @@ def find_causes(rows: CauseRows) -> list[Cause]:
 
 
 def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: Outcome) -> int:
-    """Index of the median row of an outcome by the margin of its severity, and by order among
-    equals.
-    """
+    """Index of the median row of an outcome, by the margin that ranks its cases by severity."""
     name = next((m for m, starts in TYPICAL_MARGINS if outcome.value.startswith(starts)), "")
     values = margins[name][rows] if name in margins else np.zeros(len(rows))
     known = np.isfinite(values)
@@ -151,9 +149,7 @@ def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: 
 
 
 def collision_section(columns: ResultRows) -> ReportSection | None:
-    """Section of the bodies that the open hand collided with at the start and how deep; None if
-    none.
-    """
+    """Section of the bodies that the open hand overlaps at the grasp; None if there are none."""
     outcomes, blockers = columns.codes("outcome"), columns.codes("blocker")
     overlap = columns["overlap"]
     collision = [name.startswith("collision_") for name in outcomes.names]
@@ -164,9 +160,9 @@ def collision_section(columns: ResultRows) -> ReportSection | None:
     found = np.unique(blockers.codes[collides], return_index=True, return_counts=True)
     order = np.lexsort((found[1], -found[2]))
     rows = []
-    for place, count in zip(found[0][order].tolist(), found[2][order].tolist(), strict=True):
-        name = blockers.names[place]
-        mask = collides & (blockers.codes == place)
+    for code, count in zip(found[0][order].tolist(), found[2][order].tolist(), strict=True):
+        name = blockers.names[code]
+        mask = collides & (blockers.codes == code)
         depth = overlap[mask] * 1e3
         own = int(on_target[outcomes.codes[mask]].sum())
         cells = [
@@ -255,7 +251,7 @@ def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
 
 
 def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:
-    """Section of what hindered the arm, and of its obstacles; None if the arm was not checked."""
+    """Section of outcomes of the arm, with obstacles; None if the arm was not checked."""
     # Outcomes between a clear hand and the trial.
     arm_outcomes = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
     if summary.mode == "hand":

@@ -50,8 +50,9 @@ def outcome_bar(counts: OutcomeCounts) -> CountedBar:
 
 
 def object_bars(summary: Summary) -> list[CountedBar]:
-    """A bar for each object, and one for the total of several objects. Of more than 40 objects,
-    those with the lowest success rates are shown.
+    """A bar for each object, and one for the total of several objects.
+
+    Of more than 40 objects, only the 40 with the lowest success rates get a bar.
     """
     max_objects = 40
     objects = list(summary.objects)
@@ -66,8 +67,9 @@ def _add_total(objects: list[OutcomeCounts], summary: Summary) -> list[OutcomeCo
 
 
 def worst_first(groups: Sequence[OutcomeCounts]) -> list[OutcomeCounts]:
-    """Groups sorted by success rate of executed grasps; groups without executed grasps come first,
-    and of equal rates the less certain ones.
+    """Groups sorted by success rate of executed grasps, lowest first.
+
+    Groups without executed grasps come first; among equal rates, the less certain ones do.
     """
 
     def rank(group: OutcomeCounts) -> tuple[float, float]:

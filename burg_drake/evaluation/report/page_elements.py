@@ -13,15 +13,12 @@ from burg_drake.evaluation.outcome_counts import member_codes
 from burg_drake.evaluation.results_table import TextValues
 from burg_drake.visualization import (
     OUTCOME_GROUPS,
-    Child as Child,
-    Html as Html,
+    Child,
+    Html,
     PageTable,
     contrast_ratio,
-    element as element,
+    element,
     html_document,
-    interval_mark as interval_mark,
-    join as join,
-    nice_step as nice_step,
     page_style,
 )
 
@@ -33,8 +30,8 @@ class ReportSection:
     Attributes:
         title: heading.
         text: text below the heading.
-        table: table of the section ...
-        charts: ... or charts in place of it.
+        table: table of the section, if any.
+        charts: charts in place of a table.
         command: command to copy, above the table or charts.
         facts: names and texts in a list.
     """
@@ -163,7 +160,7 @@ def group_indices(outcomes: TextValues) -> NDArray[np.int8]:
 
 
 def group_indices_of_codes(codes: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Index into `OUTCOME_GROUPS` (N,) of outcomes, given by their places in `Outcome`."""
+    """Index into `OUTCOME_GROUPS` (N,) of outcomes, given as indices into `Outcome` (N,)."""
     return np.array([GROUP_INDICES[outcome] for outcome in Outcome], dtype=np.int8)[codes]
 
 

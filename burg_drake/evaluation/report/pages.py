@@ -19,7 +19,7 @@ from burg_drake.core import (
     count_with_noun,
     format_count,
 )
-from burg_drake.evaluation.campaign_folder import LEDGER_FILE, SCENES_FOLDER, Campaign
+from burg_drake.evaluation.campaign_folder import SCENE_STATES_FILE, SCENES_FOLDER, Campaign
 from burg_drake.evaluation.outcome_counts import OutcomeCounts, Summary, member_codes
 from burg_drake.evaluation.report.failure_sections import (
     CAUSE_MARGINS,
@@ -191,7 +191,7 @@ def renew_report(campaign: Campaign) -> None:
     Raises:
         InvalidInputError: it cannot be written.
     """
-    known, report = campaign.path / LEDGER_FILE, campaign.report_path
+    known, report = campaign.path / SCENE_STATES_FILE, campaign.report_path
     since = known.stat().st_mtime_ns if known.exists() else 0
     if not report.exists() or report.stat().st_mtime_ns < since:
         write_campaign_report(campaign)
@@ -259,7 +259,7 @@ def _campaign_notice(campaign: Campaign, summary: Summary) -> str:
 
 
 def _report_link(campaign: Campaign, name: str) -> str:
-    """Relative link from the report of all scenes to that of one; empty if it does not exist."""
+    """Relative link from the report of all scenes to a scene's report; empty if there is none."""
     there = (campaign.folder(name) / REPORT_FILE).is_file()
     return quote(f"{SCENES_FOLDER}/{name}/{REPORT_FILE}") if there else ""
 

@@ -56,8 +56,8 @@ class _Layout:
     """Dimensions of a picture of grasps."""
 
     panel = 220.0  # Side of a picture [SVG units].
-    caption = 22.0  # Height of the line above it.
-    foot = 16.0  # Height of the scale below it.
+    caption = 22.0  # Height of the line above a picture.
+    foot = 16.0  # Height of the scale below a picture.
     ruler = 0.05  # Length of the scale [m].
 
 
@@ -95,8 +95,8 @@ def scene_drawing(
     """The scene, seen from the near edge of the board, with names.
 
     Args:
-        scene: for its board.
-        free, fixed: its instances by name.
+        scene: scene with the board.
+        free, fixed: surfaces of the instances by name.
         notes: a short text for each free instance, below its name.
     """
     picture_width = 480.0  # SVG units.
@@ -129,10 +129,10 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
     others in the colours of their outcomes. Every grasp is one path.
 
     Args:
-        name: of the instance.
-        solid: in the scene frame.
-        X_SO: (4, 4) its pose there.
-        grasps: to draw.
+        name: name of the instance.
+        solid: surface of the instance in the scene frame.
+        X_SO: (4, 4) pose of the instance in the scene frame.
+        grasps: grasps to draw.
     """
     elevation = float(np.deg2rad(30.0))  # Radians by which the camera looks down.
     R_WC = camera_rotation(elevation)
@@ -173,9 +173,7 @@ def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps)
 def _grasp_paths(
     grasps: DrawnGrasps, mask: NDArray[np.bool_], corners: Array, view: FlatView
 ) -> list[Html]:
-    """One SVG group for each outcome group, the best on top, and within it the nearer grasps on
-    top.
-    """
+    """One SVG group for each outcome group, the best on top; in each, nearer grasps on top."""
     found = []
     depth = view.depths(corners[:, 0])
     for k in sorted(set(grasps.groups[mask].tolist()), reverse=True):
@@ -226,7 +224,7 @@ DRAWN_COLUMNS = ("id", "x", "y", "z", "qw", "qx", "qy", "qz", "width")
 
 
 def scene_as_judged(run: Run) -> Scene | None:
-    """The scene of a run; None if its files, or those of its library, are gone or have changed."""
+    """The scene of a run; None if files of scene or library are gone or have changed."""
     try:
         scene = run.scene()
         for name in (*scene.instances, *scene.background):
@@ -240,9 +238,9 @@ def scene_picture(scene: Scene, columns: ResultRows, groups: NDArray[np.int8]) -
     """The scene with the number of grasps that lifted each object.
 
     Args:
-        scene: as it was judged.
+        scene: scene as it was judged.
         columns: the results.
-        groups: (N,) of each row, see `group_indices`.
+        groups: (N,) outcome group of each row, see `group_indices`.
     """
     instances, lifted = columns.codes("instance"), groups == LIFTED_GROUP
     notes = {}
@@ -261,8 +259,8 @@ class GraspFigure:
     """A drawing of the grasps on an object.
 
     Attributes:
-        name: of the object, or of its instance in the scene.
-        drawing: with the grasps.
+        name: name of the object, or of its instance in the scene.
+        drawing: drawing of object and grasps.
         shown: the grasps that are drawn.
         best: id of the best grasp; empty if there is none.
     """
@@ -274,12 +272,12 @@ class GraspFigure:
 
     @property
     def lifted(self) -> int:
-        """Number of grasps that lifted it, drawn or not."""
+        """Number of grasps that lifted the object, drawn or not."""
         return int(self.shown.counts[LIFTED_GROUP])
 
     @property
     def grasps(self) -> int:
-        """Number of all grasps on it, drawn or not."""
+        """Number of all grasps on the object, drawn or not."""
         return int(self.shown.counts.sum())
 
 
@@ -360,8 +358,8 @@ def _drawn_grasps(
 
     Args:
         columns: the table.
-        groups: (N,) of its rows.
-        all_groups: (M,) of all grasps on the object.
+        groups: (N,) outcome groups of the rows.
+        all_groups: (M,) outcome groups of all grasps on the object.
     """
     X_OG = np.tile(np.eye(4), (len(groups), 1, 1))
     if len(groups):
@@ -386,8 +384,8 @@ def object_pictures(
 
     Args:
         campaign: the run.
-        stored: its rows, with poses, widths and ids.
-        groups: (N,) of each row, see `group_indices`.
+        stored: rows of the run, with poses, widths and ids.
+        groups: (N,) outcome group of each row, see `group_indices`.
     """
     codes, names = stored.codes("object")
     library_of: dict[str, ObjectLibrary] = {}

@@ -40,14 +40,15 @@ def reproduce_command(run: Run) -> str:
 
 
 def reproduce_campaign_command(campaign: Campaign) -> str:
-    """Command line that repeats a run over many scenes; for given grasps, of which it keeps no
-    single file, the command that began it.
+    """Command line that repeats a run over many scenes.
+
+    For given grasps it is the command that began the run, which keeps no single file of them.
     """
     document = campaign.document
     grasps = _sampling_options(document)
     if not grasps:
         return document.command
-    begun = (place.folder / STATION_FILE for place in campaign.places)
+    begun = (stored.folder / STATION_FILE for stored in campaign.stored_runs)
     station = next((path for path in begun if path.is_file()), None)
     words = [*_command_words(document, grasps, station), "-o", str(campaign.path)]
     scenes = _scene_words([entry.path for entry in document.scenes])

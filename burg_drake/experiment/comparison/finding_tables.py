@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from burg_drake.core import MISSING_NUMBER, TextTable, format_count, format_number
-from burg_drake.evaluation import interval_mark, nice_step, number_cells, section, table
+from burg_drake.evaluation import number_cells, section, table
 from burg_drake.experiment.comparison.comparison import (
     bracketed_interval,
     estimate_text,
@@ -16,7 +16,7 @@ from burg_drake.experiment.comparison.comparison import (
 )
 from burg_drake.experiment.comparison.confusion_matrix import Estimate
 from burg_drake.experiment.comparison.margin_calibration import Bin, MarginCalibration
-from burg_drake.visualization import Child, Html, element, join
+from burg_drake.visualization import Child, Html, element, interval_mark, join, nice_step
 
 
 @dataclass(frozen=True)

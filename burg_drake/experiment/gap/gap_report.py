@@ -25,7 +25,6 @@ from burg_drake.evaluation import (
     engine_label,
     header,
     html_page,
-    interval_mark,
     section,
     tiles,
 )
@@ -45,7 +44,15 @@ from burg_drake.experiment.gap.gap_words import (
     step_sentences,
 )
 from burg_drake.experiment.trials.trial_sheet import Success
-from burg_drake.visualization import OUTCOME_GROUPS, Child, Html, element, join, outcome_group
+from burg_drake.visualization import (
+    OUTCOME_GROUPS,
+    Child,
+    Html,
+    element,
+    interval_mark,
+    join,
+    outcome_group,
+)
 
 GAP_REPORT_FILE = "gap.html"  # Page about a gap measurement, in its folder.
 

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from burg_drake.core import TextTable, format_percent, outcome_label, plain_data
-from burg_drake.evaluation import count_pushes, interval_mark
+from burg_drake.evaluation import count_pushes
 from burg_drake.experiment.comparison.comparison import bracketed_interval, json_values
 from burg_drake.experiment.comparison.confusion_matrix import Estimate
 from burg_drake.experiment.comparison.finding_tables import FindingTable
@@ -21,7 +21,7 @@ from burg_drake.experiment.gap.gap_steps import (
     successes_by_object,
 )
 from burg_drake.experiment.trials.trial_sheet import Success, is_success
-from burg_drake.visualization import Html, join
+from burg_drake.visualization import Html, interval_mark, join
 
 GAP_STEP_TITLES: dict[StepName, str] = {
     "hand": "hand alone",

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from itertools import product
 
 from burg_drake.core import Stage, TextTable, count_with_noun, format_percent, outcome_label
-from burg_drake.evaluation import command, interval_mark, section
+from burg_drake.evaluation import command, section
 from burg_drake.experiment.comparison.finding_tables import FindingTable
 from burg_drake.experiment.gap.rejudging import (
     DISAGREEMENT_CAUSES,
@@ -16,7 +16,7 @@ from burg_drake.experiment.gap.rejudging import (
     Rejudged,
     Rejudging,
 )
-from burg_drake.visualization import Html, element, join
+from burg_drake.visualization import Html, element, interval_mark, join
 
 
 def rejudged_sentences(rejudging: Rejudging) -> list[str]:
