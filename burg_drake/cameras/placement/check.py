@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
+from burg_drake.cameras.placement.alignment import Aligner
 from burg_drake.cameras.placement.board_background import empty_board
 from burg_drake.cameras.placement.depth_aligner import DepthAligner, check_depth
 from burg_drake.cameras.placement.document import (
@@ -53,6 +53,7 @@ from burg_drake.core import (
     Single,
     Vector3,
     content_hash,
+    wrap_to_pi,
 )
 from burg_drake.printout import height_map
 from burg_drake.scene import Scene, SceneLike, as_scene
@@ -120,8 +121,8 @@ def assess_placement(
     if missing or found.alignment is None:
         return unseen_placement(scene, name, missing, found.seen)
     alignment = found.alignment
-    q, spread = alignment.q, alignment.spread(camera)
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    q = alignment.q
+    deviation = np.sqrt(np.maximum(np.diag(alignment.total_covariance(camera)), 0.0))
     reason = _doubt_reason(shape, found, deviation, rough, typical)
     status: PlacementStatus = "uncertain" if reason else "measured"
     residual = alignment.residual
@@ -134,7 +135,7 @@ def assess_placement(
         reference=cast(Vector3, tuple(np.round(shape.p_OR, 9).tolist())),
         displacement=(float(q[0]), float(q[1])),
         displacement_sd=(float(deviation[0]), float(deviation[1])),
-        angle=None if shape.symmetric else wrap_to_pi(q[2]),
+        angle=None if shape.symmetric else float(wrap_to_pi(q[2])),
         angle_sd=None if shape.symmetric else float(deviation[2]),
         seen=round(found.seen, 4),
         residual=float(residual) if np.isfinite(residual) else None,

@@ -16,7 +16,9 @@ from burg_drake.cameras.placement.alignment import (
     Alignment,
     DisplacementFit,
     fit_displacement,
+    limit_step,
     outline_sectors,
+    step_units,
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import (
@@ -27,7 +29,15 @@ from burg_drake.cameras.placement.pinhole_view import (
     visible_outline,
     window_slices,
 )
-from burg_drake.core import Array, Booleans, InvalidInputError, Single, inverse, transform_points
+from burg_drake.core import (
+    Array,
+    Booleans,
+    InvalidInputError,
+    Single,
+    inverse,
+    robust_sd,
+    transform_points,
+)
 
 MIN_HEIGHT_SIGMAS = 4.0
 """Noise standard deviations above the board at which an object is present."""
@@ -82,7 +92,7 @@ class DepthAligner:
         self._valid = self._depth > 0.0
         height = self._p_SQ[..., 2]
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
-        spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * min_noise
+        spread = robust_sd(low) if len(low) > 100 else 2.0 * min_noise
         self.noise_sd = max(spread, min_noise)
         # Metres. Fits of the right object leave less.
         self.residual_floor, self.max_residual = self.noise_sd, 0.005
@@ -104,7 +114,7 @@ class DepthAligner:
             solved = found.solve(turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.05:
                 return None
-            q = q + np.clip(solved.step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
+            q = q + limit_step(solved.step)
             best = found, solved
             # Metres. Smaller steps end the rounds.
             if limit == max_distances[-1] and np.abs(solved.step[:2]).max() < 2e-5:
@@ -204,9 +214,9 @@ class _DepthMeasurements:
         self._offset = np.einsum("ni,ni->n", n, p - on_surface)
         arm = on_surface - shape.p_SR - (q[0], q[1], 0.0)
         turn = arm[:, 0] * n[:, 1] - arm[:, 1] * n[:, 0]
-        self._along = np.column_stack([n[:, 0], n[:, 1], turn])
+        self._jacobian = np.column_stack([n[:, 0], n[:, 1], turn])
         ray = p - aligner.view.X_SC[:3, 3]
-        self._camera = np.concatenate([np.cross(ray, n), n], axis=1)
+        self._camera_jacobian = np.concatenate([np.cross(ray, n), n], axis=1)
         ray = ray / np.maximum(np.linalg.norm(ray, axis=1), 1e-9)[:, None]
         slant = np.abs(np.einsum("ni,ni->n", n, ray))
         # Metres. Error of a surface point besides noise.
@@ -226,8 +236,12 @@ class _DepthMeasurements:
         pixel = p_CQ[:, 2] / aligner.view.K[0, 0]
         self._surface_points = len(self._offset)
         self._offset = np.concatenate([self._offset, offset[falls] * pixel])
-        self._along = np.concatenate([self._along, contour.along[falls] * pixel[:, None]])
-        self._camera = np.concatenate([self._camera, -contour.camera[falls] * pixel[:, None]])
+        self._jacobian = np.concatenate(
+            [self._jacobian, contour.displacement_jacobian[falls] * pixel[:, None]]
+        )
+        self._camera_jacobian = np.concatenate(
+            [self._camera_jacobian, -contour.camera_jacobian[falls] * pixel[:, None]]
+        )
         # Pixels. Quantization (0.29) and smeared edges.
         self._deviation = np.concatenate([self._deviation, 0.6 * pixel])
         self._groups = np.concatenate([self._groups, 100_000 + outline_sectors(contour)[falls]])
@@ -236,22 +250,24 @@ class _DepthMeasurements:
         """Fit the step to the measurements."""
         if len(self._offset) < 30:
             return None
-        reach = float(np.linalg.norm(np.ptp(self._shape.p_SV[:, :2], axis=0))) / 2
-        unit = np.array([1e-3, 1e-3, 1e-3 / reach])
-        symmetric = self._shape.symmetric or not turn
         return fit_displacement(
-            self._along, self._offset, self._deviation, self._groups, symmetric, unit
+            self._jacobian,
+            self._offset,
+            self._deviation,
+            self._groups,
+            self._shape.symmetric or not turn,
+            step_units(self._shape),
         )
 
     def result(self, q: Array, solved: DisplacementFit) -> Alignment:
         """Build the alignment, with the last step applied."""
-        residual = (self._offset - self._along @ solved.step)[: self._surface_points]
+        residual = (self._offset - self._jacobian @ solved.step)[: self._surface_points]
         fits = np.abs(residual) < 4.0 * self._noise + 2e-3
         share = self._fits / max(self._count, 1) * (fits.mean() if len(fits) else 0.0)
         return Alignment(
             q,
             solved.covariance,
-            solved.sensitivity @ self._camera,
+            solved.sensitivity @ self._camera_jacobian,
             float(share),
             float(share),
             float(np.sqrt(np.mean(residual[fits] ** 2))) if fits.any() else float("nan"),

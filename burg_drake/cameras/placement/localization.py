@@ -11,7 +11,6 @@ from burg_drake.cameras.placement.alignment import (
     Aligner,
     Alignment,
     are_different_places,
-    wrap_to_pi,
 )
 from burg_drake.cameras.placement.object_search import (
     SilhouetteSearch,
@@ -20,7 +19,7 @@ from burg_drake.cameras.placement.object_search import (
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
-from burg_drake.core import Array
+from burg_drake.core import Array, wrap_to_pi
 
 LARGE_TURN = np.deg2rad(40.0)
 """Radians from the target's angle; beyond, an object must fit better, not just as well."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
+from burg_drake.cameras.placement.alignment import Aligner
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
-from burg_drake.core import Array
+from burg_drake.core import Array, wrap_to_pi
 
 SEARCH_RANGE = 0.05
 """Metres from its target within which an object is searched."""

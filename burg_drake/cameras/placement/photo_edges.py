@@ -239,7 +239,7 @@ def sample_normal_profiles(
         sampled(picture.color),
         sampled(picture.evidence.astype(np.float32)),
         known,
-        *contour.inside(points, t),
+        *contour.surface_strip(points, t),
         other,
     )
 

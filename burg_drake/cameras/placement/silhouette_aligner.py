@@ -8,7 +8,9 @@ from burg_drake.cameras.placement.alignment import (
     Alignment,
     DisplacementFit,
     fit_displacement,
+    limit_step,
     outline_sectors,
+    step_units,
 )
 from burg_drake.cameras.placement.board_background import EmptyBoard
 from burg_drake.cameras.placement.object_shape import TargetShape
@@ -109,7 +111,7 @@ class SilhouetteAligner:
             solved = _solve_displacement(shape, contour, find_far_edges(on, self._picture))
             if solved is None:
                 break
-            q = q + _limit_step(solved.step)
+            q = q + limit_step(solved.step)
         return q
 
     def _sample_normals(self, contour: ImageContour, others: Array, reach: float) -> NormalProfiles:
@@ -130,10 +132,10 @@ class SilhouetteAligner:
             # Metres from the start; beyond, the alignment has failed.
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.03:
                 return None
-            q = q + _limit_step(solved.step)
+            q = q + limit_step(solved.step)
             result = _build_alignment(q, contour, edges, solved)
             # Pixels. Smaller motions of the outline end the rounds.
-            if np.abs(contour.along @ solved.step).max() < 0.04:
+            if np.abs(contour.displacement_jacobian @ solved.step).max() < 0.04:
                 break
         return result
 
@@ -144,8 +146,6 @@ def _solve_displacement(
     used = edges.found
     if used.sum() < MIN_OUTLINE_EDGES:
         return None
-    reach = float(np.linalg.norm(np.ptp(shape.p_SV[:, :2], axis=0))) / 2
-    unit = np.array([1e-3, 1e-3, 1e-3 / reach])
     # Nuisances that move edges, by standard deviations: objects are darker at their edges by 15 %,
     # outlines look larger by 0.2 pixels, and by 0.6 where they meet the board and its shadow, which
     # ends 4 mm above it.
@@ -153,19 +153,14 @@ def _solve_displacement(
     growth = np.full(used.sum(), 0.2)
     nuisance = np.column_stack([-0.15 * edges.shading[used], growth, 0.6 * np.exp(-height / 4e-3)])
     return fit_displacement(
-        contour.along[used],
+        contour.displacement_jacobian[used],
         edges.offset[used],
         edges.deviation[used],
         outline_sectors(contour)[used],
         shape.symmetric or not turn,
-        unit,
+        step_units(shape),
         nuisance,
     )
-
-
-def _limit_step(step: Array) -> Array:
-    """Limit a step to the range in which edges are searched."""
-    return np.clip(step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
 
 
 def _build_alignment(
@@ -173,7 +168,7 @@ def _build_alignment(
 ) -> Alignment:
     agreement_limit = 1.5  # Pixels between an edge and the outline.
     used: Booleans = edges.found
-    left = edges.offset[used] - contour.along[used] @ solved.step
+    left = edges.offset[used] - contour.displacement_jacobian[used] @ solved.step
     agrees = (np.abs(left) < agreement_limit) & (solved.weights > 0.0)
     residual = _weighted_rms(left[agrees], edges.deviation[used][agrees])
     normals = contour.normals[used]
@@ -188,7 +183,7 @@ def _build_alignment(
     return Alignment(
         q,
         solved.covariance + sum(s @ s.T for s in (shifted, twisted, squeezed)),
-        -solved.sensitivity @ contour.camera[used],
+        -solved.sensitivity @ contour.camera_jacobian[used],
         float(agrees.sum() / max(edges.expected.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
         residual,

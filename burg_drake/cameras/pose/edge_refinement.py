@@ -27,7 +27,15 @@ from burg_drake.cameras.pose.sheet_deviations import (
     SheetModes,
     residuals_within_markers,
 )
-from burg_drake.core import Array, Booleans, Indices, Single
+from burg_drake.core import (
+    TUKEY_LIMIT,
+    Array,
+    Booleans,
+    Indices,
+    Single,
+    robust_sd,
+    tukey_weights,
+)
 
 INITIAL_BLURS = np.array(
     [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
@@ -206,7 +214,7 @@ class EdgeRefinement:
             rest = (
                 residuals_within_markers(normal, views.print, fits.offset, information, marker) / sd
             )
-            weight = good * _tukey_weight(rest, good)
+            weight = _robust_weights(rest, good)
         offset = fits.offset + (normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
         motion = _weighted_step(J / sd[:, None], offset / sd, weight) if step else np.zeros(7)
@@ -244,7 +252,7 @@ class EdgeRefinement:
             last = self._fit_shifted(light, last, found)
             found = self._disturbance(last)
             good = has_expected_profile(last.fits)
-            last = replace(last, weight=good * _tukey_weight(found.residual / last.sd, good))
+            last = replace(last, weight=_robust_weights(found.residual / last.sd, good))
             found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
@@ -396,16 +404,16 @@ def _robust_step(motion: Array, offset: Array, sd: Array, good: Booleans) -> tup
     step = _weighted_step(J, e, weight)
     for _ in range(WEIGHT_ROUNDS):
         rest = e - J @ step
-        weight = good * _tukey_weight(rest, good)
+        weight = _robust_weights(rest, good)
         step = _weighted_step(J, e, weight)
     return step, weight
 
 
-def _tukey_weight(rest: Array, good: Booleans) -> Array:
-    """(N,) weights of residuals (N,) by the spread of the good ones."""
-    scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
-    # 95 % efficiency on normal residuals.
-    return np.asarray(np.maximum(1.0 - (rest / (4.685 * scale)) ** 2, 0.0) ** 2)
+def _robust_weights(rest: Array, good: Booleans) -> Array:
+    """(N,) Tukey's weights of residuals (N,), by the standard deviation of the good ones; 0 for the
+    others.
+    """
+    return good * tukey_weights(rest / (TUKEY_LIMIT * robust_sd(rest[good])))
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
