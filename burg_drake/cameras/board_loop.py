@@ -82,12 +82,12 @@ class BoardLoop:
         return X_SC
 
     def place_camera(self, context: Context, X_SC: Array) -> None:
-        """Move the camera over the board."""
+        """Moves the camera over the board."""
         mine = self.sensor.GetMyMutableContextFromRoot(context)
         self.sensor.SetX_PB(mine, self._in_world(X_SC))
 
     def place_object(self, context: Context, instance: str, X_SO: Array) -> None:
-        """Move an object, in the simulation only: the overlay shows its target.
+        """Moves an object, in the simulation only: the overlay shows its target.
 
         Raises:
             UnknownNameError: the scene has no such free instance.

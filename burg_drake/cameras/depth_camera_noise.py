@@ -27,7 +27,7 @@ def noisy_depth(
     normals: Single | None = None,
     color: Bytes | None = None,
 ) -> Single:
-    """Add the noise of a depth camera to a depth image.
+    """Adds the noise of a depth camera to a depth image.
 
     Edges get lateral noise and flying pixels; depth gets axial noise and quantization; occluded,
     grazing and dark pixels are removed. Equal generators give equal images. Pixels without depth
@@ -66,7 +66,7 @@ def _add_depth_errors(
     focal: float,
     rng: np.random.Generator,
 ) -> Single:
-    """Add edge and depth errors, before pixels are removed."""
+    """Adds edge and depth errors, before pixels are removed."""
     measured = depth.copy()
     if noise.lateral_base or noise.lateral_angle or noise.flying:
         edges = depth_edges(depth)
@@ -128,7 +128,7 @@ def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
 def _check_image_shape(
     name: str, image: np.ndarray | None, shape: tuple[int, ...], kind: type[np.generic]
 ) -> None:
-    """Check that an image has the depth image's size."""
+    """Checks that an image has the depth image's size."""
     if image is None:
         return
     if image.shape != (*shape, 3) or not np.issubdtype(image.dtype, kind):
@@ -254,7 +254,7 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
 def add_axial_noise(
     depth: Single, angle: Single | None, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Add independent normal errors with the standard deviation `axial_sigma` to depth."""
+    """Adds independent normal errors with the standard deviation `axial_sigma` to depth."""
     moved = rng.standard_normal(depth.shape, dtype=np.float32)
     moved *= axial_sigma(depth, angle, noise)
     moved += depth
@@ -264,7 +264,7 @@ def add_axial_noise(
 def add_disparity_noise(
     depth: Single, focal: float, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Add normal errors of `disparity_sigma` to the disparities and round to `disparity_step`.
+    """Adds normal errors of `disparity_sigma` to the disparities and rounds to `disparity_step`.
 
     While errors are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
     (Grunnet-Jepsen, Sweetser and Woodfill, "Tuning depth cameras for best performance"; Keselman et
@@ -293,7 +293,7 @@ def add_disparity_noise(
 
 
 def _drop_invalid(moved: Single, depth: Single) -> Single:
-    """Remove pixels that had no depth, or whose noisy depth is not positive."""
+    """Removes pixels that had no depth, or whose noisy depth is not positive."""
     return np.where((depth > 0.0) & (moved > 0.0), moved, np.float32(0.0))
 
 
@@ -318,7 +318,7 @@ def add_lateral_noise(
     noise: DepthNoise,
     rng: np.random.Generator,
 ) -> Single:
-    """Fray edges: pixels near them take the depth of a pixel a random step away.
+    """Frays edges: pixels near them take the depth of a pixel a random step away.
 
     Only pixels near an edge are changed: lateral noise was measured at edges, and inside a surface
     it would add to the axial noise, which already includes it. Barron and Malik ("Intrinsic scene
@@ -351,7 +351,7 @@ def add_lateral_noise(
 def add_flying_pixels(
     depth: Single, edges: Booleans, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Move a share of the pixels at edges to random depths between near and far.
+    """Moves a share of the pixels at edges to random depths between near and far.
 
     A pixel that sees two surfaces measures a mixture ("Color-guided flying pixel correction in
     depth images", arXiv 2410.08084); the mixing ratio is random here, an estimate. Edges without a
@@ -379,7 +379,7 @@ def add_flying_pixels(
 def hidden_from_second_imager(
     depth: Single, focal: float, baseline: float, *, same_view: bool
 ) -> Booleans:
-    """Find pixels whose points are hidden from a second imager beside the camera.
+    """Finds pixels whose points are hidden from a second imager beside the camera.
 
     The second imager sees pixel u of depth z at `u - f b / z`, in the same row. A box at z1 before
     a wall at z2 casts a shadow of `f b (1 / z1 - 1 / z2)` pixels on its left if the second imager
@@ -415,7 +415,7 @@ def hidden_from_second_imager(
 
 
 def _overtaken_pixels(there: Single, disparity: Single) -> Booleans:
-    """Find pixels for which a pixel further right appears further left in the second image.
+    """Finds pixels for which a pixel further right appears further left in the second image.
     Surfaces that both imagers see have none, however steep. A nearer surface begins half a pixel
     before its first pixel's centre. Pixels without depth hide nothing.
     """

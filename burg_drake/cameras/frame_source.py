@@ -64,7 +64,7 @@ class FrameSource(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release the camera or file; another thread's `read` returns None."""
+        """Releases the camera or file; another thread's `read` returns None."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Frames to the end; waits while a camera is away."""

@@ -89,7 +89,7 @@ class CameraSource(LeafSystem):
 
 
 def _next_frame(source: FrameSource) -> Frame | None:
-    """Read the next readable frame."""
+    """Reads the next readable frame."""
     while True:
         try:
             return source.read()
@@ -98,7 +98,7 @@ def _next_frame(source: FrameSource) -> Frame | None:
 
 
 def rgba_image(pixels: Bytes) -> ImageRgba8U:
-    """Convert pixels (H, W, 3) to an opaque Drake image."""
+    """Converts pixels (H, W, 3) to an opaque Drake image."""
     image = ImageRgba8U(pixels.shape[1], pixels.shape[0])
     image.mutable_data[..., :3] = pixels
     image.mutable_data[..., 3] = 255

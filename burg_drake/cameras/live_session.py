@@ -130,11 +130,11 @@ class FrameReader:
         self._thread = threading.Thread(target=self._run, name="frame reader", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Starts the thread."""
         self._thread.start()
 
     def take(self) -> Frame | None:
-        """Take the next frame; None if there is none yet."""
+        """Takes the next frame; None if there is none yet."""
         with self._changed:
             frame, self._next = self._next, None
             self._changed.notify_all()
@@ -146,7 +146,7 @@ class FrameReader:
         return self._next is None
 
     def close(self) -> None:
-        """End the thread and close the source."""
+        """Ends the thread and closes the source."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
@@ -166,7 +166,7 @@ class FrameReader:
         self._set_state("ended")
 
     def _read_one(self) -> bool:
-        """Read and deliver a frame; return whether there may be more."""
+        """Reads and delivers a frame; returns whether there may be more."""
         try:
             frame = self.source.read()
         except CameraLost as error:
@@ -182,7 +182,7 @@ class FrameReader:
         return frame is not None
 
     def _keep_time(self, frame: Frame) -> None:
-        """Wait until a file's frame is due; after a delay later frames are postponed, not sped
+        """Waits until a file's frame is due; after a delay later frames are postponed, not sped
         up.
         """
         now = time.monotonic()
@@ -291,13 +291,13 @@ class LiveSession:
         self._worker = threading.Thread(target=self._run, name="live session", daemon=True)
 
     def start(self, frames: int | None = None) -> None:
-        """Start processing frames, at most `frames` of them if given."""
+        """Starts processing frames, at most `frames` of them if given."""
         self._limit, self._last_request = frames, time.monotonic()
         self.reader.start()
         self._worker.start()
 
     def close(self) -> None:
-        """End both threads and close the source."""
+        """Ends both threads and closes the source."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -306,11 +306,11 @@ class LiveSession:
             self._worker.join()
 
     def on_frame(self, listener: Callable[[Picture], None]) -> None:
-        """Call `listener` with the first picture of each frame, in the drawing thread."""
+        """Calls `listener` with the first picture of each frame, in the drawing thread."""
         self._on_frame.append(listener)
 
     def keep_awake(self, reason: Callable[[], bool]) -> None:
-        """Keep the session from idling while `reason()` is true, such as during a recording."""
+        """Keeps the session from idling while `reason()` is true, such as during a recording."""
         self._awake.append(reason)
 
     @property
@@ -322,7 +322,7 @@ class LiveSession:
         return timed_out and not any(reason() for reason in self._awake)
 
     def request_pictures(self) -> int:
-        """Request pictures, and wake the session if it idles.
+        """Requests pictures, and wakes the session if it idles.
 
         Returns:
             The number of the newest picture if it is stale, from before an idle time; else 0.
@@ -368,7 +368,7 @@ class LiveSession:
         return sum(now - moment <= RATE_WINDOW for moment in tuple(self._moments)) / RATE_WINDOW
 
     def next_picture(self, after: int, seconds: float) -> Picture | None:
-        """Wait for a picture with a number above `after`; None after a timeout [s].
+        """Waits for a picture with a number above `after`; None after a timeout [s].
 
         An idle session gives the next new picture.
         """
@@ -391,7 +391,7 @@ class LiveSession:
         return self.next_picture(stale, seconds) if stale else self.picture
 
     def wait(self, *, seconds: float | None = None, to_end: bool = True) -> None:
-        """Wait until all frames are processed, or for a timeout.
+        """Waits until all frames are processed, or for a timeout.
 
         Args:
             seconds: timeout; none if None.
@@ -435,7 +435,7 @@ class LiveSession:
             self._changed.notify_all()
 
     def _run_once(self) -> None:
-        """Wait for a frame or a changed setting and process it."""
+        """Waits for a frame or a changed setting and processes it."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._redraw or self._wants_frame)
             if self._closed:
@@ -481,7 +481,7 @@ class LiveSession:
         return located
 
     def picture_of(self, located: LocatedFrame, placement: PlacementCheck | None) -> Picture:
-        """Draw a picture with the current settings."""
+        """Draws a picture with the current settings."""
         settings = self._settings
         overlay, drawing = time_call(lambda: self.processor.draw(located, settings, placement))
         jpeg, encoding = time_call(lambda: encode_jpeg(overlay, 88))
@@ -504,7 +504,7 @@ class LiveSession:
             listener(picture)
 
     def _report_pose(self, located: LocatedFrame, now: float) -> None:
-        """Add an event when a pose appears or disappears for some time."""
+        """Adds an event when a pose appears or disappears for some time."""
         state = (located.estimate.valid, bool(located.estimate.reason))
         if self._pose_state[1] != state:
             self._pose_state = (now, state)

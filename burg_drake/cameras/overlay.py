@@ -192,7 +192,7 @@ class Overlay:
         return drawn
 
     def notice(self, image: Bytes, text: str) -> Bytes:
-        """Draw a line of text over the image, such as why there is no overlay.
+        """Draws a line of text over the image, such as why there is no overlay.
 
         Args:
             image: (H, W, 3) red, green, blue.
@@ -232,13 +232,13 @@ class Overlay:
         return _line_set(pixels[seen], colors[owner[seen]], 1.2, 0.7, INNER_RIM_OPACITY)
 
     def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
-        """Project lines (N, 2, 3) in S, in the color of their verdict."""
+        """Projects lines (N, 2, 3) in S, in the colour of their verdict."""
         ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
         colors = np.tile(np.array(VERDICT_COLORS[verdict], dtype=float), (len(ends), 1))
         return _line_set(self.intrinsics.project(ends), colors, 3.0, 1.0, RIM_OPACITY)
 
     def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
-        """Write names of visible objects, and their corrections."""
+        """Writes names of visible objects, and their corrections."""
         owner = state.surface.owner
         seen = np.bincount(owner[owner != NO_OWNER], minlength=len(state.shape.names))
         boxes, plates = [], []
@@ -259,7 +259,7 @@ class Overlay:
 
 
 def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
-    """Label each pixel with the instance that it shows.
+    """Labels each pixel with the instance that it shows.
 
     Args:
         scene: scene with the objects at their targets; as loaded, or a reference for `load_scene`.
@@ -327,7 +327,7 @@ def _line_set(
 
 
 def _instance_color(number: int) -> tuple[int, int, int]:
-    """Color of an instance by its index in the scene; the first ones are safe for color
+    """Colour of an instance by its index in the scene; the first ones are safe for colour
     blindness.
     """
     rest = number - len(CATEGORY_COLORS)
@@ -375,7 +375,7 @@ class CorrectionMark:
 
 
 def correction_mark(placement: Placement, style: OverlayStyle, height: float) -> CorrectionMark:
-    """Build the mark for the remaining correction of an object.
+    """Builds the mark for the remaining correction of an object.
 
     Args:
         placement: of the object.
@@ -462,7 +462,7 @@ def _arrow_head_lines(tip: Array, along: Array, length: float) -> Array:
 
 
 def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: float) -> None:
-    """Blend surfaces into an image (H, W, 3), in place.
+    """Blends surfaces into an image (H, W, 3), in place.
 
     Args:
         surface: instance and shade of each pixel.
@@ -504,7 +504,7 @@ class LineSet:
 
 
 def blend_lines(image: Bytes, inks: Sequence[LineSet]) -> None:
-    """Draw lines into an image (H, W, 3), in place; each pixel takes the nearest line."""
+    """Draws lines into an image (H, W, 3), in place; each pixel takes the nearest line."""
     rim_width = 1.2  # Pixels. Dark rim on both sides of a line, for contrast with white paper.
     ends, colors, width, opacity, rim = (
         np.concatenate([getattr(ink, field.name) for ink in inks]) for field in fields(LineSet)
@@ -543,7 +543,7 @@ class LinePixels:
 def rasterize_lines(
     ends: Array, half_width: Array, reach: float, size: tuple[int, int]
 ) -> LinePixels:
-    """Find the pixels near lines.
+    """Finds the pixels near lines.
 
     Args:
         ends: (N, 2, 2) ends of the lines [pixels], short ones.

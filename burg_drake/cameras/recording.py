@@ -84,7 +84,7 @@ def partial_path(path: Path) -> Path:
 
 
 def require_video_path(path: str | Path, *, plain: bool = False) -> Path:
-    """Check that a recording can be written.
+    """Checks that a recording can be written.
 
     Args:
         path: of the video.
@@ -129,7 +129,7 @@ class RecordedPoses:
 
 
 def table_row(frame: int, time: float, estimate: BoardEstimate) -> list[Any]:
-    """Build a row of `RECORDING_COLUMNS`.
+    """Builds a row of `RECORDING_COLUMNS`.
 
     Args:
         frame: of the video.
@@ -340,7 +340,7 @@ class Recording:
         return self.path
 
     def _release(self) -> None:
-        """Close the open files."""
+        """Closes the open files."""
         for writer in self._writers:
             writer.release()
         try:
@@ -349,14 +349,14 @@ class Recording:
             raise InvalidInputError(f"cannot write {self._files.table}: {error}") from error
 
     def _abandon(self) -> None:
-        """Delete the files of a recording without pictures."""
+        """Deletes the files of a recording without pictures."""
         with contextlib.suppress(BurgError):
             self._release()
         for path in self._files.growing_files:
             partial_path(path).unlink(missing_ok=True)
 
     def _fill(self, time: float) -> None:
-        """Repeat the last picture up to the time of a new one."""
+        """Repeats the last picture up to the time of a new one."""
         assert self._last is not None
         before, pictures = self._last
         # Seconds. Longer pauses of a lost camera are shortened in the video.

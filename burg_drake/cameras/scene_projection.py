@@ -32,7 +32,7 @@ class VisibleLines:
 
 
 def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLines:
-    """Find the visible lines of a scene.
+    """Finds the visible lines of a scene.
 
     Args:
         shape: of the scene.
@@ -55,7 +55,7 @@ def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLi
 
 
 def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
-    """Clip lines to the view and split them into short pieces, which follow the lens distortion.
+    """Clips lines to the view and splits them into short pieces, which follow the lens distortion.
 
     Args:
         p_CQ: (N, 2, 3) ends of the lines in the camera's frame [m].
@@ -164,7 +164,7 @@ class SurfaceCamera:
         self._x, self._y = np.moveaxis(directions[self._nodes][..., :2], 2, 0).copy()
 
     def render(self, X_SC: Array, lines: VisibleLines, shades: Bytes) -> SurfaceImage:
-        """Render the surfaces from a pose of the camera.
+        """Renders the surfaces from a pose of the camera.
 
         Args:
             X_SC: (4, 4) camera's optical frame in the scene frame.
@@ -237,7 +237,7 @@ class SurfaceCamera:
         return crossed
 
     def _interpolate(self, shade: Bytes) -> Bytes:
-        """Interpolate shades between the nodes."""
+        """Interpolates shades between the nodes."""
         import cv2
 
         scale = np.array([[RAY_SPACING_PX, 0.0, 0.0], [0.0, RAY_SPACING_PX, 0.0]])

@@ -84,7 +84,7 @@ def _open_images(references: Sequence[str]) -> FrameSource:
 
 
 def image_paths(references: Sequence[str]) -> list[Path]:
-    """Find image files by names, folders or patterns such as `photos/*.jpg`.
+    """Finds image files by names, folders or patterns such as `photos/*.jpg`.
 
     Raises:
         InvalidInputError: there are none.
@@ -160,7 +160,7 @@ class ImageSource(FrameSource):
 
 
 def images_in(folder: Path) -> list[Path]:
-    """List the image files of a folder, `view9.png` before `view10.png`.
+    """Lists the image files of a folder, `view9.png` before `view10.png`.
 
     Raises:
         InvalidInputError: there are none.
@@ -177,7 +177,7 @@ def is_image(path: Path) -> bool:
 
 
 def sort_naturally(paths: Sequence[Path]) -> list[Path]:
-    """Sort paths by name, with numbers in them by value."""
+    """Sorts paths by name, with numbers in them by value."""
 
     def key(path: Path) -> list[tuple[int, str]]:
         parts = re.split(r"(\d+)", str(path))
@@ -242,7 +242,7 @@ class VideoSource(FrameSource):
         self._capture.release()
 
     def _next_image(self) -> Image | None:
-        """Read the next readable frame; None at the end."""
+        """Reads the next readable frame; None at the end."""
         for _ in range(100):  # Consecutive unreadable frames after which the file ends.
             image = _read_rgb(self._capture)
             if image is not None:
@@ -341,7 +341,7 @@ class DeviceSource(FrameSource):
             capture.release()
 
     def _take_images(self, capture: cv2.VideoCapture) -> bool:
-        """Take images until there are no more or the source is closed; return whether there were
+        """Takes images until there are no more or the source is closed; returns whether there were
         any.
         """
         any_taken = False

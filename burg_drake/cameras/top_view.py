@@ -94,7 +94,7 @@ class BoardRectifier:
         self._shape = tuple(int(n) for n in np.maximum(np.rint(extent / side), 1)[::-1])
 
     def picture(self, image: Image) -> BoardPicture:
-        """Rectify an image to a top view.
+        """Rectifies an image to a top view.
 
         Args:
             image: (H, W, 3) RGB.
@@ -150,7 +150,7 @@ def board_picture(
     margin: float = 0.02,
     resolution: float = DEFAULT_PIXEL_SIZE,
 ) -> BoardPicture:
-    """Rectify one image to a top view; use `BoardRectifier` for successive images.
+    """Rectifies one image to a top view; use `BoardRectifier` for successive images.
 
     Args:
         image: (H, W, 3) RGB.
@@ -221,7 +221,7 @@ class SheetFinder:
         self._detector = MarkerDetector(board.layout)
 
     def find(self, image: Bytes) -> SheetFit:
-        """Find the sheet in an image.
+        """Finds the sheet in an image.
 
         Args:
             image: (H, W) or RGB (H, W, 3).
@@ -264,7 +264,7 @@ class SheetFinder:
         return SheetFit(H, distortion, middle, radius, error, ids)
 
     def _require_no_foreign_markers(self, grey: Bytes, fit: int) -> None:
-        """Reject a sheet with more foreign markers than fitting ones: boards of several sizes share
+        """Rejects a sheet with more foreign markers than fitting ones: boards of several sizes share
         a part of the first row.
         """
         layout = self._layout
@@ -280,7 +280,7 @@ class SheetFinder:
 
 
 def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:
-    """Fit homography and distortion to corners (N, 2), robust against misplaced corners of half
+    """Fits homography and distortion to corners (N, 2), robust against misplaced corners of half
     hidden markers.
     """
     H, _ = cv2.findHomography(p_SQ, corners, 0)
@@ -341,7 +341,7 @@ def board_observations(
     period: float = 1.0,
     stop: threading.Event | None = None,
 ) -> Iterator[BoardObservation]:
-    """Observe the board repeatedly.
+    """Observes the board repeatedly.
 
     Args:
         source: a live camera gives its newest frame each time, files give every frame. The caller

@@ -14,7 +14,7 @@ from burg_drake.station import Station, StationLike, as_station
 
 
 def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[str, float]:
-    """Compute the visible share of each free object's silhouette in a station's camera.
+    """Computes the visible share of each free object's silhouette in a station's camera.
 
     The silhouette is that of the object alone in an unbounded image. Its visible part is in the
     image and not hidden by another object, the table or an obstacle of the station. The arm is

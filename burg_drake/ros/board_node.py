@@ -73,7 +73,7 @@ class BoardNode:
         self._overlay: Overlay | None = None
 
     def locate(self, image: Any, camera_info: Any | None) -> Sighting:
-        """Locate the board in an image.
+        """Locates the board in an image.
 
         Args:
             image: `sensor_msgs/Image` or `CompressedImage`.
@@ -97,7 +97,7 @@ class BoardNode:
         )
 
     def draw(self, sighting: Sighting) -> Bytes | None:
-        """Draw the scene's objects over the image (H, W, 3), or a line that says why there are
+        """Draws the scene's objects over the image (H, W, 3), or a line that says why there are
         none; None without an image.
         """
         image, intrinsics = sighting.image, sighting.intrinsics

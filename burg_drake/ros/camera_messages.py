@@ -58,7 +58,7 @@ IMAGE_ENCODINGS = {
 
 
 def decode_image_message(message: Any) -> Bytes:
-    """Decode the image of a message.
+    """Decodes the image of a message.
 
     Args:
         message: `sensor_msgs/Image`, or `sensor_msgs/CompressedImage` (JPEG, PNG, ...).
@@ -116,7 +116,7 @@ def _decode_compressed(message: Any) -> Bytes:
 
 
 def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Intrinsics:
-    """Read the intrinsics of a `camera_info` message.
+    """Reads the intrinsics of a `camera_info` message.
 
     K and P are of the full sensor; the images may be cropped (`roi`) and binned (`binning_x`,
     `binning_y`). A binned pixel's centre is the centre of its sensor pixels, which `image_geometry`

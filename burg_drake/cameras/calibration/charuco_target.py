@@ -160,7 +160,7 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 def refine_corners(
     light: Single, corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> Array:
-    """Refine corners to the intersections of their edges.
+    """Refines corners to the intersections of their edges.
 
     Args:
         light: (H, W) image in linear light.

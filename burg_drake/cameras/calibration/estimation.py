@@ -61,7 +61,7 @@ class LensChoice:
 
 
 def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str) -> LensChoice:
-    """Fit all lens models and choose one.
+    """Fits all lens models and chooses one.
 
     Args:
         views: of one camera.
@@ -114,7 +114,7 @@ def _rational_if_better(
 
 
 def _fit_perspective_models(views: Sequence[CharucoView], target: CharucoTarget) -> list[LensFit]:
-    """Fit the perspective models, each from the one before."""
+    """Fits the perspective models, each from the one before."""
     start = guess_camera(views, target, "perspective")
     fits = []
     # From the simplest on; each model contains the one before.
@@ -306,7 +306,7 @@ def calibrate_views(
 def _select_usable_views(
     views: Sequence[CharucoView],
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Select sharp and different views of the most frequent size; return them and the rejected
+    """Selects sharp and different views of the most frequent size; returns them and the rejected
     ones.
     """
     sizes = Counter(view.size for view in views)
@@ -357,7 +357,7 @@ def _require_views(views: Sequence[CharucoView], refused: Sequence[tuple[str, st
 def _reject_outliers(
     views: list[CharucoView], fit: LensFit
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Remove views and corners that do not fit the others."""
+    """Removes views and corners that do not fit the others."""
     lengths = [np.linalg.norm(r, axis=1) for r in fit.residuals]
     typical = float(np.median(np.concatenate(lengths)))
     rms = np.array([rms_length(r) for r in fit.residuals])

@@ -20,8 +20,8 @@ FOCAL_LENGTH_GUESSES = np.geomspace(0.25, 3.0, 11)
 def guess_camera(
     views: Sequence[CharucoView], target: CharucoTarget, model: LensModel
 ) -> tuple[Intrinsics, Array]:
-    """Guess a camera without distortion, and (V, 4, 4) the target in its frame, by the focal length
-    that explains the median view best.
+    """Guesses a camera without distortion, and (V, 4, 4) poses of the target in its frame, by the
+    focal length that explains the median view best.
     """
     width, height = views[0].size
     found = []
@@ -77,7 +77,7 @@ def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
 
 
 def lens_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
-    """Project points and differentiate the projection.
+    """Projects points and differentiates the projection.
 
     Args:
         intrinsics: of the camera.
@@ -279,7 +279,7 @@ def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
 
 
 def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
-    """Pad a camera's coefficients to the number of a model."""
+    """Pads a camera's coefficients to the number of a model."""
     count = COEFFICIENT_COUNTS[model]
     distortion = (*camera.distortion, *(0.0,) * count)[:count]
     lens: LensModel = "fisheye" if model == "fisheye" else "perspective"
@@ -327,7 +327,7 @@ class _LensFitProblem:
         return _LensFitState(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
     def minimize(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
-        """Minimize the cost from an initial camera.
+        """Minimizes the cost from an initial camera.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
@@ -348,7 +348,7 @@ class _LensFitProblem:
         return state
 
     def step(self, state: _LensFitState, damping: float) -> tuple[_LensFitState | None, float]:
-        """Find a state of lower cost and the next damping; None if there is none."""
+        """Finds a state of lower cost and the next damping; None if there is none."""
         root = np.sqrt(state.weights)[:, None]
         Jp, Jc = state.by_pose * root[..., None], state.by_others * root[..., None]
         r = state.residuals * root

@@ -30,7 +30,7 @@ COVERAGE_GRID = (6, 8)
 
 
 def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDArray[np.int_]:
-    """Count the corners in each cell of the image.
+    """Counts the corners in each cell of the image.
 
     Args:
         views: of the target.
@@ -49,7 +49,7 @@ def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDAr
 
 
 def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
-    """Find `IMAGE_PARTS` without corners, or with corners along less than half of an edge, by the
+    """Finds `IMAGE_PARTS` without corners, or with corners along less than half of an edge, by the
     counts of `corner_coverage`.
     """
     bands = (slice(0, 1), slice(1, -1), slice(-1, None))
@@ -187,7 +187,7 @@ def _fit_information(fit: LensFit) -> Array:
 
 
 def _scaled_inverse(information: Array, fit: LensFit) -> Array:
-    """Invert an information matrix, scaled by a fit's parameter scales."""
+    """Inverts an information matrix, scaled by a fit's parameter scales."""
     scale = 1.0 / np.sqrt(np.diag(_fit_information(fit)))
     outer = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(information * outer, rcond=1e-14, hermitian=True) * outer)

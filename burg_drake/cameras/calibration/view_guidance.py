@@ -133,7 +133,7 @@ class ViewCollector:
     _previous_view: CharucoView | None = None
 
     def add_frame(self, frame: Frame) -> tuple[bool, str]:
-        """Add a frame if it is a good, new view.
+        """Adds a frame if it is a good, new view.
 
         Returns:
             `(taken, word)`: whether it was added, and an instruction for the person who holds the

@@ -44,10 +44,10 @@ MIN_HEIGHT_SIGMAS = 4.0
 
 
 def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> Single:
-    """(H, W) float32 in metres, 0 where there is nothing.
+    """Depth image (H, W) as float32 in metres, 0 where nothing was measured.
 
     Raises:
-        InvalidInputError: another size than the intrinsics', or another unit.
+        InvalidInputError: the size is not that of the intrinsics, or the unit is not metres.
     """
     depth = np.asarray(depth)
     if depth.ndim != 2 or depth.dtype.kind not in "fui":
@@ -59,10 +59,10 @@ def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> Single:
     clean = np.where(np.isfinite(depth) & (depth > 0), depth, 0).astype(np.float32)
     if not clean.any():
         raise InvalidInputError("the depth image is empty: no pixel has a depth above 0")
-    middle = float(np.median(clean[clean > 0]))
-    if middle > 20.0:  # Metres. Larger medians mean that the unit is wrong.
+    median = float(np.median(clean[clean > 0]))
+    if median > 20.0:  # Metres. Larger medians mean that the unit is wrong.
         raise InvalidInputError(
-            f"the median of the depth image is {middle:g} m; give metres (is it in millimetres?)"
+            f"the median of the depth image is {median:g} m; give metres (is it in millimetres?)"
         )
     return clean
 
@@ -71,8 +71,8 @@ class DepthAligner:
     """Aligns objects with one depth image.
 
     Args:
-        view: its camera.
-        depth: (H, W) without lens distortion [m]; 0 where there is nothing.
+        view: camera of the image.
+        depth: (H, W) image without lens distortion [m]; 0 where nothing was measured.
 
     Attributes:
         noise_sd: standard deviation of the heights of the board's surface [m].
@@ -123,7 +123,7 @@ class DepthAligner:
         return best[0].result(q, best[1])
 
     def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """0, as depth has no colors."""
+        """0, as depth has no colours."""
         return 0.0
 
     def mismatch(
@@ -146,8 +146,8 @@ class DepthAligner:
         return float(wrong.sum()), float(covered.sum())
 
     def points(self, shape: TargetShape, q: Array, others: Array) -> tuple[Array, Booleans]:
-        """Points (N, 3) in S near a displaced object and of no other object, and (N,) whether its
-        silhouette covers them.
+        """Measured points (N, 3) in S near a displaced object that belong to no other object, and
+        (N,) whether the object's silhouette covers them.
         """
         window = self.view.window(shape, q, 12.0)
         part = window_slices(window)
@@ -158,18 +158,11 @@ class DepthAligner:
         step = max(1, len(p_SQ) // 4000)  # Approximate number of points that are used.
         return p_SQ[::step], inside[::step]
 
-    def expected(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """Share of visible pixels in a displaced object's silhouette that are above the board."""
-        window = self.view.window(shape, q, 1.0)
-        part = window_slices(window)
-        mask = (self.view.buffer(shape, q, window) < others[part]) & self._valid[part]
-        return float(self._above_board[part][mask].mean()) if mask.any() else 0.0
-
     def edges(self, contour: ImageContour, others: Array) -> tuple[Array, Booleans]:
-        """(N,) distance along the outline's normals to the depth edge [pixels], and whether there
-        is one.
+        """(N,) distance along the outline's normals to the depth edge [pixels], and (N,) whether
+        there is one.
 
-        Only steps from the outline's own depth to clearly larger depth count.
+        A depth edge is a step from the outline's own depth to clearly larger depth.
         """
         min_depth_step = 0.012  # Metres from an outline to the surface behind it.
         search_distance = 6.0  # Pixels on both sides of the outline.
@@ -229,7 +222,7 @@ class _DepthMeasurements:
     def _add_outline(
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array
     ) -> None:
-        """Append measurements of the outline, in metres at the object."""
+        """Appends measurements of the outline, in metres at the object."""
         contour = visible_outline(aligner.view, shape, q, others)
         offset, falls = aligner.edges(contour, others)
         p_CQ, _ = aligner.view.project(contour.p_SQ[falls])
@@ -247,7 +240,7 @@ class _DepthMeasurements:
         self._groups = np.concatenate([self._groups, 100_000 + outline_sectors(contour)[falls]])
 
     def solve(self, turn: bool) -> DisplacementFit | None:
-        """Fit the step to the measurements."""
+        """Fits the step to the measurements."""
         if len(self._offset) < 30:
             return None
         return fit_displacement(
@@ -260,7 +253,7 @@ class _DepthMeasurements:
         )
 
     def result(self, q: Array, solved: DisplacementFit) -> Alignment:
-        """Build the alignment, with the last step applied."""
+        """Builds the alignment, with the last step applied."""
         residual = (self._offset - self._jacobian @ solved.step)[: self._surface_points]
         fits = np.abs(residual) < 4.0 * self._noise + 2e-3
         share = self._fits / max(self._count, 1) * (fits.mean() if len(fits) else 0.0)

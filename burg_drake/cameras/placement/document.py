@@ -216,7 +216,7 @@ def camera_versions() -> dict[str, str]:
 
 
 def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
-    """Combine checks of several photos of the same objects at the same places.
+    """Combines checks of several photos of the same objects at the same places.
 
     An object's displacement is the mean over the photos that measured it, weighted by variance per
     coordinate. It is `uncertain` if photos contradict each other or one shows the object's absence.

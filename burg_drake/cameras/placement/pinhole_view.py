@@ -35,9 +35,12 @@ class ImageWindow:
         """Rows and columns of the raster."""
         return round(self.height * self.scale), round(self.width * self.scale)
 
-    def scaled(self, scale: float) -> ImageWindow:
-        """The same part, with a raster of another scale."""
-        return replace(self, scale=scale)
+    def with_raster(self, pixel_count: int) -> ImageWindow:
+        """The same part, with a raster of at most about `pixel_count` pixels, no finer than the
+        image.
+        """
+        pitch = max(1.0, float(np.sqrt(self.width * self.height / pixel_count)))
+        return replace(self, scale=1.0 / pitch)
 
     def overlaps(self, other: ImageWindow) -> bool:
         """Whether two windows overlap in the image."""

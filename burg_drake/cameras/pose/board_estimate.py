@@ -59,7 +59,7 @@ class LocatedCamera:
 def locate_camera(
     station: StationLike, estimates: Sequence[BoardEstimate], intrinsics: Intrinsics
 ) -> LocatedCamera:
-    """Locate a fixed camera from several images.
+    """Locates a fixed camera from several images.
 
     Args:
         station: has the pose of the board.
@@ -98,7 +98,7 @@ def locate_camera(
 
 
 def _round_pose(X_WC: Array) -> Pose:
-    """Round to a hundredth of a millimetre and a thousandth of a degree."""
+    """Rounds to a hundredth of a millimetre and a thousandth of a degree."""
     pose = Pose.from_matrix(X_WC)
     assert pose.rpy_deg is not None
     (x, y, z), (roll, pitch, yaw) = pose.translation, pose.rpy_deg

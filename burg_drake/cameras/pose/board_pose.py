@@ -106,7 +106,7 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """Detect markers and estimate the pose from corners, then edges."""
+        """Detects markers and estimates the pose from corners, then edges."""
         seen = self._detector.detect(grey)
         if len(seen.duplicated) >= MIN_FOREIGN_MARKERS:
             # It is unknown on which of the sheets the objects belong.
@@ -195,7 +195,7 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """Build the estimate of a refined pose."""
+        """Builds the estimate of a refined pose."""
         wrong = self._wrong_board.describe_foreign_markers(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
@@ -362,7 +362,7 @@ def _median_side(corners: Array) -> float:
 
 
 def _residual_doubt(error: float) -> str:
-    """Describe too large residuals; empty if they are small."""
+    """Describes too large residuals; empty if they are small."""
     if error > 0.3:  # Pixels. With more, intrinsics are wrong or the board is not flat.
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"

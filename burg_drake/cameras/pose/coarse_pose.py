@@ -32,7 +32,7 @@ class CoarsePose:
 
 
 def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePose:
-    """Estimate the pose from corners.
+    """Estimates the pose from corners.
 
     Args:
         p_SQ: (N, 4, 3) corners on the board [m].
@@ -85,7 +85,7 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
 
 
 def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Booleans:
-    """Find markers whose corners fit a homography, by RANSAC, within a distance [pixels]."""
+    """Finds markers whose corners fit a homography, by RANSAC, within a distance [pixels]."""
 
     cv2.setRNGSeed(0)
     _, fits = cv2.findHomography(

@@ -167,7 +167,7 @@ class EdgeRefinement:
         return result
 
     def _count_misplaced_markers(self, result: EdgeRound, shift: Array) -> int:
-        """Count markers whose corners and most edges are not where the pose puts them. Unclear
+        """Counts markers whose corners and most edges are not where the pose puts them. Unclear
         edges alone do not count: small or half hidden markers have them, too.
         """
         marker, n = self._edges.marker[result.views.which], len(self._corners)
@@ -184,7 +184,7 @@ class EdgeRefinement:
         shift: Array,
         step: bool = True,
     ) -> tuple[EdgeRound, Array]:
-        """Run a round that allows each marker a shift and weights its edges by how well they fit
+        """Runs a round that allows each marker a shift and weights its edges by how well they fit
         each other, not the pose. Otherwise misplaced pages would be rejected as outliers.
 
         Args:
@@ -263,7 +263,7 @@ class EdgeRefinement:
         return RefinedPose(**vars(last), disturbance=found)
 
     def _fit_shifted(self, light: Single, last: EdgeRound, found: Disturbance) -> EdgeRound:
-        """Run a round that measures the edges at their shifted markers."""
+        """Runs a round that measures the edges at their shifted markers."""
         rest = last.residual - last.views.motion @ found.step
         there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
         shift = self._shifts_by_marker(there, rest)

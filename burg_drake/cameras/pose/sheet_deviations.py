@@ -213,7 +213,7 @@ class DisturbanceFit:
         self._equations = {sd: self._normal_equations(sd) for sd in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
-        """Find the most probable shifts and the pose step they imply.
+        """Finds the most probable shifts and the pose step they imply.
 
         Args:
             prior: (7, 7) information about the step of pose and bloom that is known before.
@@ -390,7 +390,7 @@ def wrong_marker_size(found: Disturbance, side: float) -> float:
 
 
 def implausible_reason(found: Disturbance) -> str:
-    """Explain why no print of the board can look like that; empty if it can."""
+    """Explains why no print of the board can look like that; empty if it can."""
     if abs(found.aspect) > 0.05:
         return (
             f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
@@ -405,7 +405,7 @@ def implausible_reason(found: Disturbance) -> str:
 
 
 def print_doubt(found: Disturbance) -> str:
-    """Describe doubts about the print, its flatness, or camera motion; empty if there are none."""
+    """Describes doubts about the print, its flatness, or camera motion; empty if there are none."""
     if abs(found.aspect) > 0.003:
         return (
             f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"

@@ -60,7 +60,7 @@ class WrongBoardCheck:
         self._blank_offsets = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
     def describe_foreign_markers(self, grey: Bytes, light: Single, X_SC: Array) -> str:
-        """Describe markers around the grid, where the document has none.
+        """Describes markers around the grid, where the document has none.
 
         Args:
             grey: (H, W) image.
@@ -89,7 +89,7 @@ class WrongBoardCheck:
         )
 
     def describe_blank_line(self, light: Single, X_SC: Array, used: Indices) -> str:
-        """Describe a row or column that should have markers but is blank paper.
+        """Describes a row or column that should have markers but is blank paper.
 
         Args:
             light, X_SC: see `describe_foreign_markers`.
