@@ -41,7 +41,7 @@ class BoardPoseEstimator(LeafSystem):
     Args:
         board: the board.
         intrinsics: of the camera.
-        scale: size of the print against the document along x and y.
+        scale: size of the print relative to the document along x and y.
     """
 
     def __init__(

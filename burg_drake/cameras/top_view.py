@@ -264,8 +264,8 @@ class SheetFinder:
         return SheetFit(H, distortion, middle, radius, error, ids)
 
     def _require_no_foreign_markers(self, grey: Bytes, fit: int) -> None:
-        """Rejects a sheet with more foreign markers than fitting ones: boards of several sizes share
-        a part of the first row.
+        """Rejects a sheet with more foreign markers than fitting ones, as boards of several sizes
+        share a part of the first row.
         """
         layout = self._layout
         other = find_foreign_markers(grey, layout)

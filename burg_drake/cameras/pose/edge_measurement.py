@@ -171,9 +171,8 @@ def project_edges(
 
 
 def project_with_motion(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[Array, Array]:
-    """Image points (N, 2) of points (N, 3), and derivatives (N, 2, 6) of the image points by a small
-    rotation and translation of the camera, see `BoardEstimate.covariance`. Undefined behind the
-    camera.
+    """Image points (N, 2) of points (N, 3), and their derivatives (N, 2, 6) by a small rotation
+    and translation of the camera, see `BoardEstimate.covariance`. Undefined behind the camera.
     """
     q_S = p_S - X_SC[:3, 3]
     p_C = q_S @ X_SC[:3, :3]
@@ -186,8 +185,8 @@ def project_with_motion(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tupl
 def predict_pixels(
     p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
 ) -> tuple[Array, Array]:
-    """Image points (..., 2) of points (..., 3) [pixels], and variances (...) of the image points along
-    the larger axis [pixels^2], infinite behind the camera.
+    """Image points (..., 2) of points (..., 3) [pixels], and their variances (...) along the larger
+    axis [pixels^2], infinite behind the camera.
     """
     p_S = p_SQ.reshape(-1, 3)
     ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > MIN_VISIBLE_DEPTH
@@ -343,8 +342,8 @@ def has_expected_profile(fits: EdgeFits) -> Booleans:
 
 
 def offset_variance(fits: EdgeFits, good: Booleans) -> Array:
-    """(N,) variance of offsets by the image's noise [pixels^2]; the noise grows with the root of the
-    light.
+    """(N,) variance of offsets by the image's noise, which grows with the root of the light
+    [pixels^2].
     """
     contrast = np.maximum(np.abs(fits.contrast), 4e-6)
     noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
