@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True)
 class ViewSettings:
-    """What a viewer can change while watching.
+    """Settings that a viewer can change while watching.
 
     Attributes:
         opacity: of the objects, 0 to 1; 0 leaves their outlines.
@@ -115,17 +115,16 @@ class FrameProcessor:
         if not steady:
             self._track = None
         elif estimate.valid:
-            X_SC = self._filtered(estimate)
+            X_SC = self._filter_pose(estimate)
         return LocatedFrame(frame=frame, estimate=estimate, X_SC=X_SC, milliseconds={"pose": ms})
 
-    def _filtered(self, estimate: BoardEstimate) -> Array:
+    def _filter_pose(self, estimate: BoardEstimate) -> Array:
         """The filtered pose after a new estimate."""
         from burg_drake.cameras.pose_systems import PoseFilter, Track
 
         if self._filter is None:
-            self._filter = PoseFilter(
-                period=1.0
-            )  # only a diagram updates by period; here each frame does
+            # Each frame updates the filter, so that the period has no effect.
+            self._filter = PoseFilter(period=1.0)
         self._track = self._filter.update(self._track or Track(), estimate)
         assert self._track.X_SC is not None
         return self._track.X_SC
@@ -203,7 +202,8 @@ def change_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any])
     """Changes settings by name.
 
     Raises:
-        InvalidInputError: no such setting, or a value of another type or out of bounds.
+        InvalidInputError: a setting does not exist, or its value has the wrong type or is out of
+            bounds.
         UnknownNameError: see `check_settings`.
     """
     max_number = 1e6  # Largest value of a setting.

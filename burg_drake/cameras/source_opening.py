@@ -31,7 +31,7 @@ def open_source(
     """Opens a source of frames.
 
     Args:
-        reference: what to open:
+        reference: source to open:
             `0`, `1`, ... or `/dev/video0`: a camera of this machine;
             `rtsp://...`, `http://...`: a stream from the network;
             `sim:STATION[/CAMERA]`: a simulated camera of a station that looks at `scene`;
@@ -116,8 +116,7 @@ class ImageSource(FrameSource):
 
     Args:
         paths: of the files.
-        name: of the source; by default the file's name, or the first file's and the number of
-            files.
+        name: of the source; by default the name of the first file, and the number of the others.
 
     Raises:
         InvalidInputError: there are no files, or none can be read.
@@ -197,7 +196,7 @@ class VideoSource(FrameSource):
         path: of the file.
 
     Attributes:
-        broken: number of unreadable frames so far, which were skipped.
+        broken: number of unreadable frames that were skipped so far.
 
     Raises:
         InvalidInputError: it cannot be read as a video.
@@ -257,8 +256,8 @@ class VideoSource(FrameSource):
 
 FRAME_TIMEOUT = 2.0
 """Seconds without an image after which a camera counts as lost."""
-FIRST_WAIT = 0.5  # Seconds until a lost camera is opened again; doubled each time ...
-MAX_WAIT = 5.0  # ... up to this.
+MIN_REOPEN_INTERVAL = 0.5  # Seconds until a lost camera is opened again; doubled each time ...
+MAX_REOPEN_INTERVAL = 5.0  # ... up to this.
 
 CAMERA_HINT = (
     "is it plugged in, is no other program using it, and do you have permission to read it?"
@@ -278,7 +277,7 @@ class DeviceSource(FrameSource):
     Args:
         name: name in messages.
         open_capture: opens the camera, again after a loss; returns None on failure.
-        question: hint on what to check if it does not open.
+        hint: text on what to check if the camera does not open.
 
     Raises:
         InvalidInputError: it does not open, or gives no images.
@@ -288,7 +287,7 @@ class DeviceSource(FrameSource):
         self,
         name: str,
         open_capture: Callable[[], cv2.VideoCapture | None],
-        question: str = CAMERA_HINT,
+        hint: str = CAMERA_HINT,
     ) -> None:
         self.name, self.live = name, True
         self._open = open_capture
@@ -297,7 +296,7 @@ class DeviceSource(FrameSource):
         first = None if capture is None else _read_rgb(capture)
         if capture is None or first is None:
             what = "does not open" if capture is None else "opens, but gives no images"
-            raise InvalidInputError(f"{name} {what}; {question}")
+            raise InvalidInputError(f"{name} {what}; {hint}")
         self.size = (first.shape[1], first.shape[0])
         self.fps = capture.get(cv2.CAP_PROP_FPS) or None
         self._changed = threading.Condition()
@@ -321,21 +320,21 @@ class DeviceSource(FrameSource):
         return frame
 
     def close(self) -> None:
-        """Lets go of the camera."""
+        """Releases the camera."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
         self._thread.join(timeout=FRAME_TIMEOUT)
 
     def _run(self, capture: cv2.VideoCapture | None) -> None:
-        wait = FIRST_WAIT
+        interval = MIN_REOPEN_INTERVAL
         while not self._closed.is_set():
             if capture is not None:
-                wait = FIRST_WAIT if self._take_images(capture) else wait
+                interval = MIN_REOPEN_INTERVAL if self._take_images(capture) else interval
                 capture.release()
-            if self._closed.wait(wait):
+            if self._closed.wait(interval):
                 return
-            wait = min(2.0 * wait, MAX_WAIT)
+            interval = min(2.0 * interval, MAX_REOPEN_INTERVAL)
             capture = self._open()
         if capture is not None:
             capture.release()
@@ -371,7 +370,7 @@ def open_device(
     """Opens a camera.
 
     Args:
-        device: its number, `/dev/videoN`, or the address of a stream (rtsp, http).
+        device: number of the camera, `/dev/videoN`, or the address of a stream (rtsp, http).
         size: requested width and height [pixels]; the camera's default if not given.
         fps: requested frames per second; some cameras take the nearest supported rate.
 

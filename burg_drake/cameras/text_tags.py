@@ -81,7 +81,7 @@ def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
     """Draws a tag into an image (H, W, 3), in place, clipped to the image.
 
     Args:
-        corner: column and row of its upper left corner.
+        corner: column and row of the tag's upper left corner.
     """
     colors, opacity = tag
     x, y = corner
@@ -98,14 +98,14 @@ def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
 def draw_tags(image: Bytes, boxes: Array, tags: Sequence[Tag], keep_clear: Booleans) -> None:
     """Draws tags into an image (H, W, 3), in place; see `find_tag_corners`.
 
-    Tags that had to move away get a line to the middle of their box.
+    A tag far from its box gets a line to the middle of the box.
     """
     sizes = [(colors.shape[1], colors.shape[0]) for colors, _ in tags]
     corners = find_tag_corners(boxes, sizes, keep_clear)
     for corner, size, box in zip(corners, sizes, boxes, strict=True):
         low, high = np.array(corner), np.array(corner) + size
-        apart = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
-        if np.hypot(*apart) > 12.0:  # Pixels. Farther tags are connected to their box by a line.
+        gap = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
+        if np.hypot(*gap) > 12.0:  # Pixels.
             middle = np.round(box.mean(axis=0)).astype(int)
             start = np.clip(middle, low, high)
             cv2.line(image, start.tolist(), middle.tolist(), PLATE_COLOR, 1, cv2.LINE_AA)

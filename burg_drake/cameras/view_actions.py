@@ -30,15 +30,15 @@ class ViewActions:
     Args:
         live: the session.
         folder: default folder of snapshots and recordings.
-        plain: also record the pictures without overlay.
+        plain: whether to record the pictures without overlay, too.
     """
 
     def __init__(self, live: LiveSession, folder: str | Path = ".", *, plain: bool = False) -> None:
         self.live, self.folder = live, Path(folder)
         self.recording: Recording | None = None
-        """The one that is being written."""
+        """The recording in progress; None if there is none."""
         self.checking = False
-        """A placement check is at work."""
+        """Whether a placement check is running."""
         self._plain = plain
         self._lock = threading.RLock()
         self._check: threading.Thread | None = None

@@ -22,8 +22,8 @@ def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[st
 
     Args:
         scene: objects with their poses.
-        station: has the camera and the obstacles.
-        camera: its name.
+        station: station with the camera and the obstacles.
+        camera: name of the camera.
 
     Returns:
         0 to 1 by instance, in the scene's order; 0 for objects behind the camera.

@@ -16,7 +16,7 @@ class Sighting:
     """The board in one image.
 
     Attributes:
-        stamp: the image's time, in the type that its message has it.
+        stamp: time of the image, in the type of its message.
         camera_frame: tf frame of the camera, x right, y down, z forward; may be empty.
         estimate: pose of the camera over the board; `reason` says why an image could not be used.
         image: (H, W, 3) RGB; None if it could not be read.
@@ -62,7 +62,7 @@ class BoardNode:
         Args:
             scene: objects on the board.
             intrinsics: of the camera; from its camera_info if None.
-            rectified: the images are free of distortion (`image_rect`).
+            rectified: whether the images are free of distortion (`image_rect`).
             print_scale: size of the printed board relative to the document, along x and y.
         """
         self._scene = scene

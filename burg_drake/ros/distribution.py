@@ -40,7 +40,7 @@ def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.
         environment: environment variables.
 
     Raises:
-        MissingDependencyError: its client library cannot be imported; the message says why and what
+        MissingDependencyError: the client library cannot be imported; the message says why and what
             to install.
     """
     version_variable = environment.get("ROS_VERSION", "")

@@ -146,9 +146,7 @@ def _set_pose(position: Any, orientation: Any, X: Array) -> None:
 
 
 NODE_NAME_PATTERN = re.compile(r"[A-Za-z]\w*", re.ASCII)  # Valid names of a node.
-TOPIC_NAME_PATTERN = re.compile(
-    r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII
-)  # Valid names of a topic.
+TOPIC_NAME_PATTERN = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)  # Valid topics.
 COMPRESSED_SUFFIX = "compressed"
 """Last part of the name of a topic with compressed images (image_transport)."""
 
@@ -270,9 +268,8 @@ class RosNode(ABC):
     """A running node of ROS 1 or ROS 2.
 
     Attributes:
-        publications: its topics.
-        camera_info: the latest `sensor_msgs/CameraInfo`, None before the
-            first.
+        publications: published topics.
+        camera_info: the latest `sensor_msgs/CameraInfo`; None before the first.
     """
 
     publications: Publications
