@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.frame_source import require_rgb
 from burg_drake.cameras.intrinsics import FieldOfView, Intrinsics
 from burg_drake.cameras.placement.document import ExtraObject, Placement, PlacementCheck
 from burg_drake.cameras.scene_mesh import SceneMesh, build_scene_mesh, object_footprints
@@ -205,11 +206,7 @@ class Overlay:
         return draw_notice(self._checked_copy(image), text)
 
     def _checked_copy(self, image: Bytes) -> Bytes:
-        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
-            raise InvalidInputError(
-                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
-                " 3) uint8"
-            )
+        require_rgb(image)
         self.intrinsics.require_size(image.shape[1], image.shape[0], "image")
         return np.array(image, order="C")
 

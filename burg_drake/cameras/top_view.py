@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
+from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image, require_rgb
 from burg_drake.cameras.intrinsics import NEAR_DISTANCE, Intrinsics
 from burg_drake.cameras.pose.board_pose import BoardPose, grey_image
 from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE, consistent_markers
@@ -104,11 +104,7 @@ class BoardRectifier:
                 board or another one.
         """
         image = np.asarray(image)
-        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-            raise InvalidInputError(
-                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
-                " 3) uint8"
-            )
+        require_rgb(image)
         p_SQ = self._pixel_centres()
         if self._pose is None:
             sheet = self._finder.find(image)

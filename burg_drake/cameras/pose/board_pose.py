@@ -237,17 +237,11 @@ class BoardPose:
         reprojection error [pixels].
         """
         marker = self._edges.marker[refined.views.which]
-        weight = refined.weight / refined.sd**2
-        normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
         count = np.bincount(marker[refined.weight > 0.0], minlength=len(self._p_SQ))
-        outer = weight[:, None, None] * normal[:, :, None] * normal[:, None]
-        total = np.zeros((len(self._p_SQ), 2, 2))
-        np.add.at(total, marker, outer)
-        toward = np.zeros((len(self._p_SQ), 2))
-        np.add.at(toward, marker, (weight * refined.residual)[:, None] * normal)
+        G, g = refined.shift_equations(self._edges)
         # A used marker shows 6 edges at least.
-        used = np.flatnonzero((count >= 6) & (np.linalg.cond(total) < 1e3))
-        shift = np.linalg.solve(total[used], toward[used][..., None])[..., 0]
+        used = np.flatnonzero((count >= 6) & (np.linalg.cond(G) < 1e3))
+        shift = np.linalg.solve(G[used], g[used][..., None])[..., 0]
         p_C = (self._p_SQ[used] - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3]
         error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
         return used, self.intrinsics.project(p_C) + shift[:, None], error

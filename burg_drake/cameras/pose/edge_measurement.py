@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,11 @@ class EdgeViews:
     motion: Array
     print: Array
     bloom: Array
+
+    @cached_property
+    def normal(self) -> Array:
+        """(N, 2) unit vectors along `across`."""
+        return self.across / np.sqrt((self.across**2).sum(axis=1, keepdims=True))
 
 
 def project_edges(

@@ -95,6 +95,18 @@ class EdgeRound:
     spread: LightSpread
     rms_motion: float
 
+    def shift_equations(self, edges: MarkerEdges) -> tuple[Array, Array]:
+        """(M, 2, 2) and (M, 2) normal equations of a shift of each marker by its edges' residuals
+        [pixels].
+        """
+        marker, normal = edges.marker[self.views.which], self.views.normal
+        information = self.weight / self.sd**2
+        count = edges.marker.max() + 1
+        G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
+        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+        np.add.at(g, marker, (information * self.residual)[:, None] * normal)
+        return G, g
+
 
 @dataclass(frozen=True, eq=False)
 class RefinedPose(EdgeRound):
@@ -202,7 +214,6 @@ class EdgeRefinement:
         max_shift = EDGE_MARGIN_PX / 2.0  # Pixels. The fit across an edge stays within the image.
         views = project_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
         marker = self._edges.marker[views.which]
-        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
         shift = np.clip(shift, -max_shift, max_shift)
         shifted_views = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, shifted_views, last.spread.blur)
@@ -213,11 +224,11 @@ class EdgeRefinement:
         weight = good.astype(float)
         for _ in range(WEIGHT_ROUNDS):
             information = weight / sd**2
-            rest = (
-                residuals_within_markers(normal, views.print, fits.offset, information, marker) / sd
+            residual = residuals_within_markers(
+                views.normal, views.print, fits.offset, information, marker
             )
-            weight = _robust_weights(rest, good)
-        offset = fits.offset + (normal * shift[marker]).sum(axis=1)
+            weight = _robust_weights(residual / sd, good)
+        offset = fits.offset + (views.normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
         motion = _weighted_step(J / sd[:, None], offset / sd, weight) if step else np.zeros(7)
         middle = self._edges.p_SE[views.which].mean(axis=0)
@@ -230,18 +241,13 @@ class EdgeRefinement:
             residual=offset - J @ motion,
             sd=sd,
         )
-        return found, self._shifts_by_marker(found, found.residual)
+        return found, self._shifts_by_marker(found)
 
-    def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
-        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]; 0 for markers
-        without edges."""
-        views = found.views
-        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
-        marker = self._edges.marker[views.which]
-        information = found.weight / found.sd**2
-        G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
-        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
-        np.add.at(g, marker, (information * offset)[:, None] * normal)
+    def _shifts_by_marker(self, found: EdgeRound) -> Array:
+        """(M, 2) shifts of the markers by the residuals of their edges [pixels]; 0 for markers
+        without edges.
+        """
+        G, g = found.shift_equations(self._edges)
         G += np.eye(2) / MAX_EDGE_OFFSET_PX**2
         return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
@@ -256,20 +262,17 @@ class EdgeRefinement:
             good = has_expected_profile(last.fits)
             last = replace(last, weight=_robust_weights(found.residual / last.sd, good))
             found = self._fit_disturbance(last)
-        X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._blur_covariance(last)
-        covariance[3:, 3:] += found.mean_square_aspect * self._stretch_covariance(X_SC[:3, 3])
-        residual = last.residual - last.views.motion @ found.step
-        last = replace(last, X_SC=X_SC, covariance=covariance, residual=residual)
-        return RefinedPose(**vars(last), disturbance=found)
+        last = _apply_disturbance(last, found)
+        covariance[3:, 3:] += found.mean_square_aspect * self._stretch_covariance(last.X_SC[:3, 3])
+        return RefinedPose(**vars(replace(last, covariance=covariance)), disturbance=found)
 
     def _fit_shifted(self, light: Single, last: EdgeRound, found: Disturbance) -> EdgeRound:
         """Runs a round that measures the edges at their shifted markers."""
-        rest = last.residual - last.views.motion @ found.step
-        there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
-        shift = self._shifts_by_marker(there, rest)
-        return self._iterate_by_marker(light, there, last.views.which, shift, step=False)[0]
+        last = _apply_disturbance(last, found)
+        shift = self._shifts_by_marker(last)
+        return self._iterate_by_marker(light, last, last.views.which, shift, step=False)[0]
 
     def _fit_disturbance(self, last: EdgeRound) -> Disturbance:
         return DisturbanceFit(
@@ -373,6 +376,12 @@ class EdgeRefinement:
         J = J * np.sqrt(weight / (scale * sd**2 + shared_variance))[:, None]
         covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
         return covariance
+
+
+def _apply_disturbance(last: EdgeRound, found: Disturbance) -> EdgeRound:
+    """The round with its pose and residuals corrected by the disturbance's step."""
+    residual = last.residual - last.views.motion @ found.step
+    return replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=residual)
 
 
 def _bloom_prior() -> Array:

@@ -185,7 +185,7 @@ class DisturbanceFit:
         kept = information > 0.0
         used, belongs = np.unique(marker, return_inverse=True)
         self._kept, self._marker = kept, belongs
-        self._normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        self._normal = views.normal
         self._offset = offset
         # Weighted sums over the edges of each marker.
         self._sums = np.zeros((len(used), len(belongs)))
