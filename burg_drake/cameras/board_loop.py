@@ -38,9 +38,8 @@ class LoopCamera:
 
     Attributes:
         name: name in the station.
-        samples: rays along each side of a pixel of the colour image, see
-            `Camera.samples`.
-        depth: give the estimator the depth image, too, to measure the scale of the board.
+        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
+        depth: whether the estimator gets the depth image, too, to measure the scale of the board.
         period: time between images [s]; images are continuous if None.
 
     Raises:
@@ -127,8 +126,8 @@ def build_board_loop(
 
     Args:
         scene: objects on the board, which the overlay draws at their targets.
-        station: has the camera.
-        camera: its name, or a `LoopCamera` with its settings.
+        station: station with the camera.
+        camera: name of the camera, or a `LoopCamera` with its settings.
         robot, engine, meshcat: see `build_station_diagram`.
         style: of the overlay, if not the default.
         filter: filter between estimate and overlay; none if not given.

@@ -392,9 +392,9 @@ def open_device(
     return source
 
 
-def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Names and sizes of the working cameras among the first `most` of this machine."""
-    for device in _candidate_devices(most):
+def open_devices() -> Iterator[tuple[str, tuple[int, int]]]:
+    """Names and sizes of the working cameras of this machine."""
+    for device in _candidate_devices():
         capture = _open_capture(device, None, None)
         image = None if capture is None else _read_rgb(capture)
         if capture is not None:
@@ -403,11 +403,12 @@ def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
             yield str(device), (image.shape[1], image.shape[0])
 
 
-def _candidate_devices(most: int) -> list[int]:
+def _candidate_devices() -> list[int]:
+    """Numbers of at most 64 cameras to try; without a list of the system, 0 to 3."""
     if sys.platform.startswith("linux"):
         numbers = (path.name.removeprefix("video") for path in Path("/dev").glob("video*"))
-        return sorted(int(number) for number in numbers if number.isdigit())[:most]
-    return list(range(min(most, 4)))
+        return sorted(int(number) for number in numbers if number.isdigit())[:64]
+    return [0, 1, 2, 3]
 
 
 def _open_capture(
