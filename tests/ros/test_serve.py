@@ -47,7 +47,9 @@ def test_a_moment_is_not_told() -> None:
         (1.0 + 0.9 * StatusLogIntervals.no_pose, LOST),
         (1.6, FOUND),
     ]
-    assert logged_lines(StatusLog(0.0), *sightings) == ["the board is in sight: 52 markers, 0.12 px"]
+    assert logged_lines(StatusLog(0.0), *sightings) == [
+        "the board is in sight: 52 markers, 0.12 px"
+    ]
 
 
 def test_reasons_that_alternate_do_not_flood_the_log() -> None:

@@ -125,7 +125,7 @@ class EdgeViews:
     @cached_property
     def normal(self) -> Array:
         """(N, 2) unit vectors along `across`."""
-        return self.across / np.sqrt((self.across**2).sum(axis=1, keepdims=True))
+        return np.asarray(self.across / np.sqrt((self.across**2).sum(axis=1, keepdims=True)))
 
 
 def project_edges(
