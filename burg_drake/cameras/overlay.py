@@ -180,17 +180,14 @@ class Overlay:
         state = _DrawState(shape, inverse(X_SC), lines, surface, marks)
         colors = np.array([self._colors[name] for name in shape.names], dtype=float)
         blend_surfaces(drawn, surface, colors, style.opacity)
-        line_sets = [_outline_lines(state, _brighten(colors), style.outline_width)]
-        line_sets += [
-            self._project_mark(mark.lines, mark.verdict, state.X_CS) for mark in marks.values()
-        ]
+        bright = _brighten(colors)
+        line_sets = [_outline_lines(state, bright, style.outline_width)]
+        line_sets += [self._project_mark(m.lines, m.verdict, state.X_CS) for m in marks.values()]
         if placement is not None and style.errors:
             circles = map(circle_extra_object, placement.extra)
             line_sets += [self._project_mark(circle, "off", state.X_CS) for circle in circles]
         if style.footprints:
-            line_sets.append(
-                self._project_footprints(state, standing, standing_owner, _brighten(colors))
-            )
+            line_sets.append(self._project_footprints(state, standing, standing_owner, bright))
         blend_lines(drawn, line_sets)
         if style.names or marks:
             self._write_tags(drawn, state, style.names)

@@ -145,13 +145,11 @@ def find_extra_objects(
     disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     unexplained = cv2.morphologyEx(unexplained.astype(np.uint8), cv2.MORPH_OPEN, disk)
     size = 2 * round(0.02 * pitch / 2) + 1  # Metres within which regions belong to one object.
-    count, labels = cv2.connectedComponents(
-        cv2.dilate(unexplained, np.ones((size, size), np.uint8))
-    )
+    grown = cv2.dilate(unexplained, np.ones((size, size), np.uint8))
+    count, labels = cv2.connectedComponents(grown)
     hidden = _HiddenBoard(aligner, placed)
-    found = [
-        _describe_region(view, (labels == k) & (unexplained > 0), hidden) for k in range(1, count)
-    ]
+    labels *= unexplained
+    found = [_describe_region(view, labels == k, hidden) for k in range(1, count)]
     large = []
     for area, extra in found:
         reach = SEARCH_RANGE + extra.width / 2.0

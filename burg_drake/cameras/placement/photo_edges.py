@@ -26,7 +26,7 @@ class StepLines:
         t: (T,) distances from the expected step, outwards [pixels].
         light: (N, T, 3) of the photo.
         behind: (N, T, 3) the background behind the object, in the light farther outside.
-        color: (N, 3) of the object, some pixels inside its edge.
+        color: (N, 3) of the object, farther inside.
         tone: (N, 3) expected ratio of the object's colour at its edge to `color`.
         strip: (N,) distance from the step to the next material [pixels]; -infinity if there is
             none.
@@ -281,7 +281,8 @@ def find_near_edges(profiles: NormalProfiles, background: EmptyBoard) -> PhotoEd
     inner_width = 0.6  # Pixels over which the object's colour is sampled; many objects have a rim.
     outer_width = 3.0  # Pixels over which the light outside is sampled.
     max_rms_share = 0.2  # Residual of a good edge, as a fraction of the contrast of paper and ink.
-    t, covered, occluded = profiles.t, profiles.covered, profiles.occluded
+    t, light = profiles.t, profiles.light
+    covered, occluded = profiles.covered, profiles.occluded
     # Pixels. Standard deviation from pixel area and interpolation.
     blur = float(np.hypot(background.blur, 0.4))
     # Blur standard deviations from an edge at which it is no longer seen.
@@ -296,19 +297,13 @@ def find_near_edges(profiles: NormalProfiles, background: EmptyBoard) -> PhotoEd
     usable = inner.any(axis=1) & outer.any(axis=1) & ~(covered & (t > 0.7)).any(axis=1)
     mixed = (occluded & (t > 0.0)).any(axis=1) & ~(occluded | (t < 0.0)).all(axis=1)
     usable &= ~mixed & ~(occluded & (t < 0.0) & (t > -2.0) & ~covered).any(axis=1)
-    color = _mean_of_samples(profiles.light, inner)
+    color = _mean_of_samples(light, inner)
     behind, left_outside = _background_light(profiles, outer)
     used = (core | (t > -1.0)) & (t > start - inner_width) & (t < clear + outer_width)
     paper = background.contrast
     seen = used.any(axis=0)
     lines = StepLines(
-        t[seen],
-        profiles.light[:, seen],
-        behind[:, seen],
-        color,
-        profiles.tone,
-        strip,
-        used[:, seen],
+        t[seen], light[:, seen], behind[:, seen], color, profiles.tone, strip, used[:, seen]
     )
     fit = fit_steps(lines, blur, background.noise, paper)
     # Pixels at the contrast of paper and ink; grows as the contrast falls.
