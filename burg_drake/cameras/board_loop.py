@@ -38,9 +38,8 @@ class LoopCamera:
 
     Attributes:
         name: name in the station.
-        samples: rays along each side of a pixel of the colour image, see
-            `Camera.samples`.
-        depth: give the estimator the depth image, too, to measure the scale of the board.
+        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
+        depth: whether the estimator gets the depth image, too, to measure the scale of the board.
         period: time between images [s]; images are continuous if None.
 
     Raises:
@@ -82,12 +81,12 @@ class BoardLoop:
         return X_SC
 
     def place_camera(self, context: Context, X_SC: Array) -> None:
-        """Move the camera over the board."""
+        """Moves the camera over the board."""
         mine = self.sensor.GetMyMutableContextFromRoot(context)
         self.sensor.SetX_PB(mine, self._in_world(X_SC))
 
     def place_object(self, context: Context, instance: str, X_SO: Array) -> None:
-        """Move an object, in the simulation only: the overlay shows its target.
+        """Moves an object, in the simulation only: the overlay shows its target.
 
         Raises:
             UnknownNameError: the scene has no such free instance.
@@ -127,8 +126,8 @@ def build_board_loop(
 
     Args:
         scene: objects on the board, which the overlay draws at their targets.
-        station: has the camera.
-        camera: its name, or a `LoopCamera` with its settings.
+        station: station with the camera.
+        camera: name of the camera, or a `LoopCamera` with its settings.
         robot, engine, meshcat: see `build_station_diagram`.
         style: of the overlay, if not the default.
         filter: filter between estimate and overlay; none if not given.

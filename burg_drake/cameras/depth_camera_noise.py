@@ -27,7 +27,7 @@ def noisy_depth(
     normals: Single | None = None,
     color: Bytes | None = None,
 ) -> Single:
-    """Add the noise of a depth camera to a depth image.
+    """Adds the noise of a depth camera to a depth image.
 
     Edges get lateral noise and flying pixels; depth gets axial noise and quantization; occluded,
     grazing and dark pixels are removed. Equal generators give equal images. Pixels without depth
@@ -66,7 +66,7 @@ def _add_depth_errors(
     focal: float,
     rng: np.random.Generator,
 ) -> Single:
-    """Add edge and depth errors, before pixels are removed."""
+    """Adds edge and depth errors, before pixels are removed."""
     measured = depth.copy()
     if noise.lateral_base or noise.lateral_angle or noise.flying:
         edges = depth_edges(depth)
@@ -128,7 +128,7 @@ def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
 def _check_image_shape(
     name: str, image: np.ndarray | None, shape: tuple[int, ...], kind: type[np.generic]
 ) -> None:
-    """Check that an image has the depth image's size."""
+    """Checks that an image has the depth image's size."""
     if image is None:
         return
     if image.shape != (*shape, 3) or not np.issubdtype(image.dtype, kind):
@@ -139,7 +139,7 @@ def _check_image_shape(
 
 
 DEPTH_EDGE_THRESHOLD = 0.01
-"""Second difference of inverse depth at an edge, as a fraction of it."""
+"""Least second difference of inverse depth at an edge, as a fraction of the inverse depth."""
 
 
 def inverse_depth(depth: Single) -> Single:
@@ -169,8 +169,8 @@ def incidence_angle(depth: Single, intrinsics: Intrinsics, normals: Single | Non
     Args:
         depth: (H, W) [m], 0 for none.
         intrinsics: of the camera.
-        normals: (H, W, 3) unit normals in the camera's frame. If None, they are those of the depth
-            image, without lens distortion.
+        normals: (H, W, 3) unit normals in the camera's frame; computed from the depth image if
+            None, as if the lens had no distortion.
     """
     if normals is None:
         cosine = _incidence_cosine(inverse_depth(depth), intrinsics)
@@ -229,14 +229,14 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
     """(H, W) standard deviation of depth [m].
 
     `a + b (z - c)^2`, and beyond 60 degrees in addition `d / sqrt(z) (t / (pi/2 - t))^2`, with the
-    angle t (Nguyen, Izadi and Lovell 2012, equations of the axial noise). Their angle is that of a
-    turned plane in the image's middle; here it is measured against the ray. As in their model, the
-    second term begins with a step (0.4 mm at 1 m).
+    angle t (Nguyen, Izadi and Lovell 2012, equations of the axial noise). They turned a plane in
+    the image's middle; here t is the angle to the ray. As in their model, the second term begins
+    with a step (0.4 mm at 1 m).
 
     Args:
         depth: (H, W) [m], 0 for none.
         angle: (H, W) of incidence [rad]; None if `axial_angle` is 0.
-        noise: has a, b, c and d as `axial_base`, `axial_square`, `axial_center`, `axial_angle`.
+        noise: a, b, c and d are `axial_base`, `axial_square`, `axial_center` and `axial_angle`.
     """
     sigma: Single = np.float32(noise.axial_square) * np.square(
         depth - np.float32(noise.axial_center)
@@ -254,7 +254,7 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
 def add_axial_noise(
     depth: Single, angle: Single | None, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Add independent normal errors with the standard deviation `axial_sigma` to depth."""
+    """Adds independent normal errors with the standard deviation `axial_sigma` to depth."""
     moved = rng.standard_normal(depth.shape, dtype=np.float32)
     moved *= axial_sigma(depth, angle, noise)
     moved += depth
@@ -264,7 +264,7 @@ def add_axial_noise(
 def add_disparity_noise(
     depth: Single, focal: float, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Add normal errors of `disparity_sigma` to the disparities and round to `disparity_step`.
+    """Adds normal errors of `disparity_sigma` to the disparities and rounds to `disparity_step`.
 
     While errors are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
     (Grunnet-Jepsen, Sweetser and Woodfill, "Tuning depth cameras for best performance"; Keselman et
@@ -275,7 +275,7 @@ def add_disparity_noise(
     Args:
         depth: (H, W) [m], 0 for none.
         focal: f_x [pixels].
-        noise: has sigma and step, either of which may be 0, and the baseline b.
+        noise: with sigma and step, either of which may be 0, and the baseline b.
         rng: random generator; not used without errors.
     """
     scale = np.float32(focal * abs(noise.baseline))
@@ -293,7 +293,7 @@ def add_disparity_noise(
 
 
 def _drop_invalid(moved: Single, depth: Single) -> Single:
-    """Remove pixels that had no depth, or whose noisy depth is not positive."""
+    """Removes pixels that had no depth, or whose noisy depth is not positive."""
     return np.where((depth > 0.0) & (moved > 0.0), moved, np.float32(0.0))
 
 
@@ -305,7 +305,7 @@ def lateral_sigma(angle: Single | Array, noise: DepthNoise) -> Array:
 
     Args:
         angle: of incidence, of any shape [rad].
-        noise: has a and b as `lateral_base` and `lateral_angle`.
+        noise: a and b are `lateral_base` and `lateral_angle`.
     """
     t = np.minimum(np.asarray(angle, dtype=float), MAX_NOISE_ANGLE)
     return np.asarray(noise.lateral_base + noise.lateral_angle * t / (np.pi / 2 - t))
@@ -318,7 +318,7 @@ def add_lateral_noise(
     noise: DepthNoise,
     rng: np.random.Generator,
 ) -> Single:
-    """Fray edges: pixels near them take the depth of a pixel a random step away.
+    """Frays edges: pixels near them take the depth of a pixel a random step away.
 
     Only pixels near an edge are changed: lateral noise was measured at edges, and inside a surface
     it would add to the axial noise, which already includes it. Barron and Malik ("Intrinsic scene
@@ -334,7 +334,7 @@ def add_lateral_noise(
         rng: random generator.
     """
     largest = float(lateral_sigma(np.array(MAX_NOISE_ANGLE if angle is not None else 0.0), noise))
-    # Standard deviations of lateral noise that are sampled.
+    # Pixels up to three standard deviations from an edge are changed.
     size = 2 * int(np.ceil(3.0 * largest)) + 1
     near = cv2.dilate(edges.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     rows, columns = np.divmod(np.flatnonzero(near & (depth > 0.0)), depth.shape[1])
@@ -351,7 +351,7 @@ def add_lateral_noise(
 def add_flying_pixels(
     depth: Single, edges: Booleans, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Move a share of the pixels at edges to random depths between near and far.
+    """Moves a share of the pixels at edges to random depths between near and far.
 
     A pixel that sees two surfaces measures a mixture ("Color-guided flying pixel correction in
     depth images", arXiv 2410.08084); the mixing ratio is random here, an estimate. Edges without a
@@ -360,7 +360,7 @@ def add_flying_pixels(
     Args:
         depth: (H, W) [m], 0 for none.
         edges: (H, W) see `depth_edges`.
-        noise: has the share, `flying`.
+        noise: `flying` is the share.
         rng: random generator.
     """
     around = np.ones((3, 3), np.uint8)
@@ -379,7 +379,7 @@ def add_flying_pixels(
 def hidden_from_second_imager(
     depth: Single, focal: float, baseline: float, *, same_view: bool
 ) -> Booleans:
-    """Find pixels whose points are hidden from a second imager beside the camera.
+    """Finds pixels whose points are hidden from a second imager beside the camera.
 
     The second imager sees pixel u of depth z at `u - f b / z`, in the same row. A box at z1 before
     a wall at z2 casts a shadow of `f b (1 / z1 - 1 / z2)` pixels on its left if the second imager
@@ -401,42 +401,43 @@ def hidden_from_second_imager(
         return turned[:, ::-1]
     seen = depth > 0.0
     disparity = np.float32(focal * baseline) * inverse_depth(depth)
-    there = np.arange(depth.shape[1], dtype=np.float32) - disparity
+    second_columns = np.arange(depth.shape[1], dtype=np.float32) - disparity
     hidden = np.zeros(depth.shape, dtype=bool)
-    overtaken = np.flatnonzero(_overtaken_pixels(there, disparity) & seen)
+    overtaken = np.flatnonzero(_overtaken_pixels(second_columns, disparity) & seen)
     if len(overtaken):
-        nearest, pixels = _second_view_disparity(there, disparity)
-        # Pixels. A surface occludes another one if its disparity is larger by this.
-        before = nearest.ravel()[pixels.ravel()[overtaken]] > disparity.ravel()[overtaken] + 0.5
-        hidden.ravel()[overtaken[before]] = True
+        nearest, pixels = _second_view_disparity(second_columns, disparity)
+        # Half a pixel more disparity than another surface is needed to hide it.
+        is_nearer = nearest.ravel()[pixels.ravel()[overtaken]] > disparity.ravel()[overtaken] + 0.5
+        hidden.ravel()[overtaken[is_nearer]] = True
     if same_view:
-        hidden |= seen & (there < -0.5)
+        hidden |= seen & (second_columns < -0.5)
     return hidden
 
 
-def _overtaken_pixels(there: Single, disparity: Single) -> Booleans:
-    """Find pixels for which a pixel further right appears further left in the second image.
-    Surfaces that both imagers see have none, however steep. A nearer surface begins half a pixel
-    before its first pixel's centre. Pixels without depth hide nothing.
+def _overtaken_pixels(second_columns: Single, disparity: Single) -> Booleans:
+    """Finds pixels for which a pixel further right appears further left in the second image, whose
+    columns are `second_columns`. Surfaces that both imagers see have no such pixels, however steep
+    they are. A nearer surface starts half a pixel before the centre of its first pixel. Pixels
+    without depth hide nothing.
     """
-    begins = there.copy()
+    starts = second_columns.copy()
     nearer = disparity[:, 1:] > disparity[:, :-1] + np.float32(1.0)
-    np.subtract(begins[:, 1:], np.float32(0.5), out=begins[:, 1:], where=nearer)
-    leftmost = np.minimum.accumulate(begins[:, ::-1], axis=1)[:, ::-1]
-    overtaken = np.zeros(there.shape, dtype=bool)
-    np.greater(there[:, :-1], leftmost[:, 1:], out=overtaken[:, :-1])
+    np.subtract(starts[:, 1:], np.float32(0.5), out=starts[:, 1:], where=nearer)
+    leftmost = np.minimum.accumulate(starts[:, ::-1], axis=1)[:, ::-1]
+    overtaken = np.zeros(second_columns.shape, dtype=bool)
+    np.greater(second_columns[:, :-1], leftmost[:, 1:], out=overtaken[:, :-1])
     return overtaken
 
 
-def _second_view_disparity(there: Single, disparity: Single) -> tuple[Single, Indices]:
-    """Largest disparity at each pixel of the second image (H, V), extended to the left by up to two
-    widths; and flat indices (H, W) of the first image's pixels in it. Gaps of one pixel, as in
-    stretched surfaces, are filled.
+def _second_view_disparity(second_columns: Single, disparity: Single) -> tuple[Single, Indices]:
+    """Largest disparity at each pixel of the second image (H, V), which is extended to the left by
+    up to two widths; and flat indices (H, W) into it of the first image's pixels. Gaps of one
+    pixel, as in stretched surfaces, are filled.
     """
-    height, width = there.shape
+    height, width = second_columns.shape
     left = min(int(np.ceil(disparity.max())) + 1, 2 * width)
     image = np.zeros((height, left + width), dtype=np.float32)
-    pixels = np.rint(np.maximum(there, np.float32(-left))).astype(np.intp)
+    pixels = np.rint(np.maximum(second_columns, np.float32(-left))).astype(np.intp)
     pixels += (left + image.shape[1] * np.arange(height))[:, None]
     np.maximum.at(image.ravel(), pixels.ravel(), disparity.ravel())
     return cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((1, 3), np.uint8)), pixels
@@ -448,7 +449,7 @@ def grazing_probability(angle: Single, noise: DepthNoise) -> Single:
 
     Args:
         angle: (H, W) of incidence [rad].
-        noise: has the two angles.
+        noise: with the two angles.
     """
     low, high = np.deg2rad([noise.grazing_from_deg, noise.grazing_to_deg])
     if high <= low:
@@ -463,7 +464,7 @@ def dark_probability(color: Bytes, noise: DepthNoise) -> Single:
 
     Args:
         color: (H, W, 3) red, green, blue.
-        noise: has the two figures.
+        noise: with the two figures.
     """
     luma = cv2.cvtColor(np.ascontiguousarray(color), cv2.COLOR_RGB2GRAY).astype(np.float32)
     dark = np.maximum(np.float32(1.0) - luma / np.float32(noise.dark_below), np.float32(0.0))
@@ -499,7 +500,7 @@ def _smooth_field(shape: tuple[int, ...], size: float, rng: np.random.Generator)
     """
     margin = int(np.ceil(3.0 * size))
     kernel = cv2.getGaussianKernel(2 * margin + 1, size, cv2.CV_32F)
-    kernel /= np.linalg.norm(kernel)  # of unit variance after it
+    kernel /= np.linalg.norm(kernel)  # so that the smoothed field has unit variance
     height, width = shape
     wide = (height + 2 * margin, width + 2 * margin)
     uniform = rng.random(wide, dtype=np.float32)

@@ -265,8 +265,8 @@ SENSOR_PRESETS = {
 
 
 SecondView = Literal["none", "same", "wide"]
-"""What the second imager or the projector sees: it is of no interest; as much as the first one to
-each side; all that the first one sees, if nothing is in between."""
+"""View of the second imager or the projector: not modelled; as wide as the camera's; or all that
+the camera sees, unless something is in between."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,9 +275,9 @@ class DepthNoise:
 
     Attributes:
         baseline: x of the second imager, or of the projector, in the camera's frame [m].
-        second_view: what the second imager or the projector sees. Surfaces that it does not see
-            have no depth. `same`: as much to each side as the camera. `wide`: all that the camera
-            sees, unless something is in between. `none`: all.
+        second_view: view of the second imager or the projector; surfaces outside it have no depth.
+            `same`: as wide as the camera's. `wide`: all that the camera sees, unless something is
+            in between. `none`: all surfaces.
         axial_base: standard deviation of depth at the depth `axial_center` [m]. At the depth z it
             is `axial_base + axial_square (z - axial_center)^2`.
         axial_square: growth of the standard deviation of depth with the squared distance from

@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True)
 class ViewSettings:
-    """What a viewer can change while watching.
+    """Settings that a viewer can change while watching.
 
     Attributes:
         opacity: of the objects, 0 to 1; 0 leaves their outlines.
@@ -99,7 +99,7 @@ class FrameProcessor:
         self._track: Track | None = None
 
     def locate(self, frame: Frame, *, steady: bool = False) -> LocatedFrame:
-        """Estimate the pose of a frame's camera.
+        """Estimates the pose of a frame's camera.
 
         Args:
             frame: frame to process.
@@ -115,17 +115,16 @@ class FrameProcessor:
         if not steady:
             self._track = None
         elif estimate.valid:
-            X_SC = self._filtered(estimate)
+            X_SC = self._filter_pose(estimate)
         return LocatedFrame(frame=frame, estimate=estimate, X_SC=X_SC, milliseconds={"pose": ms})
 
-    def _filtered(self, estimate: BoardEstimate) -> Array:
+    def _filter_pose(self, estimate: BoardEstimate) -> Array:
         """The filtered pose after a new estimate."""
         from burg_drake.cameras.pose_systems import PoseFilter, Track
 
         if self._filter is None:
-            self._filter = PoseFilter(
-                period=1.0
-            )  # only a diagram updates by period; here each frame does
+            # Each frame updates the filter, so that the period has no effect.
+            self._filter = PoseFilter(period=1.0)
         self._track = self._filter.update(self._track or Track(), estimate)
         assert self._track.X_SC is not None
         return self._track.X_SC
@@ -133,7 +132,7 @@ class FrameProcessor:
     def draw(
         self, located: LocatedFrame, settings: ViewSettings, placement: PlacementCheck | None = None
     ) -> Bytes:
-        """Draw the scene over the frame, or a line with the reason why not.
+        """Draws the scene over the frame, or a line with the reason why not.
 
         Returns:
             (H, W, 3) RGB.
@@ -151,7 +150,7 @@ class FrameProcessor:
         return self._overlay.draw(image, located.X_SC, placement=placement, style=style)
 
     def check(self, located: LocatedFrame) -> PlacementCheck:
-        """Check the placement of the objects; takes a while."""
+        """Checks the placement of the objects; takes a while."""
         from burg_drake.cameras.placement.check import check_placement
 
         depth = located.frame.depth
@@ -182,7 +181,7 @@ def placement_order(scene: Scene) -> tuple[str, ...]:
 
 
 def check_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
-    """Check settings and return them unchanged.
+    """Checks settings and returns them unchanged.
 
     Raises:
         InvalidInputError: an opacity outside 0 to 1.
@@ -200,10 +199,11 @@ def check_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
 
 
 def change_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any]) -> ViewSettings:
-    """Change settings by name.
+    """Changes settings by name.
 
     Raises:
-        InvalidInputError: no such setting, or a value of another type or out of bounds.
+        InvalidInputError: a setting does not exist, or its value has the wrong type or is out of
+            bounds.
         UnknownNameError: see `check_settings`.
     """
     max_number = 1e6  # Largest value of a setting.
@@ -225,7 +225,7 @@ def change_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any])
 
 
 def describe_pose(estimate: BoardEstimate, board: Board) -> str:
-    """Describe the estimated pose of a camera in a line of text."""
+    """Describes the estimated pose of a camera in a line of text."""
     if not estimate.valid:
         return estimate.reason or "no pose"
     line = f"{len(estimate.ids)} of {len(board.layout.ids)} markers"
@@ -251,7 +251,7 @@ def _format_two_digits(value: float) -> str:
 
 
 def time_call(work: Callable[[], T]) -> tuple[T, float]:
-    """Call `work`; return its result and its duration [ms]."""
+    """Calls `work`; returns its result and its duration [ms]."""
     start = time.perf_counter()
     result = work()
     return result, 1e3 * (time.perf_counter() - start)

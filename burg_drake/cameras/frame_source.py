@@ -6,9 +6,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from burg_drake.core import Array, BurgError, Bytes
+import numpy as np
+
+from burg_drake.core import Array, BurgError, Bytes, InvalidInputError
 
 Image = Bytes
+
+
+def require_rgb(image: Image) -> None:
+    """Rejects arrays that are no RGB image (H, W, 3).
+
+    Raises:
+        InvalidInputError: the array has another shape or type.
+    """
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise InvalidInputError(
+            f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W, 3)"
+            " uint8"
+        )
 
 
 class CameraLost(BurgError):
@@ -64,7 +79,7 @@ class FrameSource(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release the camera or file; another thread's `read` returns None."""
+        """Releases the camera or file; another thread's `read` returns None."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Frames to the end; waits while a camera is away."""

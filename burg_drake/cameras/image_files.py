@@ -30,7 +30,7 @@ from burg_drake.station import MAX_IMAGE_SIDE
 
 @contextlib.contextmanager
 def silence_opencv() -> Iterator[None]:
-    """Stop OpenCV and FFmpeg from writing errors to the terminal; errors are raised instead."""
+    """Stops OpenCV and FFmpeg from writing errors to the terminal; errors are raised instead."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when FFmpeg is first used
     log = getattr(cv2.utils, "logging", cv2)  # has the log functions in OpenCV 5; cv2 in OpenCV 4
     level = log.getLogLevel()
@@ -78,7 +78,7 @@ def read_image(path: str | Path) -> Image:
 
 
 def decode_image(data: bytes) -> Image | None:
-    """Decode an image file's contents to (H, W, 3) RGB; None if they are not an image or too
+    """Decodes an image file's contents to (H, W, 3) RGB; None if they are not an image or too
     large.
     """
     try:
@@ -95,7 +95,7 @@ def decode_image(data: bytes) -> Image | None:
 
 
 def refuse_huge_image(data: bytes, name: str) -> None:
-    """Reject an image that would take too much memory, before it is decoded; a small file may hold
+    """Rejects an image that would take too much memory, before it is decoded; a small file may hold
     a large image of one colour.
 
     Args:
@@ -139,7 +139,7 @@ def _is_cut_off(data: bytes) -> bool:
 
 
 def require_image_format(path: str | Path) -> None:
-    """Reject image file names without the suffix of a supported format.
+    """Rejects image file names without the suffix of a supported format.
 
     Raises:
         InvalidInputError: no such format.
@@ -169,7 +169,7 @@ def write_image(path: str | Path, image: Image) -> None:
 
 
 def encode_jpeg(image: Image, quality: int) -> bytes:
-    """Encode an RGB image (H, W, 3) as JPEG, of a quality from 0 to 100."""
+    """Encodes an RGB image (H, W, 3) as JPEG, of a quality from 0 to 100."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     return bytes(data.tobytes())
 

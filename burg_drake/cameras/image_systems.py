@@ -24,12 +24,12 @@ from burg_drake.scene import SceneLike, as_scene
 
 
 class CameraSource(LeafSystem):
-    """Shows the frames of a source.
+    """Outputs the frames of a source.
 
     Ports:
         color_image (output, ImageRgba8U): the newest frame.
-        depth_image (output, ImageDepth32F): its depth [m], infinite where none was measured; only
-        if the source has depth.
+        depth_image (output, ImageDepth32F): the frame's depth [m], infinite where none was
+        measured; only if the source has depth.
         valid (output, 1): 1 as long as the source gives frames; 0 when the camera is lost or the
         source has ended, and the images are the last ones.
         frame_time (output, 1): time of the frame by the source's clock [s].
@@ -39,7 +39,7 @@ class CameraSource(LeafSystem):
     While a camera is lost, updates wait for it for a moment each.
 
     Args:
-        source: of frames; it stays the caller's to close.
+        source: source of frames; the caller closes it.
         fps: updates a second; the source's own, or 30, if not given.
 
     Raises:
@@ -89,7 +89,7 @@ class CameraSource(LeafSystem):
 
 
 def _next_frame(source: FrameSource) -> Frame | None:
-    """Read the next readable frame."""
+    """Reads the next readable frame."""
     while True:
         try:
             return source.read()
@@ -98,7 +98,7 @@ def _next_frame(source: FrameSource) -> Frame | None:
 
 
 def rgba_image(pixels: Bytes) -> ImageRgba8U:
-    """Convert pixels (H, W, 3) to an opaque Drake image."""
+    """Converts pixels (H, W, 3) to an opaque Drake image."""
     image = ImageRgba8U(pixels.shape[1], pixels.shape[0])
     image.mutable_data[..., :3] = pixels
     image.mutable_data[..., 3] = 255
@@ -181,7 +181,7 @@ class DepthNoiseSystem(LeafSystem):
             np.where(np.isfinite(perfect), perfect, np.float32(0.0)),
             self.noise,
             self.intrinsics,
-            rng_from("depth noise", self._seed, self._moment(context)),
+            rng_from("depth noise", self._seed, self._noise_key(context)),
             normals=evaluate_optional(self._normals, context),
             color=None if color is None else color.data[..., :3],
         )
@@ -189,10 +189,10 @@ class DepthNoiseSystem(LeafSystem):
         result.mutable_data[..., 0] = np.where(measured > 0.0, measured, np.float32(np.inf))
         output.set_value(result)
 
-    def _moment(self, context: Context) -> float | int:
+    def _noise_key(self, context: Context) -> float | int:
         """Key of the noise: the number of the image, or the time [s]."""
         time = float(context.get_time())
-        # Periods before an image at which a time belongs to it.
+        # A time less than a millionth of a period before an image belongs to the image.
         return time if self._period is None else math.floor(time / self._period + 1e-6)
 
 
@@ -204,7 +204,7 @@ class SceneOverlay(LeafSystem):
         X_SC: `Value[RigidTransform]`, camera's optical frame in the scene frame.
         valid: (1,), optional: above 0.5 if `X_SC` can be used; always, if not connected.
         estimate: `Value[BoardEstimate]`, optional: its `reason` is written where `X_SC` is not
-            valid; where `valid` is not connected, this one's counts.
+            valid; if `valid` is not connected, the estimate's `valid` is used.
         placement: `Value[PlacementCheck]`, optional: deviations of the objects from their targets;
             None while unknown.
 

@@ -251,7 +251,7 @@ class Intrinsics:
         return self.model == "fisheye"
 
     def require_size(self, width: int, height: int, source: str) -> None:
-        """Reject images of another size than the calibrated one.
+        """Rejects images of another size than the calibrated one.
 
         Args:
             width, height: of the image [pixels].
@@ -333,7 +333,7 @@ def camera_intrinsics(camera: Camera) -> Intrinsics:
 
 
 def of_camera_info(info: Any) -> Intrinsics:
-    """Convert Drake's `CameraInfo` to intrinsics."""
+    """Converts Drake's `CameraInfo` to intrinsics."""
     return Intrinsics(
         width=info.width(),
         height=info.height(),

@@ -38,7 +38,7 @@ DEFAULT_CAMERA = "board"  # Camera of a station with several cameras if the refe
 
 
 def find_simulated_camera(reference: str) -> tuple[Station, str]:
-    """Find the station and the camera's name for `sim:STATION[/CAMERA]`.
+    """Finds the station and the camera's name for `sim:STATION[/CAMERA]`.
 
     STATION is a built-in name or a file. CAMERA defaults to `board`, or to the only one.
 
@@ -73,7 +73,7 @@ def find_simulated_camera(reference: str) -> tuple[Station, str]:
 
 
 def read_opencv(text: str, name: str) -> Tree:
-    """Parse the contents of an OpenCV file.
+    """Parses the contents of an OpenCV file.
 
     Args:
         text: contents of the file.
@@ -90,7 +90,7 @@ def read_opencv(text: str, name: str) -> Tree:
 
 
 def _read_xml(text: str, name: str) -> Tree:
-    """Parse XML elements to dicts by tag; text of `data` elements becomes a list of words."""
+    """Parses XML elements to dicts by tag; text of `data` elements becomes a list of words."""
     parser: Any = ElementTree.XMLPullParser(("start", "end"))
     opened: list[dict[str, Any]] = [{}]
     values, line = 0, 1
@@ -259,7 +259,7 @@ def is_ros_fisheye(model: str, coefficients: Sequence[float]) -> bool:
 
 
 def _refuse_cropped_image(data: Tree, name: str) -> None:
-    """Reject messages whose images are a part of the sensor's image, to which K refers."""
+    """Rejects messages whose images are a part of the sensor's image, to which K refers."""
     binning = [_read_integer(data, key, name) for key in ("binning_x", "binning_y") if key in data]
     roi = data.get("roi")
     roi = roi if isinstance(roi, dict) else {}
@@ -356,7 +356,7 @@ def _build_intrinsics(
     camera: str = "",
     residual: float | None = None,
 ) -> Intrinsics:
-    """Build intrinsics from a file's numbers; errors name the file."""
+    """Builds intrinsics from a file's numbers; errors name the file."""
     width, height = _read_size(data, name)
     try:
         return Intrinsics(

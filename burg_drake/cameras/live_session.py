@@ -44,7 +44,7 @@ class EventLog:
     """A thread-safe log of events.
 
     Args:
-        on_event: called with each as it happens.
+        on_event: called with each event.
     """
 
     def __init__(self, on_event: Callable[[Event], None] = lambda event: None) -> None:
@@ -101,10 +101,10 @@ class FrameReader:
     Args:
         source: source of frames; closed with the reader.
         paced: play files at their frame rate, not as fast as frames are taken.
-        changed: notified when a frame has come or the state has changed; notify it when frames
-            may be wanted again.
-        events: log for a lost or recovered camera and unreadable frames.
-        wanted: returns whether frames are wanted; none are read otherwise.
+        changed: condition that is notified when a frame arrives or the state changes; to be
+            notified when frames may be wanted again.
+        events: log of lost and recovered cameras and of unreadable frames.
+        wanted: returns whether frames are wanted; none are read if not.
     """
 
     def __init__(
@@ -119,22 +119,22 @@ class FrameReader:
         self.source = source
         self.state: SourceState = "waiting"
         self.fault = ""
-        """What is wrong while the state is `lost`."""
+        """Reason for the state `lost`."""
         self.failure: BaseException | None = None
-        """What ended the thread, if that was no end of the source."""
+        """The error that ended the thread, if one did."""
         self._paced = paced and not source.live
         self._changed, self._events, self._frames_wanted = changed, events, wanted
         self._next: Frame | None = None
-        self._shown: tuple[float, float] | None = None
+        self._last_due: tuple[float, float] | None = None
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name="frame reader", daemon=True)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Starts the thread."""
         self._thread.start()
 
     def take(self) -> Frame | None:
-        """Take the next frame; None if there is none yet."""
+        """Takes the next frame; None if there is none yet."""
         with self._changed:
             frame, self._next = self._next, None
             self._changed.notify_all()
@@ -146,7 +146,7 @@ class FrameReader:
         return self._next is None
 
     def close(self) -> None:
-        """End the thread and close the source."""
+        """Ends the thread and closes the source."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
@@ -166,7 +166,7 @@ class FrameReader:
         self._set_state("ended")
 
     def _read_one(self) -> bool:
-        """Read and deliver a frame; return whether there may be more."""
+        """Reads and delivers a frame; returns whether there may be more."""
         try:
             frame = self.source.read()
         except CameraLost as error:
@@ -177,19 +177,17 @@ class FrameReader:
             return True
         if frame is not None:
             if self._paced:
-                self._keep_time(frame)
+                self._wait_until_due(frame)
             self._deliver_frame(frame)
         return frame is not None
 
-    def _keep_time(self, frame: Frame) -> None:
-        """Wait until a file's frame is due; after a delay later frames are postponed, not sped
-        up.
-        """
+    def _wait_until_due(self, frame: Frame) -> None:
+        """Waits until a file's frame is due; a delay postpones all later frames."""
         now = time.monotonic()
-        due, before = self._shown or (now, frame.time)
+        due, before = self._last_due or (now, frame.time)
         # Largest wait between two frames of a file, in seconds.
         due = max(due + min(max(frame.time - before, 0.0), 2.0), now)
-        self._shown = (due, frame.time)
+        self._last_due = (due, frame.time)
         self._closed.wait(due - now)
 
     def _deliver_frame(self, frame: Frame) -> None:
@@ -241,13 +239,14 @@ class LiveSession:
         events: log for changes of camera and pose, not for single frames.
         settings: initial settings.
         paced: play files at their frame rate; else as fast as they can be processed.
-        idle_after: stop reading and processing a camera's frames if for so long no picture was
-            requested and nothing kept the session awake [s]. The next request gets a new picture.
+        idle_after: time without requested pictures after which a camera's frames are no longer
+            read and processed, unless the session is kept awake [s]. The next request gets a new
+            picture.
 
     Attributes:
         picture: the newest picture; None before the first.
         counts: counts of frames so far.
-        last_located: the last frame that gave a pose; before one did, the last frame.
+        last_located: the last frame with a pose; before the first such frame, the last frame.
 
     Raises:
         InvalidInputError: the source has another resolution than the intrinsics.
@@ -278,26 +277,26 @@ class LiveSession:
         )
         self._idle_after = idle_after if source.live else math.inf
         self._last_request, self._waiter_count = math.inf, 0
-        self._awake: list[Callable[[], bool]] = []
+        self._awake_reasons: list[Callable[[], bool]] = []
         self._settings = check_settings(processor.scene, settings)
         self._placement: PlacementCheck | None = None
         self._on_frame: list[Callable[[Picture], None]] = []
         self._redraw = self._closed = self._busy = False
-        self._limit: int | None = None
+        self._frame_limit: int | None = None
         self._failure: BaseException | None = None
-        self._moments: deque[float] = deque()
+        self._frame_times: deque[float] = deque()
         self._reported: tuple[bool, bool] | None = None
         self._pose_state = (0.0, (False, False))
         self._worker = threading.Thread(target=self._run, name="live session", daemon=True)
 
     def start(self, frames: int | None = None) -> None:
-        """Start processing frames, at most `frames` of them if given."""
-        self._limit, self._last_request = frames, time.monotonic()
+        """Starts processing frames, at most `frames` of them if given."""
+        self._frame_limit, self._last_request = frames, time.monotonic()
         self.reader.start()
         self._worker.start()
 
     def close(self) -> None:
-        """End both threads and close the source."""
+        """Ends both threads and closes the source."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -306,12 +305,12 @@ class LiveSession:
             self._worker.join()
 
     def on_frame(self, listener: Callable[[Picture], None]) -> None:
-        """Call `listener` with the first picture of each frame, in the drawing thread."""
+        """Calls `listener` with the first picture of each frame, in the drawing thread."""
         self._on_frame.append(listener)
 
     def keep_awake(self, reason: Callable[[], bool]) -> None:
-        """Keep the session from idling while `reason()` is true, such as during a recording."""
-        self._awake.append(reason)
+        """Keeps the session from idling while `reason()` is true, such as during a recording."""
+        self._awake_reasons.append(reason)
 
     @property
     def is_idle(self) -> bool:
@@ -319,20 +318,20 @@ class LiveSession:
         timed_out = (
             not self._waiter_count and time.monotonic() - self._last_request > self._idle_after
         )
-        return timed_out and not any(reason() for reason in self._awake)
+        return timed_out and not any(reason() for reason in self._awake_reasons)
 
     def request_pictures(self) -> int:
-        """Request pictures, and wake the session if it idles.
+        """Requests pictures, and wakes the session if it idles.
 
         Returns:
             The number of the newest picture if it is stale, from before an idle time; else 0.
         """
         with self._changed:
-            waits = self.picture is not None and self.is_idle and not self._settings.frozen
-            stale = self.picture.number if self.picture is not None and waits else 0
+            is_stale = self.picture is not None and self.is_idle and not self._settings.frozen
+            number = self.picture.number if self.picture is not None and is_stale else 0
             self._last_request = time.monotonic()
             self._changed.notify_all()
-        return stale
+        return number
 
     @property
     def settings(self) -> ViewSettings:
@@ -343,7 +342,7 @@ class LiveSession:
         """Changes settings by name, see `ViewSettings`.
 
         Raises:
-            InvalidInputError: no such setting, or not such a value.
+            InvalidInputError: the setting does not exist, or the value does not fit.
         """
         with self._changed:
             self._settings = change_settings(self.processor.scene, self._settings, settings)
@@ -365,10 +364,10 @@ class LiveSession:
     def rate(self) -> float:
         """Processed frames per second in the last seconds."""
         now = time.monotonic()
-        return sum(now - moment <= RATE_WINDOW for moment in tuple(self._moments)) / RATE_WINDOW
+        return sum(now - then <= RATE_WINDOW for then in tuple(self._frame_times)) / RATE_WINDOW
 
     def next_picture(self, after: int, seconds: float) -> Picture | None:
-        """Wait for a picture with a number above `after`; None after a timeout [s].
+        """Waits for a picture with a number above `after`; None after a timeout [s].
 
         An idle session gives the next new picture.
         """
@@ -391,7 +390,7 @@ class LiveSession:
         return self.next_picture(stale, seconds) if stale else self.picture
 
     def wait(self, *, seconds: float | None = None, to_end: bool = True) -> None:
-        """Wait until all frames are processed, or for a timeout.
+        """Waits until all frames are processed, or for a timeout.
 
         Args:
             seconds: timeout; none if None.
@@ -402,9 +401,8 @@ class LiveSession:
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
         with self._changed:
-            # Polls: an interrupt in another thread does not wake this one.
+            # Polls every 0.5 s: an interrupt in another thread does not wake this one.
             while not self._is_over(to_end) and (left := end - time.monotonic()) > 0:
-                # Seconds between checks for the end of the session.
                 self._changed.wait(min(left, 0.5))
         failure = self._failure or self.reader.failure
         if failure is not None:
@@ -412,18 +410,18 @@ class LiveSession:
 
     @property
     def is_over(self) -> bool:
-        """Whether no frame will be processed any more, such as after a photograph."""
+        """Whether no more frames will be processed, such as after a photograph."""
         return self._is_over(to_end=True)
 
     def _is_over(self, to_end: bool) -> bool:
-        if self._closed or self._failure or self.reader.failure or self._has_all_frames:
+        if self._closed or self._failure or self.reader.failure or self._has_reached_limit:
             return True
         ended = self.reader.state == "ended" and self.reader.is_empty and not self._busy
         return to_end and ended
 
     @property
-    def _has_all_frames(self) -> bool:
-        return self._limit is not None and self.counts.frames >= self._limit
+    def _has_reached_limit(self) -> bool:
+        return self._frame_limit is not None and self.counts.frames >= self._frame_limit
 
     def _run(self) -> None:
         try:
@@ -435,7 +433,7 @@ class LiveSession:
             self._changed.notify_all()
 
     def _run_once(self) -> None:
-        """Wait for a frame or a changed setting and process it."""
+        """Waits for a frame or a changed setting and processes it."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._redraw or self._wants_frame)
             if self._closed:
@@ -456,7 +454,7 @@ class LiveSession:
     @property
     def _wants_frame(self) -> bool:
         frozen = self._settings.frozen and self.picture is not None
-        return not (self.reader.is_empty or frozen or self._has_all_frames)
+        return not (self.reader.is_empty or frozen or self._has_reached_limit)
 
     def _process(self, frame: Frame) -> LocatedFrame | None:
         try:
@@ -474,14 +472,14 @@ class LiveSession:
         if estimate.valid or not counts.valid:
             self.last_located = located
         now = time.monotonic()
-        self._moments.append(now)
-        while now - self._moments[0] > RATE_WINDOW:
-            self._moments.popleft()
+        self._frame_times.append(now)
+        while now - self._frame_times[0] > RATE_WINDOW:
+            self._frame_times.popleft()
         self._report_pose(located, now)
         return located
 
     def picture_of(self, located: LocatedFrame, placement: PlacementCheck | None) -> Picture:
-        """Draw a picture with the current settings."""
+        """Draws a picture with the current settings."""
         settings = self._settings
         overlay, drawing = time_call(lambda: self.processor.draw(located, settings, placement))
         jpeg, encoding = time_call(lambda: encode_jpeg(overlay, 88))
@@ -504,7 +502,7 @@ class LiveSession:
             listener(picture)
 
     def _report_pose(self, located: LocatedFrame, now: float) -> None:
-        """Add an event when a pose appears or disappears for some time."""
+        """Adds an event when a pose appears or disappears for some time."""
         state = (located.estimate.valid, bool(located.estimate.reason))
         if self._pose_state[1] != state:
             self._pose_state = (now, state)

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.frame_source import require_rgb
 from burg_drake.cameras.intrinsics import FieldOfView, Intrinsics
 from burg_drake.cameras.placement.document import ExtraObject, Placement, PlacementCheck
 from burg_drake.cameras.scene_mesh import SceneMesh, build_scene_mesh, object_footprints
@@ -41,7 +42,7 @@ from burg_drake.scene import SceneLike, as_scene
 
 @dataclass(frozen=True, kw_only=True)
 class OverlayStyle:
-    """What is drawn of a scene over an image.
+    """Style of the objects of a scene that are drawn over an image.
 
     Attributes:
         opacity: of the objects' surfaces, 0 (outlines alone) to 1.
@@ -50,7 +51,7 @@ class OverlayStyle:
         footprints: draw where objects touch the board.
         errors: draw how far each object stands from its place, where a placement check is given.
         tolerance: displacement up to which an object counts as placed [m].
-        angle_tolerance: the same for its turn [rad].
+        angle_tolerance: turn up to which an object counts as placed [rad].
         shown: instances that are drawn, as if there were no others; all if None.
     """
 
@@ -120,7 +121,7 @@ class Overlay:
     Attributes:
         scene: scene to draw.
         intrinsics: of the camera.
-        style: used where `draw` is given none; may be replaced at any time.
+        style: style of `draw` without one of its own; may be replaced at any time.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class Overlay:
         """Loads the objects' surfaces.
 
         Args:
-            scene: whose objects.
+            scene: scene to draw.
             intrinsics: of the camera.
             style: the default one if None.
 
@@ -168,8 +169,8 @@ class Overlay:
             UnknownNameError: `style.shown` names an instance that the scene does not have.
         """
         style = style or self.style
-        drawn = self._copy(image)
-        camera, standing, standing_owner = self._camera(style.shown)
+        drawn = self._checked_copy(image)
+        camera, standing, standing_owner = self._surface_camera(style.shown)
         shape = camera.shape
         if not shape.names:
             return drawn
@@ -179,87 +180,85 @@ class Overlay:
         state = _DrawState(shape, inverse(X_SC), lines, surface, marks)
         colors = np.array([self._colors[name] for name in shape.names], dtype=float)
         blend_surfaces(drawn, surface, colors, style.opacity)
-        inks = [_outline_lines(state, _brighten(colors), style.outline_width)]
-        inks += [self._lines(mark.lines, mark.verdict, state.X_CS) for mark in marks.values()]
+        bright = _brighten(colors)
+        line_sets = [_outline_lines(state, bright, style.outline_width)]
+        line_sets += [self._project_mark(m.lines, m.verdict, state.X_CS) for m in marks.values()]
         if placement is not None and style.errors:
             circles = map(circle_extra_object, placement.extra)
-            inks += [self._lines(circle, "off", state.X_CS) for circle in circles]
+            line_sets += [self._project_mark(circle, "off", state.X_CS) for circle in circles]
         if style.footprints:
-            inks.append(self._footprints(state, standing, standing_owner, _brighten(colors)))
-        blend_lines(drawn, inks)
+            line_sets.append(self._project_footprints(state, standing, standing_owner, bright))
+        blend_lines(drawn, line_sets)
         if style.names or marks:
-            self._write(drawn, state, style.names)
+            self._write_tags(drawn, state, style.names)
         return drawn
 
     def notice(self, image: Bytes, text: str) -> Bytes:
-        """Draw a line of text over the image, such as why there is no overlay.
+        """Draws a line of text over the image, such as why there is no overlay.
 
         Args:
             image: (H, W, 3) red, green, blue.
             text: one line.
         """
-        return draw_notice(self._copy(image), text)
+        return draw_notice(self._checked_copy(image), text)
 
-    def _copy(self, image: Bytes) -> Bytes:
-        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
-            raise InvalidInputError(
-                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
-                " 3) uint8"
-            )
+    def _checked_copy(self, image: Bytes) -> Bytes:
+        require_rgb(image)
         self.intrinsics.require_size(image.shape[1], image.shape[0], "image")
         return np.array(image, order="C")
 
-    def _camera(self, shown: tuple[str, ...] | None) -> tuple[SurfaceCamera, Array, Indices]:
-        """Surface camera for the shown instances, and their footprints with the instances'
-        numbers.
+    def _surface_camera(
+        self, shown: tuple[str, ...] | None
+    ) -> tuple[SurfaceCamera, Array, Indices]:
+        """Surface camera for the shown instances; (N, 2, 3) lines of their footprints; and (N,) the
+        numbers of the lines' instances.
         """
         if shown not in self._shown:
             shape = self._full_mesh.select(shown)
             self._shown[shown] = (SurfaceCamera(shape, self._view), *object_footprints(shape))
         return self._shown[shown]
 
-    def _footprints(
+    def _project_footprints(
         self, state: _DrawState, lines: Array, owner: Indices, colors: Array
     ) -> LineSet:
-        """Lines of the footprints that no other object hides."""
+        """Projects the lines (N, 2, 3) of the footprints that no other object hides."""
         ends, line = clip_lines(transform_points(state.X_CS, lines), self._view)
         pixels, owner = self.intrinsics.project(ends), owner[line]
         height, width = state.surface.owner.shape
         x, y = np.round(pixels.mean(axis=1)).astype(int).T
         at = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
-        there = state.surface.owner[at]
-        seen = (there == owner) | (there == NO_OWNER)
+        shown_owner = state.surface.owner[at]
+        seen = (shown_owner == owner) | (shown_owner == NO_OWNER)
         return _line_set(pixels[seen], colors[owner[seen]], 1.2, 0.7, INNER_RIM_OPACITY)
 
-    def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
-        """Project lines (N, 2, 3) in S, in the color of their verdict."""
+    def _project_mark(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
+        """Projects lines (N, 2, 3) of a mark in S, in the colour of its verdict."""
         ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
         colors = np.tile(np.array(VERDICT_COLORS[verdict], dtype=float), (len(ends), 1))
         return _line_set(self.intrinsics.project(ends), colors, 3.0, 1.0, RIM_OPACITY)
 
-    def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
-        """Write names of visible objects, and their corrections."""
+    def _write_tags(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
+        """Writes names of visible objects, and their corrections."""
         owner = state.surface.owner
         seen = np.bincount(owner[owner != NO_OWNER], minlength=len(state.shape.names))
-        boxes, plates = [], []
-        # Instances that show fewer pixels get no name tag.
-        for number in np.flatnonzero(seen >= 12):
+        boxes, tags = [], []
+        for number in np.flatnonzero(seen >= 12):  # Visible pixels of an instance with a name tag.
             ends = state.lines.ends[state.lines.owner == number].reshape(-1, 2)
             name = state.shape.names[number]
-            note = state.marks.get(name)
-            words = [name] * names + ([note.text] if note else [])
+            mark = state.marks.get(name)
+            words = [name] * names + ([mark.text] if mark else [])
             if len(ends) and words:
                 size = self.intrinsics.width - 1, self.intrinsics.height - 1
                 boxes.append(np.clip([ends.min(axis=0), ends.max(axis=0)], 0, size))
-                color = VERDICT_COLORS[note.verdict] if note else TEXT_COLOR
+                color = VERDICT_COLORS[mark.verdict] if mark else TEXT_COLOR
                 # Fraction of the image's height.
-                plates.append(render_tag("  ".join(words), color, round(0.028 * len(drawn))))
-        if plates:
-            draw_tags(drawn, np.array(boxes), plates, owner != NO_OWNER)
+                tags.append(render_tag("  ".join(words), color, round(0.028 * len(drawn))))
+        if tags:
+            draw_tags(drawn, np.array(boxes), tags, owner != NO_OWNER)
 
 
 def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
-    """Label each pixel with the instance that it shows.
+    """Labels each pixel with the instance that it shows.
 
     Args:
         scene: scene with the objects at their targets; as loaded, or a reference for `load_scene`.
@@ -289,8 +288,8 @@ def _correction_marks(
 
 
 def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
-    """Outlines and inner lines. An outline's colour shows the placement; it is dashed if that is
-    uncertain.
+    """Outlines and inner lines. An outline's colour shows the placement; outlines of uncertain
+    placements are dashed.
     """
     lines, rims = state.lines, np.array(colors)
     for number, name in enumerate(state.shape.names):
@@ -298,8 +297,7 @@ def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
             rims[number] = VERDICT_COLORS[state.marks[name].verdict]
     outer = lines.kind == OUTLINE_KIND
     chosen = np.where(outer[:, None], rims[lines.owner], colors[lines.owner])
-    # Width of inner lines, as a fraction of that of outlines.
-    widths = width * np.where(outer, 1.0, 0.6)
+    widths = width * np.where(outer, 1.0, 0.6)  # Inner lines are thinner.
     for number, name in enumerate(state.shape.names):
         if name in state.marks and state.marks[name].verdict == "uncertain":
             dashed = outer & (lines.owner == number)
@@ -309,12 +307,12 @@ def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
 
 
 def _dash_mask(ends: Array) -> Booleans:
-    """(N,) which of the short lines (N, 2, 2) around an object [pixels] belong to a dash: those in
-    every other sector about its middle, as lines are not ordered along the outline.
+    """(N,) True for the short lines (N, 2, 2) around an object [pixels] that belong to a dash:
+    dashes are sectors about the object's middle, as lines are not ordered along the outline.
     """
     arms = ends.mean(axis=1) - ends.mean(axis=(0, 1))
     around = 2 * np.pi * np.linalg.norm(arms, axis=1).mean() if len(arms) else 0.0
-    dashes = max(round(around / (2 * 7.0)), 4)  # Pixels. About half the period of dashes.
+    dashes = max(round(around / 14.0), 4)  # Pixels. Approximate period of dashes.
     share = np.arctan2(arms[:, 1], arms[:, 0]) / (2 * np.pi) % 1.0
     return np.asarray((share * dashes) % 1.0 < 0.6)
 
@@ -327,7 +325,7 @@ def _line_set(
 
 
 def _instance_color(number: int) -> tuple[int, int, int]:
-    """Color of an instance by its index in the scene; the first ones are safe for color
+    """Colour of an instance by its index in the scene; the first ones are safe for colour
     blindness.
     """
     rest = number - len(CATEGORY_COLORS)
@@ -375,11 +373,11 @@ class CorrectionMark:
 
 
 def correction_mark(placement: Placement, style: OverlayStyle, height: float) -> CorrectionMark:
-    """Build the mark for the remaining correction of an object.
+    """Builds the mark for the remaining correction of an object.
 
     Args:
         placement: of the object.
-        style: has the tolerances.
+        style: style with the tolerances.
         height: z of the arrows in S [m].
     """
     nothing = np.empty((0, 2, 3))
@@ -390,16 +388,16 @@ def correction_mark(placement: Placement, style: OverlayStyle, height: float) ->
         return CorrectionMark("not_seen", "not seen", nothing)
     move = -np.array(placement.displacement)
     turn = -(placement.angle or 0.0)
-    far, turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
-    verdict: PlacementVerdict = "off" if far or turned else "placed"
+    is_far, is_turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
+    verdict: PlacementVerdict = "off" if is_far or is_turned else "placed"
     if uncertain:
         verdict = "uncertain"
     target = (placement.target.matrix() @ (*(placement.reference or (0.0, 0.0, 0.0)), 1.0))[:3]
     target[2] = height
     lines = [nothing]
-    if far:
+    if is_far:
         lines.append(_arrow_lines(target, np.array([*move, 0.0])))
-    if turned:
+    if is_turned:
         lines.append(_turn_arrow_lines(target, turn))
     return CorrectionMark(verdict, _correction_text(placement, uncertain), np.concatenate(lines))
 
@@ -462,9 +460,10 @@ def _arrow_head_lines(tip: Array, along: Array, length: float) -> Array:
 
 
 def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: float) -> None:
-    """Blend surfaces into an image (H, W, 3), in place.
+    """Blends surfaces into an image (H, W, 3), in place.
 
     Args:
+        image: image to draw into.
         surface: instance and shade of each pixel.
         colors: (N, 3) of the instances, 0 to 255.
         opacity: 0 to 1.
@@ -503,21 +502,22 @@ class LineSet:
     rim: Array
 
 
-def blend_lines(image: Bytes, inks: Sequence[LineSet]) -> None:
-    """Draw lines into an image (H, W, 3), in place; each pixel takes the nearest line."""
+def blend_lines(image: Bytes, line_sets: Sequence[LineSet]) -> None:
+    """Draws lines into an image (H, W, 3), in place; each pixel takes the nearest line."""
     rim_width = 1.2  # Pixels. Dark rim on both sides of a line, for contrast with white paper.
     ends, colors, width, opacity, rim = (
-        np.concatenate([getattr(ink, field.name) for ink in inks]) for field in fields(LineSet)
+        np.concatenate([getattr(line_set, field.name) for line_set in line_sets])
+        for field in fields(LineSet)
     )
-    drawn = width > 0.0
-    ends, colors, width = ends[drawn], colors[drawn], width[drawn]
+    kept = width > 0.0
+    ends, colors, width = ends[kept], colors[kept], width[kept]
     if not len(ends):
         return
     pixels = rasterize_lines(ends, 0.5 * width, rim_width + 0.5, (image.shape[1], image.shape[0]))
     flat = image.reshape(-1, 3)
-    dark = rim[drawn][pixels.line] * pixels.cover(rim_width)
+    dark = rim[kept][pixels.line] * pixels.cover(rim_width)
     under = np.take(flat, pixels.at, axis=0) * (1.0 - dark[:, None])
-    core = (opacity[drawn][pixels.line] * pixels.cover())[:, None]
+    core = (opacity[kept][pixels.line] * pixels.cover())[:, None]
     flat[pixels.at] = np.round(under + core * (colors[pixels.line] - under)).astype(np.uint8)
 
 
@@ -543,12 +543,12 @@ class LinePixels:
 def rasterize_lines(
     ends: Array, half_width: Array, reach: float, size: tuple[int, int]
 ) -> LinePixels:
-    """Find the pixels near lines.
+    """Finds the pixels near lines.
 
     Args:
         ends: (N, 2, 2) ends of the lines [pixels], short ones.
         half_width: (N,) [pixels].
-        reach: distance from a line's rim up to which pixels are wanted [pixels].
+        reach: largest distance of the pixels from a line's rim [pixels].
         size: width and height of the image [pixels].
     """
     steps_per_pixel = 1 << 10  # Resolution of the distances.
@@ -557,8 +557,8 @@ def rasterize_lines(
     nearest = np.full(width * height, unreached)
     if len(ends):
         at, distance, line = _pixels_near_lines(ends, half_width + reach, size)
-        past = distance - half_width[line] + float(half_width.max())  # at least 0
-        np.minimum.at(nearest, at, (past * steps_per_pixel).astype(np.int64) * len(ends) + line)
+        shifted = distance - half_width[line] + float(half_width.max())  # at least 0
+        np.minimum.at(nearest, at, (shifted * steps_per_pixel).astype(np.int64) * len(ends) + line)
     at = np.flatnonzero(nearest != unreached)
     steps, line = np.divmod(nearest[at], max(len(ends), 1))
     return LinePixels(at, (steps + 0.5) / steps_per_pixel - half_width.max(initial=0.0), line)
@@ -573,7 +573,7 @@ def _pixels_near_lines(
     half = 0.5 * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
     around = int(half + float(limit.max()) + 0.5)
     offset = np.arange(-around, around + 1)
-    # About the lines' middles, where single precision is enough.
+    # Coordinates about the lines' middles, for which single precision suffices.
     (ax, ay), (bx, by) = (ends - center[:, None]).astype(np.float32).transpose(1, 2, 0)
     ex, ey = bx - ax, by - ay
     square = np.maximum(ex * ex + ey * ey, np.float32(1e-12))

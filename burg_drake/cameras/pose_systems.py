@@ -41,7 +41,7 @@ class BoardPoseEstimator(LeafSystem):
     Args:
         board: the board.
         intrinsics: of the camera.
-        scale: size of the print against the document along x and y.
+        scale: size of the print relative to the document along x and y.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Track:
     """State of a pose filter.
 
     Attributes:
-        X_SC: (4, 4) filtered pose; None before the first.
+        X_SC: (4, 4) filtered pose; None before the first estimate.
         information: (6, 6) sum of the estimates' inverse covariances, faded by age.
         covariance: (6, 6) of `X_SC`.
         rejected_in_a_row: consecutive estimates that were rejected.
@@ -116,14 +116,14 @@ class Track:
 
 
 class PoseFilter(LeafSystem):
-    """Mean of the latest poses, weighted by covariance; it starts again when the camera moves.
+    """Mean of the latest poses, weighted by covariance; it restarts when the camera moves.
 
-    A Kalman filter for a camera that stands still, in the form of information: with every update
-    the old information fades, so that at rest errors are those of a mean of `window` estimates,
-    lower by the square root of that. An estimate farther from the filtered pose than noise explains
-    (a chi-square of 33.1) is held back; with the `patience`-th in a row the filter starts again
-    from it. So the output lags behind a moved camera by less than `patience` updates; moves smaller
-    than the noise are followed within about `window` updates.
+    A Kalman filter for a camera that stands still, in the information form: with every update the
+    old information fades, so that at rest the errors are those of a mean of `window` estimates,
+    lower by the square root of `window`. An estimate farther from the filtered pose than noise
+    explains (a chi-square of 33.1) is rejected; the filter restarts from the `patience`-th rejected
+    estimate in a row. So the output lags behind a moved camera by less than `patience` updates;
+    moves smaller than the noise are followed within about `window` updates.
 
     Input ports:
         estimate: `BoardEstimate`, from `BoardPoseEstimator`.
@@ -131,13 +131,13 @@ class PoseFilter(LeafSystem):
     Output ports:
         X_SC: `RigidTransform`, the filtered pose; identity while not valid.
         valid: 1.0 from the first valid estimate on, until more than `hold` updates have passed
-            without one that fits; else 0.0.
+            without an accepted estimate; else 0.0.
         covariance: (36,) of the filtered pose row by row, see `BoardEstimate.covariance`, provided
             that errors of estimates are independent; NaN while not valid.
 
     Args:
         period: time between updates [s].
-        offset: of the updates from whole periods [s], below `period`; a thousandth of it if not
+        offset: of the updates from whole periods [s], below `period`; `period / 1000` if not
             given. Systems updated at the same time see each other's previous state, so without an
             offset a filter behind a held image is one image late.
         window: number of estimates in an equivalent plain mean.
@@ -159,7 +159,6 @@ class PoseFilter(LeafSystem):
                 "a pose filter takes a period above 0 [s], a window and patience of at least 1, and"
                 " hold of at least 0"
             )
-        # Delay of updates after the image's, in periods.
         offset = 1e-3 * period if offset is None else offset
         if not 0.0 <= offset < period:
             raise InvalidInputError(

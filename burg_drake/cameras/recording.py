@@ -41,7 +41,7 @@ class RecordingFiles:
 
     Attributes:
         video: the video.
-        with_plain: there is a video without overlay, too.
+        with_plain: whether there is a video without overlay, too.
     """
 
     video: Path
@@ -84,11 +84,11 @@ def partial_path(path: Path) -> Path:
 
 
 def require_video_path(path: str | Path, *, plain: bool = False) -> Path:
-    """Check that a recording can be written.
+    """Checks that a recording can be written.
 
     Args:
         path: of the video.
-        plain: there will be one without overlay, too.
+        plain: whether there is a video without overlay, too.
 
     Raises:
         InvalidInputError: the suffix is not in `VIDEO_CODECS`, a file exists, or the folder is not
@@ -129,7 +129,7 @@ class RecordedPoses:
 
 
 def table_row(frame: int, time: float, estimate: BoardEstimate) -> list[Any]:
-    """Build a row of `RECORDING_COLUMNS`.
+    """Builds a row of `RECORDING_COLUMNS`.
 
     Args:
         frame: of the video.
@@ -156,7 +156,7 @@ def read_poses(path: str | Path) -> RecordedPoses:
     """Reads the table of a recording.
 
     Raises:
-        DocumentError: the file is missing, or is none.
+        DocumentError: the file is missing, or is not the table of a recording.
     """
     path = Path(path)
     try:
@@ -221,7 +221,7 @@ class Recording:
     in real time. It contains every added picture.
 
     Args:
-        path: of the video, .mp4 or .avi; the others of `RecordingFiles` are written beside it.
+        path: of the video, .mp4 or .avi; the other `RecordingFiles` are written beside it.
         intrinsics: of the camera; they give the size of the video.
         scene, source, started: see `RecordingDocument`.
         frames_per_second: of the video.
@@ -269,7 +269,7 @@ class Recording:
             for video in files.videos:
                 self._writers.append(_open_video(video, frames_per_second, intrinsics))
         except BaseException:
-            self._abandon()
+            self._discard()
             raise
 
     def add(
@@ -291,7 +291,7 @@ class Recording:
             InvalidInputError: the table cannot be written (disk full).
         """
         if self._last is not None:
-            self._fill(time)
+            self._repeat_last_picture(time)
         try:
             self._table.writerow(table_row(self.frames, time, estimate))
             self._stream.flush()
@@ -301,7 +301,7 @@ class Recording:
             ) from error
         pictures = (overlay, plain)[: len(self._writers)]
         self._last = (time, pictures)
-        self._write(pictures)
+        self._write_frame(pictures)
         self.pictures += 1
 
     def close(self) -> Path | None:
@@ -317,9 +317,9 @@ class Recording:
         if self._stream.closed:
             return self.path if self.pictures else None
         if not self.pictures:
-            self._abandon()
+            self._discard()
             return None
-        self._release()
+        self._close_streams()
         files = self._files
         for path in files.videos:
             found = _count_frames(partial_path(path))
@@ -339,8 +339,8 @@ class Recording:
             os.replace(partial_path(path), path)
         return self.path
 
-    def _release(self) -> None:
-        """Close the open files."""
+    def _close_streams(self) -> None:
+        """Closes the open files."""
         for writer in self._writers:
             writer.release()
         try:
@@ -348,23 +348,23 @@ class Recording:
         except OSError as error:
             raise InvalidInputError(f"cannot write {self._files.table}: {error}") from error
 
-    def _abandon(self) -> None:
-        """Delete the files of a recording without pictures."""
+    def _discard(self) -> None:
+        """Deletes the files of a recording without pictures."""
         with contextlib.suppress(BurgError):
-            self._release()
+            self._close_streams()
         for path in self._files.growing_files:
             partial_path(path).unlink(missing_ok=True)
 
-    def _fill(self, time: float) -> None:
-        """Repeat the last picture up to the time of a new one."""
+    def _repeat_last_picture(self, time: float) -> None:
+        """Repeats the last picture up to the time of a new one."""
         assert self._last is not None
         before, pictures = self._last
         # Seconds. Longer pauses of a lost camera are shortened in the video.
         self._clock += min(max(time - before, 0.0), 2.0)
         while self.frames < round(self.frames_per_second * self._clock):
-            self._write(pictures)
+            self._write_frame(pictures)
 
-    def _write(self, pictures: tuple[Bytes, ...]) -> None:
+    def _write_frame(self, pictures: tuple[Bytes, ...]) -> None:
         for writer, picture in zip(self._writers, pictures, strict=True):
             writer.write(np.ascontiguousarray(picture[..., ::-1]))
         self.frames += 1

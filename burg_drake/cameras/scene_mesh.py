@@ -44,7 +44,7 @@ class MeshOutline:
     Attributes:
         vertices: (V, 3) in the object frame O [m].
         faces: (F, 3) corners of the non-degenerate triangles.
-        kept: (F,) their indices among the given faces.
+        kept: (F,) indices of these triangles among the given faces.
         edges: (E, 2) vertices at the edges' ends; an edge with more than two faces is repeated for
             every pair.
         sides: (E, 2) faces at each edge; the second is -1 for an open one.
@@ -54,7 +54,7 @@ class MeshOutline:
         """Prepares a mesh.
 
         Args:
-            vertices: (V, 3) [m]; those that coincide must be merged.
+            vertices: (V, 3) [m]; coinciding vertices must be merged.
             faces: (F, 3) corners, counter-clockwise seen from outside.
         """
         self.vertices = np.asarray(vertices, dtype=float)
@@ -97,11 +97,11 @@ class MeshOutline:
         )
 
     def front(self, p_OC: Array, faces: Indices | None = None) -> Booleans:
-        """Which faces have their front towards a point of view in O, without occlusion.
+        """(F,) True for faces whose front is towards a point of view in O; occlusion is ignored.
 
         Args:
             p_OC: (3,) [m].
-            faces: indices of any shape, which the result shares; all (F,) if None.
+            faces: indices of faces, in the shape of the result; all (F,) if None.
         """
         planes = self._planes if faces is None else self._planes[faces]
         return np.asarray(planes @ np.append(p_OC, 1.0) > 0.0)
@@ -127,8 +127,8 @@ class MeshOutline:
         across = np.linalg.norm(np.cross(first, second), axis=1)
         angle = np.arctan2(across, np.einsum("ij,ij->i", first, second))
         middle = self.vertices[self.faces].mean(axis=1)
-        apart = middle[self.sides[:, 1]] - middle[self.sides[:, 0]]
-        signed: Array = np.where(np.einsum("ij,ij->i", first, apart) <= 0.0, angle, -angle)
+        offset = middle[self.sides[:, 1]] - middle[self.sides[:, 0]]
+        signed: Array = np.where(np.einsum("ij,ij->i", first, offset) <= 0.0, angle, -angle)
         return signed
 
 
@@ -141,7 +141,7 @@ def _mesh_edges(faces: Indices) -> tuple[Indices, Indices]:
     new = np.ones(len(pairs) + 1, bool)
     new[1:-1] = (pairs[1:] != pairs[:-1]).any(axis=1)
     alone = new[:-1] & new[1:]
-    joined = np.flatnonzero(~new[1:-1])  # this one and the next are of the same edge
+    joined = np.flatnonzero(~new[1:-1])  # this pair and the next are the same edge
     edges = np.concatenate([pairs[alone], pairs[joined]])
     single = np.column_stack([owner[alone], np.full(int(alone.sum()), -1)])
     double = np.column_stack([owner[joined], owner[joined + 1]])
@@ -155,9 +155,9 @@ class SceneMesh:
     """The visible surfaces of a scene.
 
     Attributes:
-        names: instances, free ones first, in the scene's order; their index is their number.
+        names: instances, free ones first, in the scene's order; the index is the instance's number.
         outline: all surfaces as one mesh; its frame is S.
-        owner: (F,) number of the instance that each of its faces belongs to.
+        owner: (F,) number of the instance that each face of `outline` belongs to.
         boxes: (N, 2, 3) corners of each instance's bounding box along the axes of S [m].
     """
 
@@ -165,7 +165,7 @@ class SceneMesh:
         """Joins surfaces.
 
         Args:
-            placed: by instance, vertices (V, 3) in S [m] and faces (F, 3).
+            placed: surfaces by instance: vertices (V, 3) in S [m] and faces (F, 3).
         """
         self._placed = placed
         self.names = tuple(placed)
@@ -222,8 +222,8 @@ def object_footprints(shape: SceneMesh) -> tuple[Array, Indices]:
     """Convex outlines of the objects' contact areas on the board.
 
     Returns:
-        (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) their instances'
-        numbers; none for objects that stand on others.
+        (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) numbers of the lines'
+        instances; no lines for objects that stand on others.
     """
     lines, owner = [np.empty((0, 2, 3))], [np.empty(0, np.int64)]
     for number, name in enumerate(shape.names):

@@ -11,8 +11,8 @@ from burg_drake.cameras.intrinsics import NEAR_DISTANCE, FieldOfView
 from burg_drake.cameras.scene_mesh import SceneMesh
 from burg_drake.core import Array, Booleans, Bytes, Indices, inverse, transform_points
 
-OUTLINE_KIND = 0  # A line behind which lies another object or nothing.
-INNER_KIND = 1  # A contour before another part of the same object.
+OUTLINE_KIND = 0  # A contour in front of another object or of nothing.
+INNER_KIND = 1  # A contour in front of another part of the same object.
 CREASE_KIND = 2  # A sharp edge of an object.
 
 
@@ -21,8 +21,8 @@ class VisibleLines:
     """Visible pieces of a scene's lines.
 
     Attributes:
-        ends: (N, 2, 2) in the image [pixels].
-        owner: (N,) number of the instance.
+        ends: (N, 2, 2) ends of the pieces [pixels].
+        owner: (N,) number of each piece's instance.
         kind: (N,) `OUTLINE_KIND`, `INNER_KIND` or `CREASE_KIND`.
     """
 
@@ -32,11 +32,11 @@ class VisibleLines:
 
 
 def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLines:
-    """Find the visible lines of a scene.
+    """Finds the visible lines of a scene.
 
     Args:
-        shape: of the scene.
-        view: the camera's.
+        shape: mesh of the scene.
+        view: field of view of the camera.
         X_SC: (4, 4) camera's optical frame in the scene frame.
     """
     outline, X_CS = shape.outline, inverse(X_SC)
@@ -55,11 +55,11 @@ def visible_lines(shape: SceneMesh, view: FieldOfView, X_SC: Array) -> VisibleLi
 
 
 def clip_lines(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
-    """Clip lines to the view and split them into short pieces, which follow the lens distortion.
+    """Clips lines to the view and splits them into short pieces, which follow the lens distortion.
 
     Args:
         p_CQ: (N, 2, 3) ends of the lines in the camera's frame [m].
-        view: the camera's.
+        view: field of view of the camera.
 
     Returns:
         (M, 2, 3) ends of the pieces, and (M,) indices of their lines.
@@ -98,7 +98,7 @@ def _find_visible(
     kind: Indices,
     owner: Indices,
 ) -> tuple[Booleans, Indices]:
-    """Which pieces are visible, and their kinds.
+    """(N,) True for visible pieces, and (N,) the kinds of all pieces.
 
     Args:
         inside: (N, 3) points of the surface beside each piece, in C.
@@ -110,9 +110,9 @@ def _find_visible(
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-15)
     outward = -np.sign(np.einsum("ij,ij->i", across, inside))
     pixel = middle[:, 2] / max(view.intrinsics.focal)
-    # Pixels between a ray and the contour that it passes.
-    passing = np.where(kind == CREASE_KIND, 0.0, 0.1 * pixel * outward)
-    target = middle + passing[:, None] * across
+    # A ray passes a contour at a distance of 0.1 pixels.
+    gap = np.where(kind == CREASE_KIND, 0.0, 0.1 * pixel * outward)
+    target = middle + gap[:, None] * across
     distance = np.linalg.norm(target, axis=1)
     directions = (target / distance[:, None]) @ X_SC[:3, :3].T
     origins = np.broadcast_to(X_SC[:3, 3], directions.shape)
@@ -147,7 +147,7 @@ class SurfaceCamera:
     """Renders the surfaces of a scene.
 
     Attributes:
-        shape: of the scene.
+        shape: mesh of the scene.
     """
 
     def __init__(self, shape: SceneMesh, view: FieldOfView) -> None:
@@ -164,7 +164,7 @@ class SurfaceCamera:
         self._x, self._y = np.moveaxis(directions[self._nodes][..., :2], 2, 0).copy()
 
     def render(self, X_SC: Array, lines: VisibleLines, shades: Bytes) -> SurfaceImage:
-        """Render the surfaces from a pose of the camera.
+        """Renders the surfaces from a pose of the camera.
 
         Args:
             X_SC: (4, 4) camera's optical frame in the scene frame.
@@ -188,16 +188,16 @@ class SurfaceCamera:
 
     def _render_nodes(self, X_SC: Array, shades: Bytes) -> tuple[NDArray[np.int16], Bytes]:
         """Owner and shade at the nodes; rays are cast only near objects."""
-        looking = self._candidate_nodes(X_SC)
-        owner = np.full(looking.shape, NO_OWNER, np.int16)
-        shade = np.zeros(looking.shape, np.uint8)
-        directions = self._directions[self._nodes][looking]
-        owner[looking], shade[looking] = self._cast(X_SC, directions, shades)
+        candidates = self._candidate_nodes(X_SC)
+        owner = np.full(candidates.shape, NO_OWNER, np.int16)
+        shade = np.zeros(candidates.shape, np.uint8)
+        directions = self._directions[self._nodes][candidates]
+        owner[candidates], shade[candidates] = self._cast(X_SC, directions, shades)
         return owner, shade
 
     def _candidate_nodes(self, X_SC: Array) -> Booleans:
-        """Nodes inside the image rectangle around an instance's bounding box."""
-        showing = np.zeros(self._x.shape, bool)
+        """True for nodes in the image rectangle around the bounding box of an instance."""
+        candidates = np.zeros(self._x.shape, bool)
         X_CS = inverse(X_SC)
         for lower, upper in self.shape.boxes:
             corners = np.stack(np.meshgrid(*np.stack([lower, upper], axis=1)), -1).reshape(-1, 3)
@@ -205,12 +205,12 @@ class SurfaceCamera:
             if (p_CQ[:, 2] < NEAR_DISTANCE).all():
                 continue
             if (p_CQ[:, 2] < NEAR_DISTANCE).any():
-                return np.ones_like(showing)
+                return np.ones_like(candidates)
             seen = p_CQ[:, :2] / p_CQ[:, 2:]
             (left, top), (right, bottom) = seen.min(axis=0), seen.max(axis=0)
             within = (self._x >= left) & (self._x <= right)
-            showing |= within & (self._y >= top) & (self._y <= bottom)
-        return showing
+            candidates |= within & (self._y >= top) & (self._y <= bottom)
+        return candidates
 
     def _cast(
         self, X_SC: Array, directions: Array, shades: Bytes
@@ -226,7 +226,7 @@ class SurfaceCamera:
         return owner.reshape(size), shade.reshape(size)
 
     def _outline_blocks(self, lines: VisibleLines) -> Booleans:
-        """Blocks within a pixel of an outline, which consists of short pieces."""
+        """True for blocks within a pixel of an outline."""
         rows, columns = (-(-n // RAY_SPACING_PX) for n in self._size)
         crossed = np.zeros((rows, columns), bool)
         points = lines.ends[lines.kind == OUTLINE_KIND].reshape(-1, 2)
@@ -237,7 +237,7 @@ class SurfaceCamera:
         return crossed
 
     def _interpolate(self, shade: Bytes) -> Bytes:
-        """Interpolate shades between the nodes."""
+        """Interpolates shades between the nodes."""
         import cv2
 
         scale = np.array([[RAY_SPACING_PX, 0.0, 0.0], [0.0, RAY_SPACING_PX, 0.0]])

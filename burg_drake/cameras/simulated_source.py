@@ -31,7 +31,7 @@ class SimulatedSource(FrameSource):
 
     Args:
         scene: objects on the board.
-        station: has the camera; its robot is left out.
+        station: station with the camera; its robot is left out.
         camera: name of the camera.
         fps: frames a second, in simulated time and, if `live`, in real time.
         X_WC: returns the camera's pose (4, 4) at a time [s]; the station's pose if not given.
@@ -55,10 +55,10 @@ class SimulatedSource(FrameSource):
         X_WC: Callable[[float], Array] | None = None,
         live: bool = True,
     ) -> None:
-        of = station.camera(camera)
+        document = station.camera(camera)
         self.name, self.live, self.fps = f"{SIMULATED_PREFIX}{station.name}/{camera}", live, fps
         self.station, self.camera = station, camera
-        self.size = (of.width, of.height)
+        self.size = (document.width, document.height)
         self._X_WC = X_WC
         self._closed = threading.Event()
         self._thread = ThreadPoolExecutor(max_workers=1)

@@ -111,7 +111,7 @@ class Snapshot:
 
 
 def describe_board(estimate: BoardEstimate) -> SeenBoard:
-    """Convert an estimate to a document; unknown numbers are left out."""
+    """Converts an estimate to a document; unknown numbers are left out."""
     known = bool(np.isfinite(estimate.covariance).all())
     return SeenBoard(
         X_SC=Pose.from_matrix(estimate.X_SC, quaternion=True) if estimate.valid else None,
@@ -129,7 +129,7 @@ def describe_scene(scene: Scene) -> CheckedScene:
 
 
 def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
-    """Write a new folder atomically.
+    """Writes a new folder atomically.
 
     Raises:
         InvalidInputError: the folder exists, or cannot be written.
@@ -144,7 +144,7 @@ def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
 
 
 def require_new_folder(folder: str | Path) -> Path:
-    """Check that a snapshot can be saved to a folder.
+    """Checks that a snapshot can be saved to a folder.
 
     Raises:
         InvalidInputError: something of that name exists, or nothing can be written there.
@@ -157,7 +157,7 @@ def require_new_folder(folder: str | Path) -> Path:
 
 
 def load_snapshot(folder: str | Path) -> Snapshot:
-    """Read a snapshot that `save_snapshot` wrote.
+    """Reads a snapshot that `save_snapshot` wrote.
 
     Raises:
         DocumentError: no snapshot there, or it does not fit the schema.
@@ -202,7 +202,7 @@ def describe_snapshot(
     X_SC_drawn: Array | None = None,
     placement: PlacementCheck | None = None,
 ) -> SnapshotDocument:
-    """Build the document of a snapshot."""
+    """Builds the document of a snapshot."""
     if X_SC_drawn is None or not estimate.valid or np.array_equal(X_SC_drawn, estimate.X_SC):
         drawn = None
     else:
@@ -226,7 +226,7 @@ def _finite_or_none(value: float) -> float | None:
 
 
 def _read(read: Callable[[Path], T], path: Path) -> T:
-    """Read a file of a snapshot; errors for missing or damaged files say what to do."""
+    """Reads a file of a snapshot; errors for missing or damaged files say what to do."""
     try:
         return read(path)
     except InvalidInputError as error:

@@ -31,7 +31,7 @@ def open_source(
     """Opens a source of frames.
 
     Args:
-        reference: what to open:
+        reference: source to open:
             `0`, `1`, ... or `/dev/video0`: a camera of this machine;
             `rtsp://...`, `http://...`: a stream from the network;
             `sim:STATION[/CAMERA]`: a simulated camera of a station that looks at `scene`;
@@ -84,7 +84,7 @@ def _open_images(references: Sequence[str]) -> FrameSource:
 
 
 def image_paths(references: Sequence[str]) -> list[Path]:
-    """Find image files by names, folders or patterns such as `photos/*.jpg`.
+    """Finds image files by names, folders or patterns such as `photos/*.jpg`.
 
     Raises:
         InvalidInputError: there are none.
@@ -116,8 +116,7 @@ class ImageSource(FrameSource):
 
     Args:
         paths: of the files.
-        name: of the source; by default the file's name, or the first file's and the number of
-            files.
+        name: of the source; by default the name of the first file, and the number of the others.
 
     Raises:
         InvalidInputError: there are no files, or none can be read.
@@ -160,7 +159,7 @@ class ImageSource(FrameSource):
 
 
 def images_in(folder: Path) -> list[Path]:
-    """List the image files of a folder, `view9.png` before `view10.png`.
+    """Lists the image files of a folder, `view9.png` before `view10.png`.
 
     Raises:
         InvalidInputError: there are none.
@@ -177,7 +176,7 @@ def is_image(path: Path) -> bool:
 
 
 def sort_naturally(paths: Sequence[Path]) -> list[Path]:
-    """Sort paths by name, with numbers in them by value."""
+    """Sorts paths by name, with numbers in them by value."""
 
     def key(path: Path) -> list[tuple[int, str]]:
         parts = re.split(r"(\d+)", str(path))
@@ -197,7 +196,7 @@ class VideoSource(FrameSource):
         path: of the file.
 
     Attributes:
-        broken: number of unreadable frames so far, which were skipped.
+        broken: number of unreadable frames that were skipped so far.
 
     Raises:
         InvalidInputError: it cannot be read as a video.
@@ -242,7 +241,7 @@ class VideoSource(FrameSource):
         self._capture.release()
 
     def _next_image(self) -> Image | None:
-        """Read the next readable frame; None at the end."""
+        """Reads the next readable frame; None at the end."""
         for _ in range(100):  # Consecutive unreadable frames after which the file ends.
             image = _read_rgb(self._capture)
             if image is not None:
@@ -257,8 +256,8 @@ class VideoSource(FrameSource):
 
 FRAME_TIMEOUT = 2.0
 """Seconds without an image after which a camera counts as lost."""
-FIRST_WAIT = 0.5  # Seconds until a lost camera is opened again; doubled each time ...
-MAX_WAIT = 5.0  # ... up to this.
+MIN_REOPEN_INTERVAL = 0.5  # Seconds until a lost camera is opened again; doubled each time ...
+MAX_REOPEN_INTERVAL = 5.0  # ... up to this.
 
 CAMERA_HINT = (
     "is it plugged in, is no other program using it, and do you have permission to read it?"
@@ -278,7 +277,7 @@ class DeviceSource(FrameSource):
     Args:
         name: name in messages.
         open_capture: opens the camera, again after a loss; returns None on failure.
-        question: hint on what to check if it does not open.
+        hint: text on what to check if the camera does not open.
 
     Raises:
         InvalidInputError: it does not open, or gives no images.
@@ -288,7 +287,7 @@ class DeviceSource(FrameSource):
         self,
         name: str,
         open_capture: Callable[[], cv2.VideoCapture | None],
-        question: str = CAMERA_HINT,
+        hint: str = CAMERA_HINT,
     ) -> None:
         self.name, self.live = name, True
         self._open = open_capture
@@ -297,7 +296,7 @@ class DeviceSource(FrameSource):
         first = None if capture is None else _read_rgb(capture)
         if capture is None or first is None:
             what = "does not open" if capture is None else "opens, but gives no images"
-            raise InvalidInputError(f"{name} {what}; {question}")
+            raise InvalidInputError(f"{name} {what}; {hint}")
         self.size = (first.shape[1], first.shape[0])
         self.fps = capture.get(cv2.CAP_PROP_FPS) or None
         self._changed = threading.Condition()
@@ -321,27 +320,27 @@ class DeviceSource(FrameSource):
         return frame
 
     def close(self) -> None:
-        """Lets go of the camera."""
+        """Releases the camera."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
         self._thread.join(timeout=FRAME_TIMEOUT)
 
     def _run(self, capture: cv2.VideoCapture | None) -> None:
-        wait = FIRST_WAIT
+        interval = MIN_REOPEN_INTERVAL
         while not self._closed.is_set():
             if capture is not None:
-                wait = FIRST_WAIT if self._take_images(capture) else wait
+                interval = MIN_REOPEN_INTERVAL if self._take_images(capture) else interval
                 capture.release()
-            if self._closed.wait(wait):
+            if self._closed.wait(interval):
                 return
-            wait = min(2.0 * wait, MAX_WAIT)
+            interval = min(2.0 * interval, MAX_REOPEN_INTERVAL)
             capture = self._open()
         if capture is not None:
             capture.release()
 
     def _take_images(self, capture: cv2.VideoCapture) -> bool:
-        """Take images until there are no more or the source is closed; return whether there were
+        """Takes images until there are no more or the source is closed; returns whether there were
         any.
         """
         any_taken = False
@@ -371,7 +370,7 @@ def open_device(
     """Opens a camera.
 
     Args:
-        device: its number, `/dev/videoN`, or the address of a stream (rtsp, http).
+        device: number of the camera, `/dev/videoN`, or the address of a stream (rtsp, http).
         size: requested width and height [pixels]; the camera's default if not given.
         fps: requested frames per second; some cameras take the nearest supported rate.
 
@@ -393,9 +392,9 @@ def open_device(
     return source
 
 
-def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Names and sizes of the working cameras among the first `most` of this machine."""
-    for device in _candidate_devices(most):
+def open_devices() -> Iterator[tuple[str, tuple[int, int]]]:
+    """Names and sizes of the working cameras of this machine."""
+    for device in _candidate_devices():
         capture = _open_capture(device, None, None)
         image = None if capture is None else _read_rgb(capture)
         if capture is not None:
@@ -404,11 +403,12 @@ def open_devices(most: int = 64) -> Iterator[tuple[str, tuple[int, int]]]:
             yield str(device), (image.shape[1], image.shape[0])
 
 
-def _candidate_devices(most: int) -> list[int]:
+def _candidate_devices() -> list[int]:
+    """Numbers of at most 64 cameras to try; without a list of the system, 0 to 3."""
     if sys.platform.startswith("linux"):
         numbers = (path.name.removeprefix("video") for path in Path("/dev").glob("video*"))
-        return sorted(int(number) for number in numbers if number.isdigit())[:most]
-    return list(range(min(most, 4)))
+        return sorted(int(number) for number in numbers if number.isdigit())[:64]
+    return [0, 1, 2, 3]
 
 
 def _open_capture(

@@ -24,7 +24,7 @@ Tag = tuple[Bytes, NDArray[np.uint16]]
 
 @lru_cache(maxsize=512)
 def render_tag(text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int = 14) -> Tag:
-    """Render a tag: a line of text on a dark rounded rectangle.
+    """Renders a tag: a line of text on a dark rounded rectangle.
 
     Args:
         text: one line.
@@ -55,7 +55,7 @@ def render_tag(text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int 
 
 
 def draw_notice(image: Bytes, text: str) -> Bytes:
-    """Copy an image (H, W, 3) and draw a text in its corner, wrapped if it is long."""
+    """Copies an image (H, W, 3) and draws a text in its corner, wrapped if it is long."""
     drawn = np.array(image, order="C")
     x, y = 8, 8
     for line in _wrap_text(text, drawn.shape[1] - 2 * x):
@@ -66,7 +66,7 @@ def draw_notice(image: Bytes, text: str) -> Bytes:
 
 
 def _wrap_text(text: str, width: int) -> list[str]:
-    """Wrap a text to lines whose tags are at most `width` pixels wide; long words stay whole."""
+    """Wraps a text to lines whose tags are at most `width` pixels wide; long words stay whole."""
     lines = [""]
     for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -78,10 +78,10 @@ def _wrap_text(text: str, width: int) -> list[str]:
 
 
 def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
-    """Draw a tag into an image (H, W, 3), in place, clipped to the image.
+    """Draws a tag into an image (H, W, 3), in place, clipped to the image.
 
     Args:
-        corner: column and row of its upper left corner.
+        corner: column and row of the tag's upper left corner.
     """
     colors, opacity = tag
     x, y = corner
@@ -98,14 +98,14 @@ def _draw_tag(image: Bytes, tag: Tag, corner: PixelCorner) -> None:
 def draw_tags(image: Bytes, boxes: Array, tags: Sequence[Tag], keep_clear: Booleans) -> None:
     """Draws tags into an image (H, W, 3), in place; see `find_tag_corners`.
 
-    Tags that had to move away get a line to the middle of their box.
+    A tag far from its box gets a line to the middle of the box.
     """
     sizes = [(colors.shape[1], colors.shape[0]) for colors, _ in tags]
     corners = find_tag_corners(boxes, sizes, keep_clear)
     for corner, size, box in zip(corners, sizes, boxes, strict=True):
         low, high = np.array(corner), np.array(corner) + size
-        apart = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
-        if np.hypot(*apart) > 12.0:  # Pixels. Farther tags are connected to their box by a line.
+        gap = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
+        if np.hypot(*gap) > 12.0:  # Pixels.
             middle = np.round(box.mean(axis=0)).astype(int)
             start = np.clip(middle, low, high)
             cv2.line(image, start.tolist(), middle.tolist(), PLATE_COLOR, 1, cv2.LINE_AA)
@@ -116,7 +116,7 @@ def draw_tags(image: Bytes, boxes: Array, tags: Sequence[Tag], keep_clear: Boole
 def find_tag_corners(
     boxes: Array, sizes: Sequence[tuple[int, int]], keep_clear: Booleans
 ) -> list[PixelCorner]:
-    """Find a place for each tag.
+    """Finds a place for each tag.
 
     Args:
         boxes: (N, 2, 2) boxes of the named objects, least and largest x and y [pixels].

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
+from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image, require_rgb
 from burg_drake.cameras.intrinsics import NEAR_DISTANCE, Intrinsics
 from burg_drake.cameras.pose.board_pose import BoardPose, grey_image
 from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE, consistent_markers
@@ -43,8 +43,8 @@ class BoardPicture:
         image: (H, W, 3) RGB; the first row lies along `upper[1]`, the first column along
             `lower[0]`.
         lower, upper: corners of the shown area in the scene frame [m].
-        error: root mean square distance of the markers' corners in the photo from their places,
-            projected to the sheet [m].
+        error: root mean square distance of the markers' corners in the photo, projected to the
+            sheet, from their places [m].
         ids: ids of the used markers.
         note: reason to doubt the view; "" if there is none.
     """
@@ -94,39 +94,37 @@ class BoardRectifier:
         self._shape = tuple(int(n) for n in np.maximum(np.rint(extent / side), 1)[::-1])
 
     def picture(self, image: Image) -> BoardPicture:
-        """Rectify an image to a top view.
+        """Rectifies an image to a top view.
 
         Args:
             image: (H, W, 3) RGB.
 
         Raises:
-            InvalidInputError: not an image, or of another size than the intrinsics; or it shows no
-                board, or another one.
+            InvalidInputError: the image is none, has another size than the intrinsics, or shows no
+                board or another one.
         """
         image = np.asarray(image)
-        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-            raise InvalidInputError(
-                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
-                " 3) uint8"
-            )
-        p_SQ = self._points()
+        require_rgb(image)
+        p_SQ = self._pixel_centres()
         if self._pose is None:
             sheet = self._finder.find(image)
             pixels, error, ids, note = sheet.project(p_SQ), sheet.error, sheet.ids, ""
         else:
-            pixels, error, ids, note = self._by_pose(image, p_SQ)
+            pixels, error, ids, note = self._project_by_pose(image, p_SQ)
         top = _sample_image(image, pixels.reshape(*self._shape, 2))
         lower, upper = ((float(x), float(y)) for x, y in (self._lower, self._upper))
         return BoardPicture(top, lower, upper, error, ids, note)
 
-    def _points(self) -> Array:
+    def _pixel_centres(self) -> Array:
         """(N, 2) centres of the top view's pixels in the scene frame [m], row by row."""
         (rows, columns), extent = self._shape, self._upper - self._lower
         x = self._lower[0] + (np.arange(columns) + 0.5) * extent[0] / columns
         y = self._upper[1] - (np.arange(rows) + 0.5) * extent[1] / rows
         return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
-    def _by_pose(self, image: Image, p_SQ: Array) -> tuple[Array, float, tuple[int, ...], str]:
+    def _project_by_pose(
+        self, image: Image, p_SQ: Array
+    ) -> tuple[Array, float, tuple[int, ...], str]:
         assert self._pose is not None and self._intrinsics is not None
         found = self._pose.estimate(image)
         if not found.valid:
@@ -150,7 +148,7 @@ def board_picture(
     margin: float = 0.02,
     resolution: float = DEFAULT_PIXEL_SIZE,
 ) -> BoardPicture:
-    """Rectify one image to a top view; use `BoardRectifier` for successive images.
+    """Rectifies one image to a top view; use `BoardRectifier` for successive images.
 
     Args:
         image: (H, W, 3) RGB.
@@ -193,7 +191,7 @@ class SheetFit:
         H: (3, 3) homography from x and y of the scene frame [m] to undistorted image coordinates,
             which have their origin in the image's middle and half its diagonal as their unit.
         distortion: coefficient of the radius r from the middle: `r (1 + distortion r^2)`.
-        middle: (2,) [pixels].
+        middle: (2,) middle of the image [pixels].
         radius: half the image's diagonal [pixels].
         error: root mean square distance of the markers' corners from their places on the sheet [m].
         ids: ids of the used markers.
@@ -221,7 +219,7 @@ class SheetFinder:
         self._detector = MarkerDetector(board.layout)
 
     def find(self, image: Bytes) -> SheetFit:
-        """Find the sheet in an image.
+        """Finds the sheet in an image.
 
         Args:
             image: (H, W) or RGB (H, W, 3).
@@ -238,7 +236,7 @@ class SheetFinder:
         middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
         p_SQ = self._layout.p_SQ[seen.index][..., :2]
         corners = (seen.corners - middle) / radius
-        # Fraction of a marker's side, without distortion.
+        # At least 0.1 of a marker's side, as the homography has no distortion.
         tolerance = max(CORNER_TOLERANCE[0] / radius, 0.1 * float(side_lengths(corners).mean()))
         kept = np.ones(len(p_SQ), dtype=bool)
         if len(p_SQ) > 1:
@@ -250,9 +248,9 @@ class SheetFinder:
             self._require_no_foreign_markers(grey, fit)
         p_SQ, corners = p_SQ[kept].reshape(-1, 2), corners[kept].reshape(-1, 2)
         H, distortion = _fit_sheet(p_SQ, corners, fit, 1.0 / radius)
-        off = _project(H, distortion, p_SQ) - corners
+        residuals = _project(H, distortion, p_SQ) - corners
         scale = self._layout.side / float(side_lengths(corners.reshape(-1, 4, 2)).mean())
-        error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
+        error = scale * float(np.sqrt((residuals**2).sum(axis=1).mean()))
         # Fraction of a marker's side; with larger errors it is another board.
         if error > 0.05 * self._layout.side:
             raise InvalidInputError(
@@ -264,8 +262,8 @@ class SheetFinder:
         return SheetFit(H, distortion, middle, radius, error, ids)
 
     def _require_no_foreign_markers(self, grey: Bytes, fit: int) -> None:
-        """Reject a sheet with more foreign markers than fitting ones: boards of several sizes share
-        a part of the first row.
+        """Rejects a sheet with more foreign markers than fitting ones, as boards of several sizes
+        share a part of the first row.
         """
         layout = self._layout
         other = find_foreign_markers(grey, layout)
@@ -280,19 +278,19 @@ class SheetFinder:
 
 
 def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:
-    """Fit homography and distortion to corners (N, 2), robust against misplaced corners of half
+    """Fits homography and distortion to corners (N, 2), robust against misplaced corners of half
     hidden markers.
     """
     H, _ = cv2.findHomography(p_SQ, corners, 0)
     if H is None:
         raise InvalidInputError("the visible part of the board does not determine its pose")
 
-    def off(x: Array) -> Array:
+    def residuals(x: Array) -> Array:
         return (_project(_homography(x), float(x[8:].sum()), p_SQ) - corners).ravel()
 
     def fit(start: Array, limit: Array) -> Any:
         return least_squares(
-            *(off, start),
+            *(residuals, start),
             bounds=(-limit, limit),
             x_scale="jac",
             loss="soft_l1",
@@ -300,8 +298,8 @@ def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple
         )
 
     plain = fit((H / H[2, 2]).ravel()[:8], np.full(8, np.inf))
-    if markers >= 6:  # Markers from which on the distortion is fitted.
-        # Relative shift of an image corner from the centre.
+    if markers >= 6:  # Fewer do not determine the distortion.
+        # The distortion may shift an image corner by 0.3 of its distance from the middle.
         distorted = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), 0.3))
         # The distortion is used if it lowers the cost below this fraction.
         if distorted.cost < 0.5 * plain.cost:
@@ -341,12 +339,12 @@ def board_observations(
     period: float = 1.0,
     stop: threading.Event | None = None,
 ) -> Iterator[BoardObservation]:
-    """Observe the board repeatedly.
+    """Observes the board repeatedly.
 
     Args:
         source: a live camera gives its newest frame each time, files give every frame. The caller
             closes it.
-        rectifier: makes the views.
+        rectifier: rectifier of the frames.
         period: least time between observations [s]; files are read without pauses.
         stop: set to end the observations, also during a wait.
 

@@ -30,15 +30,15 @@ class ViewActions:
     Args:
         live: the session.
         folder: default folder of snapshots and recordings.
-        plain: also record the pictures without overlay.
+        plain: whether to record the pictures without overlay, too.
     """
 
     def __init__(self, live: LiveSession, folder: str | Path = ".", *, plain: bool = False) -> None:
         self.live, self.folder = live, Path(folder)
         self.recording: Recording | None = None
-        """The one that is being written."""
+        """The recording in progress; None if there is none."""
         self.checking = False
-        """A placement check is at work."""
+        """Whether a placement check is running."""
         self._plain = plain
         self._lock = threading.RLock()
         self._check: threading.Thread | None = None
@@ -51,7 +51,7 @@ class ViewActions:
         return self.live.processor
 
     def snapshot(self, folder: str | Path | None = None, picture: Picture | None = None) -> Path:
-        """Save a snapshot of a picture.
+        """Saves a snapshot of a picture.
 
         Args:
             folder: new folder to make; `SCENE_snapshot_001` and so on if not given.
@@ -85,7 +85,7 @@ class ViewActions:
         return place
 
     def start_recording(self, path: str | Path | None = None) -> Path:
-        """Start to record all frames.
+        """Starts to record all frames.
 
         Args:
             path: of the video; `SCENE_recording_001.mp4` and so on if not given.
@@ -124,7 +124,7 @@ class ViewActions:
             return self.recording.path
 
     def stop_recording(self) -> Path | None:
-        """Finish the recording and return the video; None if there was none, or it was empty.
+        """Finishes the recording and returns the video; None if there was none, or it was empty.
 
         Raises:
             InvalidInputError: it could not be written completely.
@@ -146,7 +146,7 @@ class ViewActions:
         return path
 
     def start_check(self) -> None:
-        """Start a placement check of the newest picture in its own thread.
+        """Starts a placement check of the newest picture in its own thread.
 
         Raises:
             InvalidInputError: there is no picture with a pose, or a check is running.
@@ -164,7 +164,7 @@ class ViewActions:
             self._check.start()
 
     def wait_for_check(self, seconds: float | None = None) -> None:
-        """Wait until the running placement check, if any, is done."""
+        """Waits until the running placement check, if any, is done."""
         if self._check is not None:
             self._check.join(seconds)
 
@@ -193,7 +193,7 @@ class ViewActions:
                 self._finish_on_close()
 
     def _finish_on_close(self) -> None:
-        """Finish a recording that cannot go on, and report its path as an event."""
+        """Finishes a recording that cannot go on, and reports its path as an event."""
         try:
             self.stop_recording()
         except Exception as error:

@@ -14,7 +14,7 @@ from burg_drake.station import Station, StationLike, as_station
 
 
 def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[str, float]:
-    """Compute the visible share of each free object's silhouette in a station's camera.
+    """Computes the visible share of each free object's silhouette in a station's camera.
 
     The silhouette is that of the object alone in an unbounded image. Its visible part is in the
     image and not hidden by another object, the table or an obstacle of the station. The arm is
@@ -22,8 +22,8 @@ def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[st
 
     Args:
         scene: objects with their poses.
-        station: has the camera and the obstacles.
-        camera: its name.
+        station: station with the camera and the obstacles.
+        camera: name of the camera.
 
     Returns:
         0 to 1 by instance, in the scene's order; 0 for objects behind the camera.

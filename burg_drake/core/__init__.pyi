@@ -132,6 +132,7 @@ from .frames import (
     rpy_from_rotation as rpy_from_rotation,
     swap_fingers as swap_fingers,
     transform_points as transform_points,
+    wrap_to_pi as wrap_to_pi,
 )
 from .grasp_set import (
     FIXED_COLUMNS as FIXED_COLUMNS,
@@ -214,8 +215,11 @@ from .settings import (
     setting as setting,
 )
 from .statistics import (
+    TUKEY_LIMIT as TUKEY_LIMIT,
     Z_95 as Z_95,
     clustered_interval as clustered_interval,
+    robust_sd as robust_sd,
+    tukey_weights as tukey_weights,
     wilson_interval as wilson_interval,
 )
 from .structured_text import (

@@ -110,6 +110,11 @@ def rot_z(angle: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def wrap_to_pi(angle: ArrayLike) -> Array:
+    """Wraps angles (...,) to [-pi, pi) [rad]."""
+    return np.asarray(np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi)
+
+
 def check_pose(X_AB: ArrayLike, name: str) -> Array:
     """Validates poses from outside.
 

@@ -1,4 +1,4 @@
-"""Confidence intervals for proportions that are estimated from counts."""
+"""Confidence intervals for proportions from counts, and robust weights of residuals."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from burg_drake.core.arrays import Array
+
 Z_95 = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
+TUKEY_LIMIT = 4.685
+"""Standard deviations at which `tukey_weights` reach 0: 95 % efficiency on normal residuals."""
 
 
 def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
@@ -55,3 +59,14 @@ def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple
     spread = float(((k - share * n) ** 2).sum()) * len(n) / (len(n) - 1)
     half = float(stdtrit(len(n) - 1, 0.975)) * (math.sqrt(spread) / whole)
     return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
+
+
+def robust_sd(residuals: Array) -> float:
+    """Standard deviation of normal residuals, by their median absolute value."""
+    return 1.4826 * float(np.median(np.abs(residuals)))
+
+
+def tukey_weights(ratio: Array) -> Array:
+    """(N,) Tukey's weights of residuals (N,) that are given relative to the limit at which weights
+    reach 0."""
+    return np.where(np.abs(ratio) < 1.0, (1.0 - ratio**2) ** 2, 0.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import Array, InvalidInputError, wrap_to_pi
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ def _angles_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Arr
     """
     middle, half = cones[0].turns(u, v)
     others = [cone.turns(u, v) for cone in cones[1:]]
-    ends = [_wrap_to_pi(m + sign * h - middle) for m, h in others for sign in (-1.0, 1.0)]
+    ends = [wrap_to_pi(m + sign * h - middle) for m, h in others for sign in (-1.0, 1.0)]
     inside = [np.clip(end, -half, half) for end in ends]
     cut = np.sort(np.stack([-half, *inside, half], axis=1), axis=1)
     center = middle[:, None] + 0.5 * (cut[:, 1:] + cut[:, :-1])
     length = np.diff(cut, axis=1)
     for m, h in others:  # NaN where the cone allows nothing: no piece is allowed
-        length = np.where(np.abs(_wrap_to_pi(center - m[:, None])) <= h[:, None], length, 0.0)
+        length = np.where(np.abs(wrap_to_pi(center - m[:, None])) <= h[:, None], length, 0.0)
     below = np.cumsum(length, axis=1)
     target = share * below[:, -1:]
     piece = (below[:, None, :] <= target[..., None]).sum(axis=2)
@@ -105,8 +105,3 @@ def _angles_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Arr
     start = np.take_along_axis(cut[:, :-1] - (below - length), piece, axis=1)
     any_allowed = below[:, -1:] > 0.0  # False for NaN
     return np.where(any_allowed, middle[:, None] + start + target, np.nan)
-
-
-def _wrap_to_pi(angle: Array) -> Array:
-    """Wraps angles to -pi to pi."""
-    return np.asarray(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)

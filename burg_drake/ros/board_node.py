@@ -16,7 +16,7 @@ class Sighting:
     """The board in one image.
 
     Attributes:
-        stamp: the image's time, in the type that its message has it.
+        stamp: time of the image, in the type of its message.
         camera_frame: tf frame of the camera, x right, y down, z forward; may be empty.
         estimate: pose of the camera over the board; `reason` says why an image could not be used.
         image: (H, W, 3) RGB; None if it could not be read.
@@ -62,7 +62,7 @@ class BoardNode:
         Args:
             scene: objects on the board.
             intrinsics: of the camera; from its camera_info if None.
-            rectified: the images are free of distortion (`image_rect`).
+            rectified: whether the images are free of distortion (`image_rect`).
             print_scale: size of the printed board relative to the document, along x and y.
         """
         self._scene = scene
@@ -73,7 +73,7 @@ class BoardNode:
         self._overlay: Overlay | None = None
 
     def locate(self, image: Any, camera_info: Any | None) -> Sighting:
-        """Locate the board in an image.
+        """Locates the board in an image.
 
         Args:
             image: `sensor_msgs/Image` or `CompressedImage`.
@@ -97,7 +97,7 @@ class BoardNode:
         )
 
     def draw(self, sighting: Sighting) -> Bytes | None:
-        """Draw the scene's objects over the image (H, W, 3), or a line that says why there are
+        """Draws the scene's objects over the image (H, W, 3), or a line that says why there are
         none; None without an image.
         """
         image, intrinsics = sighting.image, sighting.intrinsics

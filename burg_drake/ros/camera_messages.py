@@ -26,8 +26,8 @@ class PixelEncoding:
 
     Attributes:
         channels: numbers per pixel.
+        to_rgb: OpenCV's name of the conversion to RGB, without `COLOR_`; empty if none is needed.
         dtype: type of the numbers.
-        to_rgb: OpenCV's name of the conversion, without `COLOR_`; empty if none is needed.
     """
 
     channels: int
@@ -58,7 +58,7 @@ IMAGE_ENCODINGS = {
 
 
 def decode_image_message(message: Any) -> Bytes:
-    """Decode the image of a message.
+    """Decodes the image of a message.
 
     Args:
         message: `sensor_msgs/Image`, or `sensor_msgs/CompressedImage` (JPEG, PNG, ...).
@@ -116,7 +116,7 @@ def _decode_compressed(message: Any) -> Bytes:
 
 
 def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Intrinsics:
-    """Read the intrinsics of a `camera_info` message.
+    """Reads the intrinsics of a `camera_info` message.
 
     K and P are of the full sensor; the images may be cropped (`roi`) and binned (`binning_x`,
     `binning_y`). A binned pixel's centre is the centre of its sensor pixels, which `image_geometry`
@@ -124,8 +124,8 @@ def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Int
 
     Args:
         message: `sensor_msgs/CameraInfo`; its matrices are K, D, P in ROS 1, k, d, p in ROS 2.
-        rectified: the images are from `image_rect`: use P instead of K and no distortion. A stereo
-            baseline in P is ignored, so that poses are of the camera itself.
+        rectified: whether the images are from `image_rect`: then P is used instead of K, and no
+            distortion. A stereo baseline in P is ignored, so that poses are of the camera itself.
 
     Raises:
         InvalidInputError: the camera is not calibrated, or its lens model is not supported.

@@ -29,7 +29,7 @@ ROS_2_HINT = (
 
 
 def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.environ) -> int:
-    """Choose ROS 1 or 2: the requested one, else the one whose set-up script was sourced, else the
+    """Chooses ROS 1 or 2: the requested one, else the one whose set-up script was sourced, else the
     one whose client library can be imported.
 
     As a last resort, Debian's package folder is appended to the path: ROS's pure Python packages
@@ -40,7 +40,7 @@ def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.
         environment: environment variables.
 
     Raises:
-        MissingDependencyError: its client library cannot be imported; the message says why and what
+        MissingDependencyError: the client library cannot be imported; the message says why and what
             to install.
     """
     version_variable = environment.get("ROS_VERSION", "")
@@ -57,7 +57,7 @@ def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.
 
 
 def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) -> RosNode:
-    """Start the node; `Ros1Node` and `Ros2Node` document further errors.
+    """Starts the node; `Ros1Node` and `Ros2Node` document further errors.
 
     Raises:
         MissingDependencyError: message packages are not installed.
@@ -73,7 +73,7 @@ def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) ->
 
 
 def _try_import(name: str) -> str | None:
-    """Try to import a module; return the error, or None."""
+    """Tries to import a module; returns the error, or None."""
     try:
         importlib.import_module(name)
         return None

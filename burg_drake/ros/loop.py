@@ -19,7 +19,7 @@ class StatusLogIntervals:
 
 
 class StatusLog:
-    """Selects the lines for the log."""
+    """Selects the lines of the log."""
 
     def __init__(self, now: float) -> None:
         """
@@ -36,7 +36,7 @@ class StatusLog:
         self._images = self._poses = 0
 
     def record_image(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
-        """Process an image's sighting; return a line and whether it is a warning, or None."""
+        """Processes an image's sighting; returns a line and whether it is a warning, or None."""
         self._last_image, self._warned = now, False
         if not self._images:
             self._since = now
@@ -59,7 +59,7 @@ class StatusLog:
         return sighting.status, True
 
     def record_no_image(self, publishers: Mapping[str, int], now: float) -> str | None:
-        """Process a timeout without an image; return a warning, once."""
+        """Processes a timeout without an image; returns a warning, once."""
         if self._warned or now - self._last_image < StatusLogIntervals.no_image:
             return None
         self._warned = True
@@ -86,27 +86,27 @@ class StatusLog:
 
 
 def run_node(link: RosNode, node: BoardNode) -> None:
-    """Process images until ROS or Ctrl-C ends the node. Of the images that arrive meanwhile only
-    the latest is kept.
+    """Processes images until ROS or Ctrl-C ends the node. Of the images that arrive during the work
+    on one, only the latest is kept.
     """
-    account = StatusLog(time.monotonic())
+    status_log = StatusLog(time.monotonic())
     try:
         while link.running():
             image = link.next_image(0.5)  # Seconds; Ctrl-C may have to wait as long.
             if image is None:
-                hint = account.record_no_image(link.publishers(), time.monotonic())
+                hint = status_log.record_no_image(link.publishers(), time.monotonic())
                 if hint:
                     link.log(hint, warning=True)
                 continue
             sighting = node.locate(image, link.camera_info)
             link.publications.publish(sighting, node.draw)
-            news = account.record_image(sighting, time.monotonic())
-            if news:
-                link.log(news[0], warning=news[1])
-            rate = account.rate(time.monotonic())
+            entry = status_log.record_image(sighting, time.monotonic())
+            if entry:
+                link.log(entry[0], warning=entry[1])
+            rate = status_log.rate(time.monotonic())
             if rate:
                 link.log(rate)
     finally:
-        rate = account.rate(time.monotonic(), last=True)
+        rate = status_log.rate(time.monotonic(), last=True)
         if rate:
             link.log(rate)

@@ -93,7 +93,7 @@ class _TimeoutTransport(xmlrpc.client.Transport):
 
 
 def require_master(uri: str) -> None:
-    """Check that a ROS master answers.
+    """Checks that a ROS master answers.
 
     Raises:
         InvalidInputError: no master answers at that address.
@@ -156,7 +156,7 @@ class Ros2Node(RosNode):
             self._subscribe(topic, reliable=True)
 
     def _subscribe(self, topic: str, *, reliable: bool) -> None:
-        """Subscribe to a topic; depth 1 keeps only the latest message.
+        """Subscribes to a topic; depth 1 keeps only the latest message.
 
         A reliable subscription is tried first, although it only receives from reliable publishers:
         an image is sent in hundreds of packets, and with best effort a lost one costs the image

@@ -48,7 +48,7 @@ class MessageClasses:
 
 
 def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
-    """Import the message classes; their modules have the same names in ROS 1 and ROS 2.
+    """Imports the message classes; their modules have the same names in ROS 1 and ROS 2.
 
     Raises:
         ImportError: a package is not installed.
@@ -71,7 +71,7 @@ def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
 
 
 def image_message(classes: MessageClasses, sighting: Sighting, image: Bytes) -> Any:
-    """Build a `sensor_msgs/Image` of (H, W, 3) RGB, with the header of the input image."""
+    """Builds a `sensor_msgs/Image` of (H, W, 3) RGB, with the header of the input image."""
     message = classes.Image()
     _set_header(message, sighting, sighting.camera_frame)
     message.height, message.width = image.shape[:2]
@@ -139,16 +139,14 @@ def _set_header(message: Any, sighting: Sighting, frame: str) -> None:
 
 
 def _set_pose(position: Any, orientation: Any, X: Array) -> None:
-    """Write a (4, 4) pose to a message; ROS 2 only accepts Python's own numbers."""
+    """Writes a (4, 4) pose to a message; ROS 2 only accepts Python's own numbers."""
     position.x, position.y, position.z = (float(value) for value in X[:3, 3])
     quaternion = quaternion_from_rotation(X[:3, :3])
     orientation.w, orientation.x, orientation.y, orientation.z = (float(v) for v in quaternion)
 
 
 NODE_NAME_PATTERN = re.compile(r"[A-Za-z]\w*", re.ASCII)  # Valid names of a node.
-TOPIC_NAME_PATTERN = re.compile(
-    r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII
-)  # Valid names of a topic.
+TOPIC_NAME_PATTERN = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)  # Valid topics.
 COMPRESSED_SUFFIX = "compressed"
 """Last part of the name of a topic with compressed images (image_transport)."""
 
@@ -244,7 +242,7 @@ class Publications:
             self._frames = advertise("/tf", classes.TFMessage, 100)  # As in tf2_ros.
 
     def publish(self, sighting: Sighting, draw: Callable[[Sighting], Any]) -> None:
-        """Publish a sighting: pose and transform only if known, and the overlay only if it has
+        """Publishes a sighting: pose and transform only if known, and the overlay only if it has
         subscribers.
         """
         classes, names = self._classes, self._names
@@ -270,9 +268,8 @@ class RosNode(ABC):
     """A running node of ROS 1 or ROS 2.
 
     Attributes:
-        publications: its topics.
-        camera_info: the latest `sensor_msgs/CameraInfo`, None before the
-            first.
+        publications: published topics.
+        camera_info: the latest `sensor_msgs/CameraInfo`; None before the first.
     """
 
     publications: Publications
@@ -285,7 +282,7 @@ class RosNode(ABC):
 
     @abstractmethod
     def next_image(self, timeout: float) -> Any | None:
-        """Wait for the latest new image; None after `timeout` [s]."""
+        """Waits for the latest new image; None after `timeout` [s]."""
 
     @abstractmethod
     def publishers(self) -> Mapping[str, int]:
@@ -293,11 +290,11 @@ class RosNode(ABC):
 
     @abstractmethod
     def log(self, text: str, *, warning: bool = False) -> None:
-        """Write a line to the log of ROS."""
+        """Writes a line to the log of ROS."""
 
     @abstractmethod
     def close(self) -> None:
-        """Shut down the node."""
+        """Shuts down the node."""
 
     def _handlers(
         self, names: NodeNames, classes: MessageClasses, with_camera_info: bool

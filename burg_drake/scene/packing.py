@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core import Array
+from burg_drake.core import Array, wrap_to_pi
 from burg_drake.scene.object_shapes import ObjectShape
 from burg_drake.scene.occupancy import OccupiedBoard, StandingObject, place_in_stable_pose
 from burg_drake.scene.polygons import (
@@ -78,7 +78,7 @@ def _aligned_yaws(footprint: Array, others: Sequence[StandingObject]) -> list[fl
     found: list[float] = []
     for heading in towards:
         yaw = float((heading - own) % (2.0 * np.pi))
-        if all(abs((yaw - other + np.pi) % (2.0 * np.pi) - np.pi) > 0.02 for other in found):
+        if all(abs(wrap_to_pi(yaw - other)) > 0.02 for other in found):
             found.append(yaw)
     return found
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core import Array, rot_z
+from burg_drake.core import Array, rot_z, wrap_to_pi
 from burg_drake.objects import UPRIGHT_TOLERANCE, ObjectEntry, ObjectLibrary
 
 
@@ -34,7 +34,7 @@ def best_yaw(points: Array, R_WC: Array) -> float:
     for yaw in yaws:
         seen = (points @ rot_z(yaw).T) @ R_WC[:, :2]
         area = cv2.contourArea(cv2.convexHull(seen.astype(np.float32)))
-        turn = abs((yaw + np.pi) % (2 * np.pi) - np.pi) / np.pi
+        turn = abs(wrap_to_pi(yaw)) / np.pi
         scores.append(area * (1.0 - yaw_cost * turn))
     return float(yaws[int(np.argmax(scores))])
 

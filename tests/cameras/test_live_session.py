@@ -218,7 +218,7 @@ def test_a_lost_camera_is_told_once_and_comes_back(
 ) -> None:
     """OpenCV reads the video as it reads a camera; at its end the camera is gone for a while."""
     monkeypatch.setattr(source_opening, "FRAME_TIMEOUT", 0.05)
-    monkeypatch.setattr(source_opening, "FIRST_WAIT", 0.05)
+    monkeypatch.setattr(source_opening, "MIN_REOPEN_INTERVAL", 0.05)
     gone = [True]
 
     def plug_in() -> cv2.VideoCapture | None:

@@ -38,7 +38,7 @@ def test_outlines_move_as_the_derivatives_say(box: TargetShape) -> None:
         q = Q.copy()
         q[part] += step
         moved = offsets(before, visible_outline(VIEW, box, q, NOTHING))
-        expected = before.along[:, part] * step
+        expected = before.displacement_jacobian[:, part] * step
         assert np.abs(expected).max() > 0.03
         assert (np.abs(moved - expected) < 3e-4).mean() > 0.95
 
@@ -57,7 +57,7 @@ def test_outlines_move_with_the_camera_as_the_derivatives_say(box: TargetShape) 
         moved = offsets(
             before, visible_outline(PinholeView(INTRINSICS.K, (640, 480), X), box, Q, NOTHING)
         )
-        expected = before.camera[:, part] * 3e-4
+        expected = before.camera_jacobian[:, part] * 3e-4
         assert np.abs(expected).max() > 0.03
         assert (np.abs(moved - expected) < 1e-3).mean() > 0.95
 

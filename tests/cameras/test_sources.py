@@ -265,8 +265,8 @@ class Stream(http.server.BaseHTTPRequestHandler):
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A source that waits less than for real cameras."""
     monkeypatch.setattr(source_opening, "FRAME_TIMEOUT", 0.3)
-    monkeypatch.setattr(source_opening, "FIRST_WAIT", 0.05)
-    monkeypatch.setattr(source_opening, "MAX_WAIT", 0.2)
+    monkeypatch.setattr(source_opening, "MIN_REOPEN_INTERVAL", 0.05)
+    monkeypatch.setattr(source_opening, "MAX_REOPEN_INTERVAL", 0.2)
 
 
 @pytest.fixture

@@ -197,3 +197,10 @@ def test_check_pose_names_a_pose_far_down():
 
 def test_check_pose_accepts_what_text_files_round():
     frames.check_pose(np.round(random_poses(100, 14), 7), "X")
+
+
+def test_angles_are_wrapped_to_the_interval_from_minus_pi_to_pi():
+    angles = np.array([0.0, np.pi, -np.pi, 7.0, -7.0])
+    wrapped = [0.0, -np.pi, -np.pi, 7.0 - 2.0 * np.pi, 2.0 * np.pi - 7.0]
+    np.testing.assert_allclose(frames.wrap_to_pi(angles), wrapped, atol=1e-15)
+    assert frames.wrap_to_pi(7.0) == pytest.approx(7.0 - 2.0 * np.pi)

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from burg_drake.core import clustered_interval, wilson_interval
+from burg_drake.core import (
+    TUKEY_LIMIT,
+    clustered_interval,
+    robust_sd,
+    tukey_weights,
+    wilson_interval,
+)
 
 
 def test_wilson_interval_has_the_published_values() -> None:
@@ -64,3 +70,15 @@ def test_clusters_that_are_alike_are_independent_trials() -> None:
         wilson = wilson_interval(sum(successes), sum(trials))
         assert clustered_interval(successes, trials) == wilson
     assert clustered_interval([], []) == clustered_interval([0], [0]) == (0.0, 1.0)
+
+
+def test_a_few_outliers_hardly_change_the_robust_standard_deviation() -> None:
+    residuals = np.random.default_rng(0).normal(0.0, 2.0, 100_000)
+    residuals[:1000] = 1e6
+    assert robust_sd(residuals) == pytest.approx(2.0, rel=0.03)
+
+
+def test_tukey_weights_are_those_of_statsmodels() -> None:
+    residuals = np.linspace(-6.0, 6.0, 25)
+    expected = sm.robust.norms.TukeyBiweight(TUKEY_LIMIT).weights(residuals)
+    np.testing.assert_allclose(tukey_weights(residuals / TUKEY_LIMIT), expected, atol=1e-15)

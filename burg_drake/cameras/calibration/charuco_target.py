@@ -103,7 +103,7 @@ class CharucoView:
 
     Attributes:
         name: of the image.
-        size: its width and height [pixels].
+        size: width and height of the image [pixels].
         ids: (N,) indices of the detected corners, rows of the target's `p_TQ`.
         corners: (N, 2) detected corners [pixels].
         blur: standard deviation of the blur, measured at edges [pixels].
@@ -123,8 +123,8 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 
     Args:
         image: (H, W, 3) RGB or (H, W) gray.
-        target: to detect.
-        name: of the image.
+        target: target to detect.
+        name: name of the image.
 
     Returns:
         The view; or the reason why there is none, in a few words.
@@ -160,13 +160,13 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
 def refine_corners(
     light: Single, corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> Array:
-    """Refine corners to the intersections of their edges.
+    """Refines corners to the intersections of their edges.
 
     Args:
         light: (H, W) image in linear light.
         corners: (N, 2) near the corners [pixels].
         ids: (N,) indices of the corners.
-        target: that they belong to.
+        target: target of the corners.
 
     Returns:
         (N, 2) refined corners [pixels].
@@ -190,8 +190,8 @@ def _marker_gaps(corners: Array, ids: NDArray[np.int32], target: CharucoTarget) 
 
 
 def _square_sides(corners: Array, ids: NDArray[np.int32], target: CharucoTarget) -> Array:
-    """(N,) shortest side of a square at each corner [pixels]; the least of all if no neighbour was
-    detected.
+    """(N,) shortest side of a square at each corner [pixels]; for corners without detected
+    neighbours, the shortest side of all.
     """
     pairs = _neighbour_pairs(ids, target)
     lengths = np.linalg.norm(corners[pairs[:, 0]] - corners[pairs[:, 1]], axis=1)

@@ -61,11 +61,11 @@ class LensChoice:
 
 
 def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str) -> LensChoice:
-    """Fit all lens models and choose one.
+    """Fits all lens models and chooses one.
 
     Args:
-        views: of one camera.
-        target: that they show.
+        views: views of one camera.
+        target: target that the views show.
         model: a key of `COEFFICIENT_COUNTS`, or `auto`.
 
     Raises:
@@ -77,12 +77,12 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
     corner_rays = fisheye.intrinsics.rays(image_grid(fisheye.intrinsics, 2, 2))
     is_wide = np.arccos(corner_rays[:, 2]).max() > np.radians(55.0)
     fits = [*perspective, fisheye] if is_wide else perspective
-    # All lenses distort a little, so that a pinhole is not chosen.
-    # Both a wrong model and one that the views do not determine make views disagree. So the
-    # model by which they agree most shows the correlation of errors.
-    limit = HUBER_RATIO * min(fit.typical for fit in fits[1:])
+    # All lenses distort a little, so that the pinhole, the first fit, is not chosen.
+    # Views disagree by a wrong model and by one that they do not determine. So the model with the
+    # least disagreement shows the correlation of errors.
+    limit = HUBER_RATIO * min(fit.median_residual for fit in fits[1:])
     evidence = LensEvidence(limit, min(view_disagreement(fit) for fit in fits[1:]) ** 2)
-    best = min(fits[1:], key=lambda fit: fit.information(evidence, True))
+    best = min(fits[1:], key=lambda fit: fit.criterion(evidence, True))
     # Perspective models are invalid beside the camera, so they say nothing about a fisheye.
     hypotheses = lens_hypotheses([best] if best is fisheye else fits, evidence)
     supported = best
@@ -101,10 +101,11 @@ def _rational_if_better(
     hypotheses: tuple[LensHypothesis, ...],
     corners: Array,
 ) -> LensFit:
-    """The rational fit if the more generous Akaike criterion prefers it and it is nearer to all
-    hypotheses, else the best fit. A rational lens may fit better and still be wild without corners.
+    """The rational fit if Akaike's more generous criterion prefers it and it is nearer to all
+    hypotheses; else the best fit. A rational lens may fit better and still be wild where there
+    are no corners.
     """
-    if not rational.information(evidence, False) < best.information(evidence, False):
+    if not rational.criterion(evidence, False) < best.criterion(evidence, False):
         return best
     pixels = image_grid(best.intrinsics)
     worst = [
@@ -114,7 +115,7 @@ def _rational_if_better(
 
 
 def _fit_perspective_models(views: Sequence[CharucoView], target: CharucoTarget) -> list[LensFit]:
-    """Fit the perspective models, each from the one before."""
+    """Fits the perspective models, each from the one before."""
     start = guess_camera(views, target, "perspective")
     fits = []
     # From the simplest on; each model contains the one before.
@@ -159,10 +160,10 @@ class Calibration:
 
     Attributes:
         intrinsics: with the residual of the calibration.
-        target: that was seen.
+        target: target in the images.
         model: of the lens: `pinhole`, `radial4` (k1, k2, p1, p2), `radial` (k3 also), `rational`
             (k4, k5, k6 also) or `fisheye`.
-        views: that were used.
+        views: views that were used.
         rejected: names of rejected images, and the reasons.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients, if the lens is of this model.
         hypotheses: lenses that are plausible by these corners, see `camera_error`.
@@ -224,7 +225,7 @@ def calibrate(
 
     Args:
         images: (H, W, 3) RGB or (H, W) gray, of one camera at one resolution, focus and zoom.
-        target: that they show.
+        target: target that the images show.
         model: of the lens, see `calibrate_views`.
         names: of the images; numbers from 0 if not given.
 
@@ -253,8 +254,8 @@ def calibrate_views(
     """Calibrates a camera from corners that were found.
 
     Args:
-        views: of one camera.
-        target: that they show.
+        views: views of one camera.
+        target: target that the views show.
         model: of the lens: `pinhole`, `radial4`, `radial`, `rational`, `fisheye`, or `auto`: the
             one of the last four that the residuals support best; a fisheye only if the lens is
             wide.
@@ -306,7 +307,7 @@ def calibrate_views(
 def _select_usable_views(
     views: Sequence[CharucoView],
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Select sharp and different views of the most frequent size; return them and the rejected
+    """Selects sharp and different views of the most frequent size; returns them and the rejected
     ones.
     """
     sizes = Counter(view.size for view in views)
@@ -334,7 +335,7 @@ def _select_usable_views(
 def corner_displacement(view: CharucoView, other: CharucoView) -> float:
     """Mean distance of corners between two views, as a share of the image's diagonal.
 
-    Infinite if they have less than half of their corners in common.
+    Infinite if the views have less than half of their corners in common.
     """
     _, mine, its = np.intersect1d(view.ids, other.ids, return_indices=True)
     if view.size != other.size or 2 * len(mine) < max(len(view.ids), len(other.ids)):
@@ -357,7 +358,7 @@ def _require_views(views: Sequence[CharucoView], refused: Sequence[tuple[str, st
 def _reject_outliers(
     views: list[CharucoView], fit: LensFit
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
-    """Remove views and corners that do not fit the others."""
+    """Removes views and corners that do not fit the others."""
     lengths = [np.linalg.norm(r, axis=1) for r in fit.residuals]
     typical = float(np.median(np.concatenate(lengths)))
     rms = np.array([rms_length(r) for r in fit.residuals])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import cv2
@@ -20,8 +21,8 @@ FOCAL_LENGTH_GUESSES = np.geomspace(0.25, 3.0, 11)
 def guess_camera(
     views: Sequence[CharucoView], target: CharucoTarget, model: LensModel
 ) -> tuple[Intrinsics, Array]:
-    """Guess a camera without distortion, and (V, 4, 4) the target in its frame, by the focal length
-    that explains the median view best.
+    """Guesses a camera without distortion, and (V, 4, 4) poses of the target in its frame, by the
+    focal length that explains the median view best.
     """
     width, height = views[0].size
     found = []
@@ -44,9 +45,7 @@ def guess_camera(
 def _fit_view_pose(
     view: CharucoView, target: CharucoTarget, camera: Intrinsics
 ) -> tuple[float, Array]:
-    """Mean reprojection error of a view's corners at the best pose [pixels], and that pose (4,
-    4).
-    """
+    """Mean reprojection error of a view at the best pose [pixels], and the pose (4, 4)."""
     p_TQ = target.p_TQ[view.ids]
     straight = np.ascontiguousarray((camera.undistort(view.corners) - camera.center) / camera.focal)
     _, rotations, translations, _ = cv2.solvePnPGeneric(
@@ -67,8 +66,8 @@ def _fit_view_pose(
 
 
 def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
-    """(4, 4) an upright target in front of the camera, of the size in the image: for views that no
-    pose explains, which are rejected later.
+    """(4, 4) pose of a target that is parallel to the image and has its size there: for views that
+    no pose explains, which are rejected later.
     """
     size = float(np.std(p_TQ[:, :2]) / max(float(np.std(straight)), 1e-9))
     X = np.eye(4)
@@ -77,7 +76,7 @@ def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
 
 
 def lens_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
-    """Project points and differentiate the projection.
+    """Projects points and differentiates the projection.
 
     Args:
         intrinsics: of the camera.
@@ -122,7 +121,7 @@ def lens_prior(camera: Intrinsics, bends: Array) -> tuple[Array, Array]:
     diagonal = float(np.hypot(*size))
     reach = min(1.0, 0.5 * diagonal / camera.focal[0])
     powers = FISHEYE_POWERS if camera.is_fisheye else PERSPECTIVE_POWERS[: len(camera.distortion)]
-    # A term of the lens formula has a standard deviation of 1 in the image's corners.
+    # Each term of the lens formula has a standard deviation of 1 in the image's corners.
     weights = reach**powers
     center_deviation = (np.array(camera.center) - 0.5 * (size - 1)) / (center_sd * diagonal)
     focal = np.array(camera.focal)
@@ -141,7 +140,7 @@ HUBER_RATIO = 3.0  # Residuals above this multiple of the median count linearly 
 
 
 class _LensFitState(NamedTuple):
-    """Intermediate camera, bends (3,) and poses of a fit, with cost, and residuals (N, 2), weights
+    """Camera, bends (3,) and poses (V, 4, 4) of a fit; their cost; and residuals (N, 2), weights
     (N,) and derivatives (N, 2, 6) and (N, 2, P + 3) of N corners.
     """
 
@@ -160,8 +159,8 @@ class LensEvidence:
     """Evidence of the corners for the comparison of lens models.
 
     Attributes:
-        limit: larger residuals are of outliers and count as this [pixels].
-        dispersion: number of corners with correlated errors that are worth one independent corner
+        limit: larger residuals belong to outliers and count as this one [pixels].
+        dispersion: number of corners with correlated errors that count as one independent corner
             (Burnham and Anderson, Model Selection and Multimodel Inference, 2002, section 2.5).
     """
 
@@ -176,13 +175,12 @@ class LensFit:
     Attributes:
         model: of the lens, a key of `COEFFICIENT_COUNTS`.
         intrinsics: fitted intrinsics.
-        X_CT: (V, 4, 4) target in the camera's frame, of each view.
-        residuals: of each view (N, 2): measured minus projected corners [pixels].
-        bends: (3,) of the target along x^2, x y and y^2 [of what is usual].
+        X_CT: (V, 4, 4) pose of the target in the camera's frame in each view.
+        residuals: (N, 2) measured minus projected corners of each view [pixels].
+        bends: (3,) bends of the target along x^2, x y and y^2, in usual bends.
         bulge: height difference of the target's highest and lowest corner by `bends` [m].
-        reduced: of each view (2 N, P + 3) derivatives of its pixels by fx, fy, cx, cy, the
-            coefficients and bends, with the part that a change of the view's pose explains
-            projected out.
+        reduced: (2 N, P + 3) derivatives of each view's pixels by fx, fy, cx, cy, the coefficients
+            and bends, without the part that a change of the view's pose explains.
     """
 
     model: str
@@ -209,14 +207,23 @@ class LensFit:
         """Number of the camera's parameters."""
         return 4 + COEFFICIENT_COUNTS[self.model]
 
+    @cached_property
+    def information(self) -> Array:
+        """(P + 3, P + 3) inverse covariance of the parameters of camera and target for corners of
+        variance 1, the prior included.
+        """
+        J = np.concatenate(self.reduced)
+        slopes = lens_prior(self.intrinsics, self.bends)[1]
+        return np.asarray(J.T @ J + self.variance * np.diag(slopes**2))
+
     @property
-    def typical(self) -> float:
+    def median_residual(self) -> float:
         """Median length of the residuals [pixels]."""
         return float(np.median(np.linalg.norm(np.concatenate(self.residuals), axis=1)))
 
-    def information(self, evidence: LensEvidence, bayesian: bool) -> float:
-        """Bayesian information criterion, or Akaike's, which penalizes large models less. The model
-        with the lowest value is best supported.
+    def criterion(self, evidence: LensEvidence, bayesian: bool) -> float:
+        """Bayesian information criterion, or Akaike's, which penalizes large models less. The best
+        supported model has the lowest value.
         """
         squares = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
         n = 2 * len(squares)
@@ -235,12 +242,12 @@ def fit_lens(
     """Fits a camera model.
 
     Args:
-        views: images of one camera, all of one size.
-        target: what they show.
+        views: views of one camera, all of one size.
+        target: target that the views show.
         model: of the lens, a key of `COEFFICIENT_COUNTS`.
-        start: initial camera, of a simpler model or the same, and (V, 4, 4) the target in its
-            frame.
-        bend: approximate bulge of the target [m].
+        start: initial camera, of the same or a simpler model, and (V, 4, 4) poses of the target in
+            its frame.
+        bend: usual bulge of a target [m].
 
     Raises:
         InvalidInputError: the views do not determine a camera.
@@ -279,7 +286,7 @@ def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
 
 
 def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
-    """Pad a camera's coefficients to the number of a model."""
+    """Pads a camera's coefficients to the number of a model."""
     count = COEFFICIENT_COUNTS[model]
     distortion = (*camera.distortion, *(0.0,) * count)[:count]
     lens: LensModel = "fisheye" if model == "fisheye" else "perspective"
@@ -308,7 +315,7 @@ class _LensFitProblem:
         self.rise = bend * np.stack([x * x, x * y, y * y], axis=1)
 
     def evaluate(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
-        """Cost and derivatives."""
+        """Computes cost and derivatives."""
         X = X_CT[self.view]
         p_TQ = self.p_TQ + (self.rise @ bends)[:, None] * [0.0, 0.0, 1.0]
         p_CQ = np.einsum("nij,nj->ni", X[:, :3, :3], p_TQ) + X[:, :3, 3]
@@ -316,7 +323,7 @@ class _LensFitProblem:
         residuals = self.pixels - pixels
         length = np.maximum(np.linalg.norm(residuals, axis=1), 1e-12)
         weights = np.minimum(1.0, self.limit / length)
-        # Huber's: r^2 up to the limit c, then 2 c r - c^2.
+        # Huber's loss: r^2 up to the limit c, then 2 c r - c^2.
         loss = np.sum(weights * length**2 * (2.0 - weights))
         cost = float(loss + CORNER_SD_PX**2 * np.sum(lens_prior(intrinsics, bends)[0] ** 2))
         if not (np.isfinite(cost) and (p_CQ[:, 2] > 0.0).all()):
@@ -327,7 +334,7 @@ class _LensFitProblem:
         return _LensFitState(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
     def minimize(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
-        """Minimize the cost from an initial camera.
+        """Minimizes the cost from an initial camera.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
@@ -348,7 +355,7 @@ class _LensFitProblem:
         return state
 
     def step(self, state: _LensFitState, damping: float) -> tuple[_LensFitState | None, float]:
-        """Find a state of lower cost and the next damping; None if there is none."""
+        """Finds a state of lower cost and the next damping; None if there is none."""
         root = np.sqrt(state.weights)[:, None]
         Jp, Jc = state.by_pose * root[..., None], state.by_others * root[..., None]
         r = state.residuals * root

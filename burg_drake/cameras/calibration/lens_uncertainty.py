@@ -15,7 +15,6 @@ from burg_drake.cameras.calibration.lens_fit import (
     LensEvidence,
     LensFit,
     lens_derivatives,
-    lens_prior,
 )
 from burg_drake.cameras.intrinsics import (
     IMAGE_PARTS,
@@ -30,7 +29,7 @@ COVERAGE_GRID = (6, 8)
 
 
 def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDArray[np.int_]:
-    """Count the corners in each cell of the image.
+    """Counts the corners in each cell of the image.
 
     Args:
         views: of the target.
@@ -49,7 +48,7 @@ def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDAr
 
 
 def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
-    """Find `IMAGE_PARTS` without corners, or with corners along less than half of an edge, by the
+    """Finds `IMAGE_PARTS` without corners, or with corners along less than half of an edge, by the
     counts of `corner_coverage`.
     """
     bands = (slice(0, 1), slice(1, -1), slice(-1, None))
@@ -70,7 +69,7 @@ def image_part_indices(pixels: Array, size: tuple[int, int]) -> Indices:
 
 
 BOUND_SIGMAS = 2.0
-"""Number of standard deviations that errors exceed in one of 20 cases."""
+"""Standard deviations that an error exceeds in one of 20 cases."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +77,8 @@ class LensHypothesis:
     """A lens model that is consistent with the corners.
 
     Attributes:
-        weight: its support; the weights of all hypotheses add up to 1.
-        intrinsics: fitted.
+        weight: support of the model; the weights of all hypotheses add up to 1.
+        intrinsics: fitted intrinsics.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients.
     """
 
@@ -101,9 +100,9 @@ def camera_covariance(fit: LensFit) -> Array:
 
 
 def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
-    """Weight the fits of several models to the same corners by Akaike's criterion."""
-    information = np.array([fit.information(evidence, False) for fit in fits])
-    weights = np.exp(-0.5 * (information - information.min()))
+    """Weights the fits of several models to the same corners by Akaike's criterion."""
+    criteria = np.array([fit.criterion(evidence, False) for fit in fits])
+    weights = np.exp(-0.5 * (criteria - criteria.min()))
     # Models with less support are dropped.
     kept = [k for k in range(len(fits)) if weights[k] > 1e-4 * weights.sum()]
     total = float(weights[kept].sum())
@@ -117,14 +116,14 @@ def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[Le
 def view_disagreement(fit: LensFit) -> float:
     """Ratio of the views' disagreement to that expected from independent errors of the corners.
 
-    Errors of neighbouring corners are correlated: blur, a bent target, a rolling shutter. The
-    jackknife measures this by the camera's change when one view is left out, at the corners. At
+    Errors of neighbouring corners are correlated by blur, a bent target or a rolling shutter. The
+    jackknife measures this by the change of the projected corners when one view is left out. At
     least 1.
     """
-    H, squares = _fit_information(fit), np.zeros_like(_fit_information(fit))
+    squares = np.zeros_like(fit.information)
     count = len(fit.residuals)
     for J, r in zip(fit.reduced, fit.residuals, strict=True):
-        change = _scaled_inverse(H - J.T @ J, fit) @ (J.T @ r.ravel())
+        change = _scaled_inverse(fit.information - J.T @ J, fit) @ (J.T @ r.ravel())
         squares += (count - 1) / count * np.outer(change, change)
     J = np.concatenate(fit.reduced)
     independent = float(np.einsum("ni,ij,nj->", J, _fit_covariance(fit), J))
@@ -165,8 +164,8 @@ def camera_error(
 
 
 def _camera_differences(one: Intrinsics, other: Intrinsics, pixels: Array) -> tuple[Array, Array]:
-    """Image differences of two cameras at the pixels of one: (2 N, 1 + P), the differences and
-    their derivatives by the other's parameters; and (2 N, 3), by a rotation of it.
+    """Image differences of two cameras at the pixels of one: (2 N, 1 + P) the differences and their
+    derivatives by the other camera's parameters; and (2 N, 3) by a rotation of the other camera.
     """
     found, by_pose, by_camera = lens_derivatives(other, one.rays(pixels))
     count = 4 + len(other.distortion)
@@ -176,19 +175,12 @@ def _camera_differences(one: Intrinsics, other: Intrinsics, pixels: Array) -> tu
 
 def _fit_covariance(fit: LensFit) -> Array:
     """(P + 3, P + 3) of the parameters of camera and target."""
-    return np.asarray(fit.variance * _scaled_inverse(_fit_information(fit), fit))
-
-
-def _fit_information(fit: LensFit) -> Array:
-    """(P + 3, P + 3) inverse covariance for corners of variance 1, the prior's included."""
-    J = np.concatenate(fit.reduced)
-    slopes = lens_prior(fit.intrinsics, fit.bends)[1]
-    return np.asarray(J.T @ J + fit.variance * np.diag(slopes**2))
+    return np.asarray(fit.variance * _scaled_inverse(fit.information, fit))
 
 
 def _scaled_inverse(information: Array, fit: LensFit) -> Array:
-    """Invert an information matrix, scaled by a fit's parameter scales."""
-    scale = 1.0 / np.sqrt(np.diag(_fit_information(fit)))
+    """Inverts an information matrix, scaled by a fit's parameter scales."""
+    scale = 1.0 / np.sqrt(np.diag(fit.information))
     outer = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(information * outer, rcond=1e-14, hermitian=True) * outer)
 
@@ -232,11 +224,11 @@ def _warn_of_old_name(what: str) -> None:
 class CalibrationAccuracy(Promise):
     """Bounds of the distance at which the true and the calibrated camera show the same point.
 
-    In 19 of 20 cases the distance is smaller.
+    In 19 of 20 cases the distance is smaller than the bound.
 
     Attributes:
-        parts: the bound in each part of the image [pixels]; without parts that look farther than
-            85 degrees off the axis all over.
+        parts: the bound in each part of the image [pixels]; without parts that are everywhere more
+            than 85 degrees off the axis.
         unknown: share of the image with a bound above 3 pixels.
     """
 
@@ -245,11 +237,11 @@ class CalibrationAccuracy(Promise):
 
     @property
     def excepted_parts(self) -> tuple[str, ...]:
-        """Parts without a bound, or with one much larger than that of the middle, or of the best
-        part if the middle has none; the worst first."""
+        """Parts without a bound, or with a bound much larger than that of the middle (of the best
+        part if the middle has none); the worst first.
+        """
         bounds = {name: self.parts.get(name, np.inf) for name in IMAGE_PARTS}
         best = self.parts.get("middle", min(self.parts.values()))
-        # Parts with a larger error relative to the best part are named.
         limit = max(NOTABLE_ERROR_PX, 2.0 * best)
         worse = [name for name, bound in bounds.items() if not bound <= limit]
         return tuple(sorted(worse, key=lambda name: -bounds[name]))

@@ -29,7 +29,7 @@ from burg_drake.scene import marker_dictionary
 def write_target(
     target: CharucoTarget, path: str | Path, settings: PrintSettings | None = None
 ) -> Paper:
-    """Write a target as a PDF of one page.
+    """Writes a target as a PDF of one page.
 
     Args:
         target: to print.
@@ -84,7 +84,7 @@ def target_origin(target: CharucoTarget, paper: Paper) -> Array:
 
 
 def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
-    """Draw black squares and markers; T has y down the page."""
+    """Draws black squares and markers; T has y down the page."""
     flip = np.array([1.0, -1.0])
     markers = np.asarray(target.board.getObjPoints())[:, 0, :2]
     white = {tuple(at) for at in np.floor(markers / target.square).astype(int).tolist()}

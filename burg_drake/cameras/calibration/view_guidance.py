@@ -69,7 +69,7 @@ def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
     missing = [
         side
         for side, (axis, sign) in TILT_DIRECTIONS.items()
-        if (sign * toward[:, axis] > 0.5).sum() < 2  # views, of which half of the tilt counts
+        if (sign * toward[:, axis] > 0.5).sum() < 2  # views with half of their tilt to that side
     ]
     if not missing:
         return []
@@ -77,7 +77,7 @@ def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
 
 
 def _missing_distances(calibration: Calibration) -> list[str]:
-    """Whether all views show the target at about the same distance."""
+    """Instruction for another distance if all views show the target at about the same one."""
     views, middle = calibration.views, np.array([*calibration.target.size, 0.0]) / 2.0
     places = transform_points(np.array([used.X_CT for used in views]), middle[None])
     distance = np.linalg.norm(places, axis=-1)
@@ -119,11 +119,10 @@ class ViewCollector:
     """Selects views for a calibration from frames.
 
     Attributes:
-        target: that the camera sees.
+        target: target in front of the camera.
         views: selected views.
         wanted: instruction for the person who holds the target.
-        enough: the
-            selected views suffice for a good calibration.
+        enough: whether the selected views suffice for a good calibration.
     """
 
     target: CharucoTarget
@@ -133,11 +132,11 @@ class ViewCollector:
     _previous_view: CharucoView | None = None
 
     def add_frame(self, frame: Frame) -> tuple[bool, str]:
-        """Add a frame if it is a good, new view.
+        """Adds a frame if it is a good, new view.
 
         Returns:
-            `(taken, word)`: whether it was added, and an instruction for the person who holds the
-            target.
+            `(taken, word)`: whether the frame was added, and an instruction for the person who
+            holds the target.
         """
         name = f"view {len(self.views) + 1}"
         view = find_target(frame.image, self.target, name)

@@ -20,16 +20,16 @@ class EmptyBoard:
     """The empty board as the camera would see it without shadows.
 
     Attributes:
-        color: (H, W, 3) predicted linear light; only meaningful on the `sheet`. With tints of
-            a height map if the photo shows them.
-        sheet: (H, W) pixels that see only the sheet if it is empty.
-        evidence: (H, W) from +1, where something stands, to -1, where the board is seen; 0 where
+        color: (H, W, 3) predicted linear light, with the tints of a height map if the photo shows
+            them; only meaningful on the `sheet`.
+        sheet: (H, W) True for pixels that would show only the sheet if it were empty.
+        evidence: (H, W) from +1, where an object stands, to -1, where the board is seen; 0 where
             unknown.
         paper: (3,) mean light of unshadowed paper over the sheet.
         contrast: paper minus ink, mean over channels and sheet [full scale, linear].
         blur: of the photo [pixels].
         noise: standard deviation of the photo's noise over paper [full scale, linear].
-        smear: distance by which evidence reaches beyond objects [pixels].
+        smear: distance by which evidence extends beyond objects [pixels].
     """
 
     color: Single
@@ -50,14 +50,14 @@ def empty_board(
     scale: tuple[float, float] = (1.0, 1.0),
     tints: Bytes | None = None,
 ) -> EmptyBoard | None:
-    """Predict the image of the empty board.
+    """Predicts the image of the empty board.
 
     Args:
         board: its markers must fit on it.
         image: (H, W, 3) photo without lens distortion, sRGB.
         K: (3, 3) camera matrix.
         X_SC: (4, 4) camera in the scene frame.
-        scale: size of the print against the document along x and y.
+        scale: size of the print relative to the document along x and y.
         tints: (R, C, 3) sRGB of a height map that may be printed on the paper, upper edge first;
             None without.
 
@@ -77,7 +77,7 @@ def empty_board(
     blurred_ink = cv2.GaussianBlur(ink, (0, 0), BLUR_SIGMAS_PX[2])
     # Relative to paper, before it is measured in the photo.
     pattern = compare_texture(light, blurred_ink, 0.06, cell)
-    seen = sheet & (pattern > 0.3)  # The board's texture is seen.
+    seen = sheet & (pattern > 0.3)  # pixels that show the board's texture
     levels = _light_levels(light, ink, seen, p_S)
     if levels is None:
         return None
@@ -91,11 +91,11 @@ def empty_board(
         printed if _is_tinted(light, white, printed, seen & (blurred_ink < 0.05)) else 1.0
     )
     color = (paper * (1.0 - blurred_ink[..., None] * (1.0 - black))).astype(np.float32)
-    stands = np.maximum(
+    of_object = np.maximum(
         _color_evidence(light, tint, white), _brightness_evidence(light, color, white)
     )
-    unseen = -compare_texture(light, blurred_ink, float(black.mean()), cell)
-    evidence = np.where(stands > 0.0, np.maximum(stands, unseen), unseen)
+    of_texture = -compare_texture(light, blurred_ink, float(black.mean()), cell)
+    evidence = np.where(of_object > 0.0, np.maximum(of_object, of_texture), of_texture)
     far = cv2.dilate((blurred_ink > 0.01).astype(np.uint8), np.ones((5, 5))) == 0
     noise = _paper_noise(light, seen & far)
     return EmptyBoard(
@@ -111,18 +111,16 @@ def empty_board(
 
 
 def _is_tinted(light: Single, white: Array, printed: Array, paper: Booleans) -> bool:
-    """Whether the height map's tints are in the photo: whether its tones fit them better than
-    paper.
-    """
+    """Whether the photo shows the tints of the height map: its tones fit them better than paper."""
     here = paper & (np.ptp(printed, axis=-1) > 0.1)
     if here.sum() < 30:
         return False
     seen, full, tint = light[here], white[here], printed[here]
     seen = seen / full
     tone = seen / np.maximum(seen.sum(axis=1, keepdims=True), 1e-4)
-    deviation = np.abs(tone - 1.0 / 3.0).sum(axis=1)
+    off_paper = np.abs(tone - 1.0 / 3.0).sum(axis=1)
     off_tint = np.abs(tone - tint / tint.sum(axis=1, keepdims=True)).sum(axis=1)
-    return bool(np.median(off_tint - deviation) < 0.0)
+    return bool(np.median(off_tint - off_paper) < 0.0)
 
 
 def _paper_noise(light: Single, paper: Booleans) -> float:
@@ -154,7 +152,7 @@ def _light_levels(
     basis = np.stack([np.ones_like(x), x, y, x * y, x * x, y * y], axis=-1)
     step = max(1, int(paper.sum()) // 20_000)  # Approximate number of paper pixels that are used.
     white = _upper_surface(basis, basis[paper][::step], light[paper][::step])
-    # light of ink over that of the paper around it, shadow or not
+    # ratio of the ink's light to that of the paper around it, in shadow or not
     around = cv2.blur(np.where(paper[..., None], light, np.float32(0.0)), (15, 15))
     count = cv2.blur(paper.astype(np.float32), (15, 15))
     near = inked & (count > 0.1)
@@ -179,7 +177,7 @@ def _upper_surface(basis: Array, A: Array, levels: Array) -> Array:
     w = np.zeros(6)
     for columns in (1, 3, 3, 6, 6, 6, 6):
         deviation = (mean - fit) / np.maximum(fit, 1e-3)
-        # darker by a shadow, brighter only by noise: asymmetric weights, then far ones let go
+        # Shadows darken, only noise brightens: asymmetric weights, 0 for far samples.
         weight = np.where(deviation > 0.0, quantile, 1.0 - quantile) / np.maximum(
             np.abs(deviation), 0.01
         )
@@ -223,7 +221,9 @@ def _estimate_blur(light: Single, ink: Array, board: Booleans, black: Array) -> 
 def project_print(
     board: Board, H_pixel_S: Array, size: tuple[int, int]
 ) -> tuple[Array, Array, Booleans]:
-    """(H, W) shares of ink and of white marker frames in each pixel, and pixels on the sheet."""
+    """(H, W) shares of ink and of white marker frames in each pixel, and True for pixels that are
+    entirely on the sheet.
+    """
     texels_per_metre = 4000.0  # 22 for a cell of the default markers.
     oversampling = 3  # Samples per pixel of the photo, each way.
     rows, columns = (round(s * texels_per_metre) for s in board.size[::-1])
@@ -295,17 +295,16 @@ def pixels_on_sheet(H_pixel_S: Array, size: tuple[int, int], sheet: tuple[float,
 
 
 MIN_WINDOW_SIGMA_PX = 2.0
-"""Standard deviation of the neighbourhood, at least, in pixels."""
+"""Least standard deviation of the neighbourhood, in pixels."""
 
 
 def window_sigma(cell: float) -> float:
     """Standard deviation of the neighbourhood for a cell size [pixels]."""
-    # Standard deviation of the neighbourhood, in cells.
     return max(0.8 * cell, MIN_WINDOW_SIGMA_PX)
 
 
 def compare_texture(light: Single, ink: Array, black: float, cell: float) -> Array:
-    """Compare the texture of the photo with that of the board in neighbourhoods.
+    """Compares the texture of the photo with that of the board in neighbourhoods.
 
     The covariance of their logarithms is the variance of the board's in a photo of the board in any
     light, and 0 in a photo without the pattern.
@@ -345,13 +344,12 @@ def _ramp(values: Array, limits: tuple[float, float]) -> Array:
 
 
 def _color_evidence(light: Single, tone: Single, white: Array) -> Array:
-    """(H, W) 0 where grey light on any mixture of paper, ink and tint explains the color.
+    """(H, W) 0 where grey light on any mixture of paper, ink and tint explains the colour.
 
     Args:
         light: (H, W, 3) of the photo.
         tone: (H, W, 3) reflectance of a height map's tints relative to paper.
-        white: (H, W, 3)
-            light of paper without shadow.
+        white: (H, W, 3) light of paper without shadow.
     """
     r = cv2.GaussianBlur(light, (0, 0), 0.8) / white.astype(np.float32)
     grey = np.float32(1.0 / np.sqrt(3.0))
@@ -361,19 +359,18 @@ def _color_evidence(light: Single, tone: Single, white: Array) -> Array:
     length = np.sqrt((across**2).sum(axis=-1))
     across /= np.maximum(length, 1e-6)[..., None]
     share = np.clip((r * across).sum(axis=-1), 0.0, None) * (length > 0.01)
-    # limited to the full tint
-    most = length / np.maximum(tone.sum(axis=-1) * grey, 1e-6) * along
-    share = np.minimum(share, most)
+    full_tint = length / np.maximum(tone.sum(axis=-1) * grey, 1e-6) * along
+    share = np.minimum(share, full_tint)
     residual = r - along[..., None] * grey - share[..., None] * across
     residual_length = np.sqrt((residual**2).sum(axis=-1))
-    # Unexplained part of the light. In the dark, colors are noise and stray light.
+    # Unexplained part of the light. In the dark, colours are noise and stray light.
     return _ramp(residual_length / (along + 0.06), (0.10, 0.22))
 
 
 def _brightness_evidence(light: Single, color: Single, white: Array) -> Array:
-    """(H, W) 0 where the board's color (H, W, 3) explains the brightness, with a tolerance of one
+    """(H, W) 0 where the board's colour (H, W, 3) explains the brightness, with a tolerance of one
     pixel of misalignment.
     """
-    most = cv2.dilate(color.mean(axis=-1), np.ones((3, 3)))
-    # Ratio of the photo to the board; next to a bright pixel an edge's blur is not exact
-    return _ramp(light.mean(axis=-1) / (most + 0.03 * white.mean(axis=-1)), (1.15, 1.45))
+    brightest = cv2.dilate(color.mean(axis=-1), np.ones((3, 3)))
+    # Ratio of the photo to the board; next to a bright pixel the blur of an edge is not exact.
+    return _ramp(light.mean(axis=-1) / (brightest + 0.03 * white.mean(axis=-1)), (1.15, 1.45))

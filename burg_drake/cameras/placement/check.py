@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
+from burg_drake.cameras.placement.alignment import Aligner
 from burg_drake.cameras.placement.board_background import empty_board
 from burg_drake.cameras.placement.depth_aligner import DepthAligner, check_depth
 from burg_drake.cameras.placement.document import (
@@ -53,6 +53,7 @@ from burg_drake.core import (
     Single,
     Vector3,
     content_hash,
+    wrap_to_pi,
 )
 from burg_drake.printout import height_map
 from burg_drake.scene import Scene, SceneLike, as_scene
@@ -82,13 +83,13 @@ class Undistortion:
             self._map = at[..., 0].copy(), at[..., 1].copy()
 
     def color(self, image: Bytes) -> Bytes:
-        """Undistort a color image (H, W, 3); black outside the given image."""
+        """Undistorts a colour image (H, W, 3); black outside the given image."""
         if self._map is None:
             return image
         return np.asarray(cv2.remap(image, *self._map, cv2.INTER_CUBIC))
 
     def depth(self, depth: Single) -> Single:
-        """Undistort a depth image (H, W) by nearest pixels, as depths across an edge cannot be
+        """Undistorts a depth image (H, W) by nearest pixels, as depths across an edge cannot be
         averaged; 0 outside.
         """
         if self._map is None:
@@ -102,27 +103,27 @@ def assess_placement(
     shape: TargetShape,
     found: ObjectLocation,
     camera: Array,
-    rough: float,
+    max_residual: float,
     typical: float,
 ) -> Placement:
-    """Build the document's entry of an object.
+    """Builds the document's entry of an object.
 
     Args:
-        scene: the targets.
+        scene: scene with the objects' targets.
         name: of the instance.
         shape: of the object.
-        found: its location.
+        found: location of the object.
         camera: (6, 6) covariance of the camera's pose, NaN if unknown.
-        rough: residual of the alignment above which it is of another object.
-        typical: likeness of the scene's objects in the photo, see `typical_likeness`.
+        max_residual: largest residual of a correct alignment.
+        typical: colour similarity that is usual in the photo, see `typical_color_similarity`.
     """
     missing = _missing_reason(found)
     if missing or found.alignment is None:
         return unseen_placement(scene, name, missing, found.seen)
     alignment = found.alignment
-    q, spread = alignment.q, alignment.spread(camera)
-    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    reason = _doubt_reason(shape, found, deviation, rough, typical)
+    q = alignment.q
+    deviation = np.sqrt(np.maximum(np.diag(alignment.total_covariance(camera)), 0.0))
+    reason = _doubt_reason(shape, found, deviation, max_residual, typical)
     status: PlacementStatus = "uncertain" if reason else "measured"
     residual = alignment.residual
     return Placement(
@@ -134,23 +135,23 @@ def assess_placement(
         reference=cast(Vector3, tuple(np.round(shape.p_OR, 9).tolist())),
         displacement=(float(q[0]), float(q[1])),
         displacement_sd=(float(deviation[0]), float(deviation[1])),
-        angle=None if shape.symmetric else wrap_to_pi(q[2]),
+        angle=None if shape.symmetric else float(wrap_to_pi(q[2])),
         angle_sd=None if shape.symmetric else float(deviation[2]),
         seen=round(found.seen, 4),
         residual=float(residual) if np.isfinite(residual) else None,
     )
 
 
-def typical_likeness(located: Iterable[ObjectLocation]) -> float:
-    """Median likeness of the objects that were found; 0 for fewer than three."""
-    color_similarity = [
+def typical_color_similarity(located: Iterable[ObjectLocation]) -> float:
+    """Median colour similarity of the objects that were found; 0 for fewer than three."""
+    similarities = [
         f.color_similarity for f in located if f.alignment is not None and f.seen > MIN_VISIBILITY
     ]
-    return float(np.median(color_similarity)) if len(color_similarity) > 2 else 0.0
+    return float(np.median(similarities)) if len(similarities) > 2 else 0.0
 
 
 def unseen_placement(scene: Scene, name: str, reason: str, seen: float = 0.0) -> Placement:
-    """Build the document's entry of an object that was not measured."""
+    """Builds the document's entry of an object that was not measured."""
     instance = scene.instance(name)
     return Placement(
         object=instance.object,
@@ -173,7 +174,7 @@ def _missing_reason(found: ObjectLocation) -> str:
 
 
 def _doubt_reason(
-    shape: TargetShape, found: ObjectLocation, deviation: Array, rough: float, typical: float
+    shape: TargetShape, found: ObjectLocation, deviation: Array, max_residual: float, typical: float
 ) -> str:
     """Reasons to doubt a measurement; empty if there are none."""
     alignment = found.alignment
@@ -189,11 +190,11 @@ def _doubt_reason(
             "the board is visible where the object should cover it: is it another object, or in"
             " another pose?"
         )
-    if alignment.residual > rough:
+    if alignment.residual > max_residual:
         return (
             "its outline does not quite match the image: is it another object, or in another pose?"
         )
-    # Mesh colors are reliable if most objects of the scene match theirs.
+    # Mesh colours are reliable if most objects of the scene match theirs.
     if shape.colors is not None and found.color_similarity < 0.4 * typical and typical > 0.6:
         return "it does not have the colors of its mesh: is it another object?"
     if found.spill > 0.35:  # Fraction around the silhouette with evidence of something else.
@@ -233,20 +234,21 @@ def check_placement(
             print(name, placed.status, placed.displacement)
 
     Args:
-        scene: the targets.
+        scene: scene with the objects' targets.
         image: (H, W, 3) RGB photo of the scene on its board.
         intrinsics: of the camera.
         depth: (H, W) distances along the optical axis [m] of the same camera, 0 or NaN where there
             is none. Objects are then aligned with these, and the photo only serves to find the
             board.
-        estimate: where the camera is; from the photo's markers if None.
-        scale: size of the printed board against the document along x and y, if it was measured; as
-            in `BoardPose`, whose estimate has to be of the same.
-        image_source, depth_source: what the document calls the images; their pixels' hash if None.
+        estimate: pose of the camera; estimated from the photo's markers if None.
+        scale: size of the print relative to the document along x and y, if measured; an `estimate`
+            must be of a `BoardPose` with the same scale.
+        image_source, depth_source: entries of the images in the document; hashes of the images'
+            pixels if None.
 
     Raises:
-        InvalidInputError: an image of another size than the intrinsics', or not an image; depth
-            that is not in metres; markers that do not fit on the board.
+        InvalidInputError: the photo is no image, or has another size than the intrinsics; the depth
+            is not in metres; or the markers do not fit on the board.
     """
     scene = as_scene(scene)
     scene.require_markers()
@@ -288,7 +290,7 @@ def _measure_objects(
         return {name: unseen_placement(scene, name, aligner) for name in names}, (), aligner
     shapes = target_shapes(scene)
     located = locate_objects(aligner, shapes)
-    typical = typical_likeness(located.values())
+    typical = typical_color_similarity(located.values())
     placements = {
         name: assess_placement(
             scene, name, shapes[name], found, estimate.covariance, aligner.max_residual, typical
@@ -296,23 +298,23 @@ def _measure_objects(
         for name, found in located.items()
     }
     doubtful = [name for name, placed in placements.items() if placed.status != "measured"]
-    stands, empty = find_exchanged_objects(aligner, shapes, located, doubtful)
-    elsewhere = {name: place for place, (name, _) in stands.items()}
+    occupants, empty = find_exchanged_objects(aligner, shapes, located, doubtful)
+    place_of = {name: place for place, (name, _) in occupants.items()}
     placed = [
         (shapes[name], found.alignment.q)
         for name, found in located.items()
-        if found.alignment is not None and name not in stands and name not in elsewhere
+        if found.alignment is not None and name not in occupants and name not in place_of
     ]
-    placed += [where for _, where in stands.values()]
+    placed += [occupant for _, occupant in occupants.values()]
     extra = find_extra_objects(aligner, placed, [shapes[name].p_SR for name in empty])
-    for name in {*stands, *elsewhere}:
-        instead, place = stands[name][0] if name in stands else "", elsewhere.get(name, "")
-        if instead and place:
-            reason = f"{instead} stands in its place, and {name} where {place} belongs"
+    for name in {*occupants, *place_of}:
+        occupant, place = occupants[name][0] if name in occupants else "", place_of.get(name, "")
+        if occupant and place:
+            reason = f"{occupant} stands in its place, and {name} where {place} belongs"
+        elif occupant:
+            reason = f"{occupant} stands in its place"
         else:
-            reason = (
-                f"{instead} stands in its place" if instead else f"it stands where {place} belongs"
-            )
+            reason = f"it stands where {place} belongs"
         placements[name] = unseen_placement(scene, name, reason, located[name].seen)
     return placements, extra, ""
 

@@ -16,7 +16,9 @@ from burg_drake.cameras.placement.alignment import (
     Alignment,
     DisplacementFit,
     fit_displacement,
+    limit_step,
     outline_sectors,
+    step_units,
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import (
@@ -27,17 +29,25 @@ from burg_drake.cameras.placement.pinhole_view import (
     visible_outline,
     window_slices,
 )
-from burg_drake.core import Array, Booleans, InvalidInputError, Single, inverse, transform_points
+from burg_drake.core import (
+    Array,
+    Booleans,
+    InvalidInputError,
+    Single,
+    inverse,
+    robust_sd,
+    transform_points,
+)
 
 MIN_HEIGHT_SIGMAS = 4.0
 """Noise standard deviations above the board at which an object is present."""
 
 
 def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> Single:
-    """(H, W) float32 in metres, 0 where there is nothing.
+    """Depth image (H, W) as float32 in metres, 0 where nothing was measured.
 
     Raises:
-        InvalidInputError: another size than the intrinsics', or another unit.
+        InvalidInputError: the size is not that of the intrinsics, or the unit is not metres.
     """
     depth = np.asarray(depth)
     if depth.ndim != 2 or depth.dtype.kind not in "fui":
@@ -49,10 +59,10 @@ def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> Single:
     clean = np.where(np.isfinite(depth) & (depth > 0), depth, 0).astype(np.float32)
     if not clean.any():
         raise InvalidInputError("the depth image is empty: no pixel has a depth above 0")
-    middle = float(np.median(clean[clean > 0]))
-    if middle > 20.0:  # Metres. Larger medians mean that the unit is wrong.
+    median = float(np.median(clean[clean > 0]))
+    if median > 20.0:  # Metres. Larger medians mean that the unit is wrong.
         raise InvalidInputError(
-            f"the median of the depth image is {middle:g} m; give metres (is it in millimetres?)"
+            f"the median of the depth image is {median:g} m; give metres (is it in millimetres?)"
         )
     return clean
 
@@ -61,8 +71,8 @@ class DepthAligner:
     """Aligns objects with one depth image.
 
     Args:
-        view: its camera.
-        depth: (H, W) without lens distortion [m]; 0 where there is nothing.
+        view: camera of the image.
+        depth: (H, W) image without lens distortion [m]; 0 where nothing was measured.
 
     Attributes:
         noise_sd: standard deviation of the heights of the board's surface [m].
@@ -82,7 +92,7 @@ class DepthAligner:
         self._valid = self._depth > 0.0
         height = self._p_SQ[..., 2]
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
-        spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * min_noise
+        spread = robust_sd(low) if len(low) > 100 else 2.0 * min_noise
         self.noise_sd = max(spread, min_noise)
         # Metres. Fits of the right object leave less.
         self.residual_floor, self.max_residual = self.noise_sd, 0.005
@@ -104,7 +114,7 @@ class DepthAligner:
             solved = found.solve(turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.05:
                 return None
-            q = q + np.clip(solved.step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
+            q = q + limit_step(solved.step)
             best = found, solved
             # Metres. Smaller steps end the rounds.
             if limit == max_distances[-1] and np.abs(solved.step[:2]).max() < 2e-5:
@@ -113,7 +123,7 @@ class DepthAligner:
         return best[0].result(q, best[1])
 
     def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """0, as depth has no colors."""
+        """0, as depth has no colours."""
         return 0.0
 
     def mismatch(
@@ -136,8 +146,8 @@ class DepthAligner:
         return float(wrong.sum()), float(covered.sum())
 
     def points(self, shape: TargetShape, q: Array, others: Array) -> tuple[Array, Booleans]:
-        """Points (N, 3) in S near a displaced object and of no other object, and (N,) whether its
-        silhouette covers them.
+        """Measured points (N, 3) in S near a displaced object that belong to no other object, and
+        (N,) whether the object's silhouette covers them.
         """
         window = self.view.window(shape, q, 12.0)
         part = window_slices(window)
@@ -148,18 +158,11 @@ class DepthAligner:
         step = max(1, len(p_SQ) // 4000)  # Approximate number of points that are used.
         return p_SQ[::step], inside[::step]
 
-    def expected(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """Share of visible pixels in a displaced object's silhouette that are above the board."""
-        window = self.view.window(shape, q, 1.0)
-        part = window_slices(window)
-        mask = (self.view.buffer(shape, q, window) < others[part]) & self._valid[part]
-        return float(self._above_board[part][mask].mean()) if mask.any() else 0.0
-
     def edges(self, contour: ImageContour, others: Array) -> tuple[Array, Booleans]:
-        """(N,) distance along the outline's normals to the depth edge [pixels], and whether there
-        is one.
+        """(N,) distance along the outline's normals to the depth edge [pixels], and (N,) whether
+        there is one.
 
-        Only steps from the outline's own depth to clearly larger depth count.
+        A depth edge is a step from the outline's own depth to clearly larger depth.
         """
         min_depth_step = 0.012  # Metres from an outline to the surface behind it.
         search_distance = 6.0  # Pixels on both sides of the outline.
@@ -204,9 +207,9 @@ class _DepthMeasurements:
         self._offset = np.einsum("ni,ni->n", n, p - on_surface)
         arm = on_surface - shape.p_SR - (q[0], q[1], 0.0)
         turn = arm[:, 0] * n[:, 1] - arm[:, 1] * n[:, 0]
-        self._along = np.column_stack([n[:, 0], n[:, 1], turn])
+        self._jacobian = np.column_stack([n[:, 0], n[:, 1], turn])
         ray = p - aligner.view.X_SC[:3, 3]
-        self._camera = np.concatenate([np.cross(ray, n), n], axis=1)
+        self._camera_jacobian = np.concatenate([np.cross(ray, n), n], axis=1)
         ray = ray / np.maximum(np.linalg.norm(ray, axis=1), 1e-9)[:, None]
         slant = np.abs(np.einsum("ni,ni->n", n, ray))
         # Metres. Error of a surface point besides noise.
@@ -219,39 +222,45 @@ class _DepthMeasurements:
     def _add_outline(
         self, aligner: DepthAligner, shape: TargetShape, q: Array, others: Array
     ) -> None:
-        """Append measurements of the outline, in metres at the object."""
+        """Appends measurements of the outline, in metres at the object."""
         contour = visible_outline(aligner.view, shape, q, others)
         offset, falls = aligner.edges(contour, others)
         p_CQ, _ = aligner.view.project(contour.p_SQ[falls])
         pixel = p_CQ[:, 2] / aligner.view.K[0, 0]
         self._surface_points = len(self._offset)
         self._offset = np.concatenate([self._offset, offset[falls] * pixel])
-        self._along = np.concatenate([self._along, contour.along[falls] * pixel[:, None]])
-        self._camera = np.concatenate([self._camera, -contour.camera[falls] * pixel[:, None]])
+        self._jacobian = np.concatenate(
+            [self._jacobian, contour.displacement_jacobian[falls] * pixel[:, None]]
+        )
+        self._camera_jacobian = np.concatenate(
+            [self._camera_jacobian, -contour.camera_jacobian[falls] * pixel[:, None]]
+        )
         # Pixels. Quantization (0.29) and smeared edges.
         self._deviation = np.concatenate([self._deviation, 0.6 * pixel])
         self._groups = np.concatenate([self._groups, 100_000 + outline_sectors(contour)[falls]])
 
     def solve(self, turn: bool) -> DisplacementFit | None:
-        """Fit the step to the measurements."""
+        """Fits the step to the measurements."""
         if len(self._offset) < 30:
             return None
-        reach = float(np.linalg.norm(np.ptp(self._shape.p_SV[:, :2], axis=0))) / 2
-        unit = np.array([1e-3, 1e-3, 1e-3 / reach])
-        symmetric = self._shape.symmetric or not turn
         return fit_displacement(
-            self._along, self._offset, self._deviation, self._groups, symmetric, unit
+            self._jacobian,
+            self._offset,
+            self._deviation,
+            self._groups,
+            self._shape.symmetric or not turn,
+            step_units(self._shape),
         )
 
     def result(self, q: Array, solved: DisplacementFit) -> Alignment:
-        """Build the alignment, with the last step applied."""
-        residual = (self._offset - self._along @ solved.step)[: self._surface_points]
+        """Builds the alignment, with the last step applied."""
+        residual = (self._offset - self._jacobian @ solved.step)[: self._surface_points]
         fits = np.abs(residual) < 4.0 * self._noise + 2e-3
         share = self._fits / max(self._count, 1) * (fits.mean() if len(fits) else 0.0)
         return Alignment(
             q,
             solved.covariance,
-            solved.sensitivity @ self._camera,
+            solved.sensitivity @ self._camera_jacobian,
             float(share),
             float(share),
             float(np.sqrt(np.mean(residual[fits] ** 2))) if fits.any() else float("nan"),

@@ -25,6 +25,7 @@ from burg_drake.core import (
     rot_z,
     save_document,
     software_versions,
+    wrap_to_pi,
 )
 
 PlacementStatus = Literal["measured", "uncertain", "not_seen"]
@@ -215,7 +216,7 @@ def camera_versions() -> dict[str, str]:
 
 
 def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
-    """Combine checks of several photos of the same objects at the same places.
+    """Combines checks of several photos of the same objects at the same places.
 
     An object's displacement is the mean over the photos that measured it, weighted by variance per
     coordinate. It is `uncertain` if photos contradict each other or one shows the object's absence.
@@ -279,7 +280,7 @@ def _mean_placement(placements: list[Placement]) -> Placement:
     reason = f"the photos disagree by {1e3 * deviation[:, :2].max():.1f} mm" if contradicts else ""
     if contradicts and turned:
         reason += f" and {np.rad2deg(deviation[:, 2].max()):.1f} deg"
-    angle = float((mean[2] + np.pi) % (2.0 * np.pi) - np.pi)
+    angle = float(wrap_to_pi(mean[2]))
     return replace(
         best,
         status="uncertain" if contradicts else "measured",

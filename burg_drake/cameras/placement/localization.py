@@ -11,7 +11,6 @@ from burg_drake.cameras.placement.alignment import (
     Aligner,
     Alignment,
     are_different_places,
-    wrap_to_pi,
 )
 from burg_drake.cameras.placement.object_search import (
     SilhouetteSearch,
@@ -20,7 +19,7 @@ from burg_drake.cameras.placement.object_search import (
 )
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
-from burg_drake.core import Array
+from burg_drake.core import Array, wrap_to_pi
 
 LARGE_TURN = np.deg2rad(40.0)
 """Radians from the target's angle; beyond, an object must fit better, not just as well."""
@@ -33,14 +32,14 @@ class ObjectLocation:
     """The location of one object.
 
     Attributes:
-        alignment: where it is; None if nothing was found.
-        in_image: share of its silhouette that is in the image.
-        seen: share that is in the image and not hidden by other objects; at the target if the
-            object was not found.
+        alignment: alignment of the object; None if it was not found.
+        in_image: share of the object's silhouette that is in the image; of the silhouette at the
+            target if the object was not found.
+        seen: share of that silhouette that is in the image and not hidden by other objects.
         support: mean evidence in the silhouette, where there is any, in [-1, 1].
-        spill: share of the evidence around the silhouette that shows something else than known
-            objects.
-        likeness: color similarity of photo and mesh, from 0 to 1; 0.5 if either has no colors.
+        spill: share of the evidence around the silhouette that shows unknown objects.
+        color_similarity: colour similarity of image and mesh, 0 to 1; 0.5 if either has no
+            colours.
     """
 
     alignment: Alignment | None
@@ -52,7 +51,7 @@ class ObjectLocation:
 
 
 def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str, ObjectLocation]:
-    """Find and align the objects of a scene.
+    """Finds and aligns the objects of a scene.
 
     Args:
         aligner: of the image.
@@ -75,7 +74,7 @@ def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str
             if name not in aligned:
                 aligned[name], q[name] = alignment, start
     _align_objects(aligner, shapes, q, aligned, list(q), far=False)
-    return {name: _build_located(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
+    return {name: _build_location(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
 
 
 def _align_objects(
@@ -87,7 +86,7 @@ def _align_objects(
     *,
     far: bool,
 ) -> None:
-    """Align objects from their candidates or current places; leave out failures."""
+    """Aligns objects from their candidates or current places; leaves out failures."""
     for name in names:
         others = _depth_of_others(aligner.view, shapes, q, name)
         starts = q[name] if far else _nudged_starts(shapes[name], aligned[name])
@@ -102,10 +101,9 @@ def _align_objects(
 
 
 def _nudged_starts(shape: TargetShape, found: Alignment) -> list[Array]:
-    """Starts of the last alignment: the current one, and small turns from it if not all of the
-    outline fits, as outlines may lock on wrong edges.
+    """Starts of the last alignment: the current place, and small turns from it unless nearly all
+    of the outline fits, as an outline may lock onto wrong edges.
     """
-    # With less, the alignment may have caught on a wrong edge.
     if shape.symmetric or found.agreement > 0.93:
         return [found.q]
     return [found.q + np.array([0.0, 0.0, turn]) for turn in np.deg2rad((0.0, 4.0, -4.0))]
@@ -121,7 +119,9 @@ def _depth_of_others(
 def best_alignment(
     aligner: Aligner, shape: TargetShape, starts: list[Array], others: Array, far: bool
 ) -> Alignment | None:
-    """The alignment that agrees best with the image; among equals, near the target's angle."""
+    """The alignment with the best rating; a place far from the target's angle needs a rating that
+    is higher by `Aligner.required_gain`.
+    """
     rated: list[tuple[float, Alignment]] = []
     for start in starts:
         found = aligner.align(shape, start, others, far=far)
@@ -149,8 +149,8 @@ def best_alignment(
 
 
 def _least_turned(shape: TargetShape, q: Array) -> Array:
-    """Among displacements that look the same, as a box after half a turn, the one nearest to the
-    target's angle.
+    """Of the displacements at which the object looks the same, as a box does after half a turn,
+    the one nearest to the target's angle.
     """
     alike = [q]
     for quarter in (1, 2, 3) if abs(wrap_to_pi(q[2])) > LARGE_TURN else ():
@@ -173,7 +173,7 @@ def _depth_disagreement(aligner: Aligner, shape: TargetShape, q: Array, others: 
     return min(wrong / max(area, 1.0), 1.0)
 
 
-def _build_located(
+def _build_location(
     aligner: Aligner,
     shapes: dict[str, TargetShape],
     q: dict[str, list[Array]],
@@ -223,48 +223,45 @@ def add_rotation_ambiguity(
     if shape.symmetric:
         return found
     window = _turning_window(aligner.view, shape, found.q)
-    least, area = aligner.mismatch(shape, found.q, others, window)
-    # Disagreement that still fits as well; 12 pixels of an image 640 wide.
+    mismatch, area = aligner.mismatch(shape, found.q, others, window)
+    # Raster pixels. Increase of the mismatch up to which another angle fits as well.
     tolerance = 0.01 * area + 12.0 * (aligner.view.size[0] / 640) ** 2 * window.scale**2
     evidence = np.where(np.isfinite(others), 0.0, aligner.evidence)
     search = SilhouetteSearch(aligner.view, shape, evidence)
     fitting = []
     for turn in AMBIGUITY_TEST_ANGLES:
         q = search.best_displacement(found.q + np.array([0.0, 0.0, turn]), TURNING_SHIFT)
-        more = aligner.mismatch(shape, q, others, window)[0] - least
-        if more > 2.0 * tolerance:  # Multiple of the tolerance before the exact place is known.
+        increase = aligner.mismatch(shape, q, others, window)[0] - mismatch
+        if increase > 2.0 * tolerance:  # Twice the tolerance, as the place is not exact yet.
             continue
         exact = aligner.align(shape, q, others, far=False, turn=False)
         if exact is None:
             continue
-        more = aligner.mismatch(shape, exact.q, others, window)[0] - least
-        worse = max(more, 0.0) / tolerance + _fit_loss(found, exact, aligner.residual_floor)
+        increase = aligner.mismatch(shape, exact.q, others, window)[0] - mismatch
+        worse = max(increase, 0.0) / tolerance + _fit_loss(found, exact, aligner.residual_floor)
         if worse < 1.0 and not shape.looks_alike(found.q, exact.q):
             fitting.append(exact.q - found.q)
     if not fitting:
         return found
-    off = np.array(fitting)
-    spread = off.T @ off / (len(off) + 1)
-    return replace(found, covariance=found.covariance + spread, equivalent_turns=tuple(off[:, 2]))
+    steps = np.array(fitting)
+    covariance = found.covariance + steps.T @ steps / (len(steps) + 1)
+    return replace(found, covariance=covariance, equivalent_turns=tuple(steps[:, 2]))
 
 
-def _fit_loss(found: Alignment, other: Alignment, fine: float) -> float:
-    """How much worse another alignment fits the image; 1 is significant."""
+def _fit_loss(found: Alignment, other: Alignment, residual_floor: float) -> float:
+    """Loss of fit from one alignment to another; 1 is significant."""
     missing = max(found.coverage - other.coverage, found.agreement - other.agreement, 0.0)
-    rougher = other.residual / max(found.residual, fine) - 1.0
+    rougher = other.residual / max(found.residual, residual_floor) - 1.0
     # A loss of agreement of 0.1, or residuals larger by half, tell two angles apart.
     return missing / 0.1 + max(rougher, 0.0) / 0.5
 
 
 def _turning_window(view: PinholeView, shape: TargetShape, q: Array) -> ImageWindow:
-    """An image window of all that the object may cover while it is turned."""
+    """Window of the image area that an object may cover while it is turned."""
     distance = np.linalg.norm(shape.p_SV[:, :2] - shape.p_SR[:2], axis=1)
     reach = float(distance.max()) + TURNING_SHIFT / 2
     top = float(shape.p_SV[:, 2].max())
     corner = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
     box = shape.p_SR + (q[0], q[1], 0.0) + corner * (reach, reach, top)
     _, pixels = view.project(box)
-    window = view.window_of(pixels, 1.0)
-    # Pixels around the object that are compared, about.
-    pitch = max(1.0, float(np.sqrt(window.width * window.height / 2500)))
-    return replace(window, scale=1.0 / pitch)
+    return view.window_of(pixels, 1.0).with_raster(2500)

@@ -34,18 +34,18 @@ def find_exchanged_objects(
     located: dict[str, ObjectLocation],
     doubtful: list[str],
 ) -> tuple[dict[str, tuple[str, Placed]], set[str]]:
-    """Find objects that stand in other objects' places.
+    """Finds objects that stand in other objects' places.
 
     Args:
         aligner: of the image.
         shapes: the objects by name.
-        located: what was found.
+        located: locations of the objects by name.
         doubtful: names of the objects that were not found reliably; only they are tested.
 
     Returns:
         By the name of the place: name of the object that stands there, its shape with the place as
-        target, and its displacement from it. And the names of places that are without their own
-        objects, but may hold other objects of the scene that were not found.
+        target, and its displacement from that target. And the names of places that are without
+        their own objects, but may hold other objects of the scene that were not found.
     """
     reliable = {
         name: (shapes[name], found.alignment.q)
@@ -67,23 +67,23 @@ def find_exchanged_objects(
             starts = promising_places(find_candidates(aligner.view, shape, evidence))
             found = best_alignment(aligner, shape, starts, others, far=True)
             fit = _score_fit(aligner, shape, found, others)
-            # Over the object that belongs there; the score is 3 at most.
-            clear = fit.total > max(own[place].total, own[name].total) + 0.5
+            # Lead over the object that belongs there; the score is 3 at most.
+            is_clear = fit.total > max(own[place].total, own[name].total) + 0.5
             # Fraction of the outline that is visible and agrees.
-            if found is not None and fit.good and fit.shown > 0.4 and clear:
+            if found is not None and fit.good and fit.shown > 0.4 and is_clear:
                 rated.append((fit.total, place, name, (shape, found.q)))
-    stands: dict[str, tuple[str, Placed]] = {}
+    occupants: dict[str, tuple[str, Placed]] = {}
     for _, place, name, placed in sorted(rated, key=lambda r: -r[0]):
-        if place not in stands and name not in {other for other, _ in stands.values()}:
-            stands[place] = name, placed
-    elsewhere = {name for name, _ in stands.values()}
+        if place not in occupants and name not in {other for other, _ in occupants.values()}:
+            occupants[place] = name, placed
+    elsewhere = {name for name, _ in occupants.values()}
     missing = {name for name in doubtful if not own[name].good} - elsewhere
-    empty = {place for place in missing | elsewhere if place not in stands and missing - {place}}
-    return stands, empty
+    empty = {place for place in missing | elsewhere if place not in occupants and missing - {place}}
+    return occupants, empty
 
 
 def shape_at_place(shape: TargetShape, place: TargetShape) -> TargetShape:
-    """Move an object's target to the reference point of another object's target."""
+    """Moves an object's target to the reference point of another object's target."""
     X_SO = shape.X_SO.copy()
     X_SO[:2, 3] += (place.p_SR - shape.p_SR)[:2]
     return replace(shape, X_SO=X_SO)
@@ -94,9 +94,9 @@ class _FitScore:
     """How well an object fits where it was aligned.
 
     Attributes:
-        total: agreement, evidence and likeness together.
-        good: each of them is high enough.
-        shown: share of its outline that is visible and agrees.
+        total: sum of agreement, support and colour similarity.
+        good: whether each of the three is high enough.
+        shown: share of the object's outline that is visible and agrees.
     """
 
     total: float = 0.0
@@ -109,14 +109,14 @@ def _score_fit(
 ) -> _FitScore:
     if found is None:
         return _FitScore()
-    filled, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
-    likeness = aligner.color_similarity(shape, found.q, others)
-    # Likeness of colours, where they are known.
-    colored = likeness > 0.4 or not aligner.sees_colors or shape.colors is None
+    support, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
+    similarity = aligner.color_similarity(shape, found.q, others)
+    # Colours are compared where they are known.
+    colors_match = similarity > 0.4 or not aligner.sees_colors or shape.colors is None
     _, seen = aligner.view.seen(shape, found.q, others)
     return _FitScore(
-        float(np.clip(found.agreement, 0.0, 1.0)) + filled + likeness,
-        found.agreement >= 0.7 and filled >= 0.6 and colored,
+        float(np.clip(found.agreement, 0.0, 1.0)) + support + similarity,
+        found.agreement >= 0.7 and support >= 0.6 and colors_match,
         found.coverage * seen,
     )
 
@@ -124,31 +124,32 @@ def _score_fit(
 def find_extra_objects(
     aligner: Aligner, placed: Iterable[Placed], p_SR: Sequence[Array] = ()
 ) -> tuple[ExtraObject, ...]:
-    """Find objects outside the scene by unexplained evidence, the largest first.
+    """Finds objects outside the scene by unexplained evidence, the largest first.
 
     Args:
         aligner: of the image.
         placed: all objects that were found, with their displacements.
-        p_SR: (3,) places where an object of the scene that was not found may stand. Evidence there
-            is ignored.
+        p_SR: (3,) reference points of places where an object of the scene that was not found may
+            stand. Evidence there is ignored.
     """
     view, placed = aligner.view, list(placed)
     # Pixels per metre of the board, in the middle of the image.
     pitch = float(_pixel_area(view, _points_on_board(view, np.array([view.size]) / 2.0))[0] ** -0.5)
-    stands = aligner.evidence > MIN_EXTRA_EVIDENCE
+    unexplained = aligner.evidence > MIN_EXTRA_EVIDENCE
     for shape, q in placed:
         window = view.window(shape, q, KNOWN_MARGIN * pitch + 2.0)
         mask = np.isfinite(view.buffer(shape, q, window)).astype(np.uint8)
         size = 2 * round(KNOWN_MARGIN * pitch) + 1
-        stands[window_slices(window)] &= cv2.dilate(mask, np.ones((size, size), np.uint8)) == 0
+        unexplained[window_slices(window)] &= cv2.dilate(mask, np.ones((size, size), np.uint8)) == 0
     size = max(2 * round(MIN_EXTRA_WIDTH * pitch / 2) + 1, 3)
     disk = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    stands = cv2.morphologyEx(stands.astype(np.uint8), cv2.MORPH_OPEN, disk)
+    unexplained = cv2.morphologyEx(unexplained.astype(np.uint8), cv2.MORPH_OPEN, disk)
     size = 2 * round(0.02 * pitch / 2) + 1  # Metres within which regions belong to one object.
-    count, labels = cv2.connectedComponents(cv2.dilate(stands, np.ones((size, size), np.uint8)))
+    grown = cv2.dilate(unexplained, np.ones((size, size), np.uint8))
+    count, labels = cv2.connectedComponents(grown)
     hidden = _HiddenBoard(aligner, placed)
-    found = [_describe_region(view, (labels == k) & (stands > 0), hidden) for k in range(1, count)]
-    # Square metres covered on the board.
+    labels *= unexplained
+    found = [_describe_region(view, labels == k, hidden) for k in range(1, count)]
     large = []
     for area, extra in found:
         reach = SEARCH_RANGE + extra.width / 2.0
@@ -163,23 +164,22 @@ class _HiddenBoard:
 
     def __init__(self, aligner: Aligner, placed: list[Placed]) -> None:
         self._view = aligner.view
-        stands = aligner.evidence > MIN_EXTRA_EVIDENCE
-        self._covered = np.isfinite(self._view.depth(placed)) | stands
+        shows_object = aligner.evidence > MIN_EXTRA_EVIDENCE
+        self._covered = np.isfinite(self._view.depth(placed)) | shows_object
         corners = (transform_points(s.displacement(q), s.p_SV)[:, :2] for s, q in placed)
         self._contact_areas = [cv2.convexHull(p.astype(np.float32)) for p in corners]
 
     def extent(self, start: Array, toward: Array) -> float:
         """Length of the hidden and unoccupied board from a point (2,) in a direction (2,) [m]."""
-        # Metres of the board behind an object that are searched.
         step = KNOWN_MARGIN / 2
-        distances = np.arange(KNOWN_MARGIN, 0.15, step)  # Metres
+        distances = np.arange(KNOWN_MARGIN, 0.15, step)  # Metres.
         p_S = start + distances[:, None] * toward
         _, pixels = self._view.project(np.column_stack([p_S, np.zeros(len(p_S))]))
         hidden = sample_nearest(self._covered, pixels, False).astype(bool)
-        on_foot = [
+        in_contact = [
             any(cv2.pointPolygonTest(f, p, False) >= 0 for f in self._contact_areas) for p in p_S
         ]
-        return step * int(np.argmin(np.append(hidden & ~np.array(on_foot), False)))
+        return step * int(np.argmin(np.append(hidden & ~np.array(in_contact), False)))
 
 
 def _describe_region(
@@ -187,8 +187,9 @@ def _describe_region(
 ) -> tuple[float, ExtraObject]:
     """Area of the board behind an image region [m²], and the extra object there.
 
-    An extra object stands at the near end of the board's area that it hides, and is as deep as
-    wide. If a known object hides the near end, it is in the middle of its possible places.
+    The extra object is assumed to stand at the near end of the area that it hides, and to be as
+    deep as wide. If a known object hides the near end, it is put in the middle of the possible
+    places.
     """
     row, column = np.nonzero(mask)
     p_S = _points_on_board(view, np.stack([column, row], axis=-1).astype(float))
@@ -200,7 +201,7 @@ def _describe_region(
     nearest_depth = float(np.quantile(depths, 0.02))
     if nearest_depth < MIN_EXTRA_WIDTH:  # the camera looks straight down on it
         return area, _build_extra_object(p_S.mean(axis=0), 2.0 * float(np.sqrt(area / np.pi)))
-    # seen from above the camera's foot, the hidden board widens like a shadow
+    # The hidden area widens away from the point below the camera, like a shadow.
     left, right = np.quantile(side / np.maximum(depths, 1e-3), [0.02, 0.98]).tolist()
     widening = forward + (left + right) / 2 * across
     nearest_depth -= hidden.extent(view.X_SC[:2, 3] + nearest_depth * widening, -forward) / 2.0
@@ -215,7 +216,7 @@ def _build_extra_object(position: Array, width: float) -> ExtraObject:
 
 
 def _points_on_board(view: PinholeView, pixels: Array) -> Array:
-    """(N, 2) points of the board that image points (N, 2) show."""
+    """(N, 2) points of the board at image points (N, 2)."""
     H_pixel_S = view.K @ view.X_CS[:3][:, [0, 1, 3]]
     p = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(H_pixel_S).T
     return np.asarray(p[:, :2] / p[:, 2:])

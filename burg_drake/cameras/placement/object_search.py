@@ -1,4 +1,4 @@
-"""Search for objects: where their silhouettes cover evidence that the board does not explain."""
+"""Search for places where silhouettes of objects cover evidence that the board does not explain."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement.alignment import Aligner, wrap_to_pi
+from burg_drake.cameras.placement.alignment import Aligner
 from burg_drake.cameras.placement.object_shape import TargetShape
 from burg_drake.cameras.placement.pinhole_view import ImageWindow, PinholeView, window_slices
-from burg_drake.core import Array
+from burg_drake.core import Array, wrap_to_pi
 
 SEARCH_RANGE = 0.05
 """Metres from its target within which an object is searched."""
@@ -26,7 +26,7 @@ DISTANCE_PENALTY = 0.03
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """Where an object may be.
+    """A candidate place of an object.
 
     Attributes:
         q: (3,) displacement, see `TargetShape.displacement`.
@@ -38,7 +38,7 @@ class SearchResult:
 
 
 def find_places(view: PinholeView, shape: TargetShape, evidence: Array) -> list[SearchResult]:
-    """Find candidate places of an object: those near the target's angle first, then the others,
+    """Finds candidate places of an object: those near the target's angle first, then the others,
     each best first.
 
     Args:
@@ -49,11 +49,11 @@ def find_places(view: PinholeView, shape: TargetShape, evidence: Array) -> list[
     search = SilhouetteSearch(view, shape, evidence)
     if shape.symmetric:
         return [search.best_translation(0.0, search.best_translation(0.0).q)]
-    return search.best(NEAR_SEARCH_ANGLES) + search.best(FAR_SEARCH_ANGLES)
+    return search.search_angles(NEAR_SEARCH_ANGLES) + search.search_angles(FAR_SEARCH_ANGLES)
 
 
 class SilhouetteSearch:
-    """Search of one shape in the evidence, at a coarse scale."""
+    """Searches one shape in the evidence, at a coarse scale."""
 
     def __init__(self, view: PinholeView, shape: TargetShape, evidence: Array) -> None:
         self._view, self._shape = view, shape
@@ -63,12 +63,11 @@ class SilhouetteSearch:
         top = float(shape.p_SV[:, 2].max())
         self._center = shape.p_SR + np.array([0.0, 0.0, top / 2])
 
-    def best(self, turns: Array) -> list[SearchResult]:
+    def search_angles(self, turns: Array) -> list[SearchResult]:
         """The best places at given angles, refined around the best ones."""
         rough = sorted(
             (self.best_translation(float(turn)) for turn in turns), key=lambda f: -f.score
         )
-        # Best angles that are refined.
         found = [self.best_translation(f.q[2], f.q) for f in rough[:5]]
         found.sort(key=lambda f: -f.score)
         found += [
@@ -76,25 +75,24 @@ class SilhouetteSearch:
             for f in found[:2]
             for side in (-1, 1)
         ]
-        # For near and for far angles each.
         return _drop_duplicates(sorted(found, key=lambda f: -f.score))[:3]
 
     def best_translation(self, turn: float, start: Array | None = None) -> SearchResult:
-        """The best translation at an angle: anywhere, or near a start, as the silhouette changes
-        with its place.
+        """The best translation at an angle, anywhere or near a start; from a start it is more
+        accurate, as the silhouette changes with its place.
         """
         near = start if start is not None else np.zeros(2)
         reach = SEARCH_RANGE if start is None else SEARCH_RANGE / 4
-        q, score = self._step(np.array([near[0], near[1], turn]), reach)
+        q, score = self._correlate(np.array([near[0], near[1], turn]), reach)
         off = np.hypot(q[0], q[1]) / SEARCH_RANGE
         return SearchResult(q, score - DISTANCE_PENALTY * min(off, 2.0) ** 2)
 
     def best_displacement(self, q: Array, reach: float) -> Array:
         """The best displacement at the angle of `q`, up to `reach` [m] from it."""
-        return self._step(q, reach)[0]
+        return self._correlate(q, reach)[0]
 
-    def _step(self, q: Array, reach: float) -> tuple[Array, float]:
-        """Correlate once; return the displacement at the peak and its mean evidence."""
+    def _correlate(self, q: Array, reach: float) -> tuple[Array, float]:
+        """Correlates once; returns the displacement at the peak and its mean evidence."""
         view, scale = self._view, self._scale
         window = _snap_to_scale(view.window(self._shape, q, 1.0), scale)
         mask = np.isfinite(view.buffer(self._shape, q, window)).astype(np.float32)
@@ -111,7 +109,7 @@ class SilhouetteSearch:
         v, u = np.mgrid[: score.shape[0], : score.shape[1]] - pad
         shift = np.stack([u, v], axis=-1) @ np.linalg.inv(J).T
         off = np.linalg.norm(shift, axis=-1)
-        # places outside the range are excluded; a start outside may come back
+        # Places beyond `reach` are excluded. The penalty lets a start outside the range come back.
         far = np.hypot(q[0] + shift[..., 0], q[1] + shift[..., 1]) / SEARCH_RANGE
         rated = np.where(off <= reach * 1.01, score - DISTANCE_PENALTY * far**2, -np.inf)
         best = np.unravel_index(int(rated.argmax()), rated.shape)
@@ -119,7 +117,7 @@ class SilhouetteSearch:
 
 
 def _snap_to_scale(window: ImageWindow, scale: float) -> ImageWindow:
-    """A window whose raster of `scale` shares its pixels with the scaled image."""
+    """A window whose raster's pixels are pixels of the scaled image."""
     n = round(1.0 / scale)
     left, top = window.left // n * n, window.top // n * n
     right = -(-(window.left + window.width) // n) * n
@@ -128,7 +126,7 @@ def _snap_to_scale(window: ImageWindow, scale: float) -> ImageWindow:
 
 
 def _drop_duplicates(found: list[SearchResult]) -> list[SearchResult]:
-    """Drop places that are near better ones."""
+    """Drops places that are near better ones."""
     kept: list[SearchResult] = []
     for f in found:
         near = (
@@ -151,8 +149,8 @@ Placed = tuple[TargetShape, Array]
 def assign_candidates(
     aligner: Aligner, shapes: dict[str, TargetShape], placed: dict[str, Placed]
 ) -> dict[str, list[Array]]:
-    """Candidate displacements of the objects that seem present, best first, outside the places of
-    other objects.
+    """Candidate displacements, best first, of the objects that seem present; outside the places of
+    the objects that are `placed`.
     """
     view, evidence = aligner.view, unexplained_evidence(aligner, placed)
     waiting = {name: find_candidates(view, shape, evidence) for name, shape in shapes.items()}
@@ -181,9 +179,9 @@ def unexplained_evidence(aligner: Aligner, placed: dict[str, Placed]) -> Array:
 
 
 def promising_places(found: list[SearchResult]) -> list[Array]:
-    """Displacements of the places that may prove best, the likeliest first."""
+    """Displacements of the places that may turn out best, the likeliest first."""
     best = max(f.score for f in found)
-    # Evidence below that of the best place at which a place is still tried.
+    # Score below that of the best place down to which a place is tried.
     return [f.q for i, f in enumerate(found) if i == 0 or f.score > best - 0.12]
 
 
@@ -220,7 +218,7 @@ def silhouette_support(
 def _remove_explained(
     view: PinholeView, shape: TargetShape, q: Array, evidence: Array
 ) -> ImageWindow:
-    """Remove the evidence that an object explains; return its pixels."""
+    """Removes the evidence that an object explains; returns the window of the removed pixels."""
     window = view.window(shape, q, 8.0)
     mask = np.isfinite(view.buffer(shape, q, window)).astype(np.uint8)
     grown = cv2.dilate(mask, np.ones((7, 7), np.uint8)) > 0

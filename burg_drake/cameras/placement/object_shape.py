@@ -40,10 +40,10 @@ class TargetShape:
     Attributes:
         vertices: (V, 3) in O [m].
         faces: (F, 3).
-        X_SO: (4, 4) the target.
+        X_SO: (4, 4) target pose.
         p_OR: (3,) reference point, in the plane of the board at the target [m].
-        symmetric: a turn about the vertical through the reference point changes nothing.
-        colors: (F, 3) linear reflectance of the library's mesh; None if it has no colors.
+        symmetric: whether all turns about the vertical through the reference point look the same.
+        colors: (F, 3) linear reflectance of the library's mesh; None if it has no colours.
     """
 
     vertices: Array
@@ -87,7 +87,9 @@ class TargetShape:
         return sample_surface(mesh, SURFACE_SAMPLES)
 
     def looks_alike(self, a: Array, b: Array) -> bool:
-        """Whether two displacements (3,) look the same, as a box after half a turn."""
+        """Whether the object looks the same at two displacements (3,), as a box does after half a
+        turn.
+        """
         X_SS = inverse(self.displacement(a)) @ self.displacement(b)
         points, _ = self.surface
         return self._matcher.contains_points(transform_points(X_SS, points[::12]))
@@ -114,7 +116,8 @@ class TargetShape:
 
 @lru_cache(maxsize=4)
 def target_shapes(scene: Scene) -> dict[str, TargetShape]:
-    """The shapes of all instances of a scene, free ones first; kept for the scene's next photo.
+    """The shapes of all instances of a scene, free ones first; cached for further photos of the
+    scene.
 
     Raises:
         UnknownNameError: a mesh file is missing.
@@ -131,7 +134,7 @@ def target_shapes(scene: Scene) -> dict[str, TargetShape]:
 
 def _face_colors(surface: trimesh.Trimesh, path: Path) -> Array | None:
     """(F, 3) linear reflectance of a surface's faces, from the visual mesh file; None if it has no
-    colors.
+    colours.
     """
     seen = trimesh.load(path, force="mesh", process=False)
     if not seen.visual.defined:
@@ -150,7 +153,7 @@ def target_shape(
     Args:
         vertices: (V, 3) in O [m].
         faces: (F, 3).
-        X_SO: (4, 4) target.
+        X_SO: (4, 4) target pose.
         colors: (F, 3) linear reflectance; None if it is not known.
     """
     p_SV = transform_points(X_SO, vertices)

@@ -26,8 +26,8 @@ class StepLines:
         t: (T,) distances from the expected step, outwards [pixels].
         light: (N, T, 3) of the photo.
         behind: (N, T, 3) the background behind the object, in the light farther outside.
-        color: (N, 3) of the object, farther in.
-        tone: (N, 3) expected ratio of the object's color at its edge to `color`.
+        color: (N, 3) of the object, farther inside.
+        tone: (N, 3) expected ratio of the object's colour at its edge to `color`.
         strip: (N,) distance from the step to the next material [pixels]; -infinity if there is
             none.
         used: (N, T) samples that are used.
@@ -48,9 +48,9 @@ class EdgeSteps:
 
     Attributes:
         offset: (N,) distance from the expected step [pixels].
-        variance: (N,) of that.
+        variance: (N,) of the offset [pixels^2].
         rms: (N,) root mean square residual of the light.
-        contrast: (N,) between both sides.
+        contrast: (N,) contrast of the two sides of the step.
         color: (N, 3) of the object at its edge.
     """
 
@@ -62,7 +62,7 @@ class EdgeSteps:
 
 
 def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> EdgeSteps:
-    """Fit steps to all profiles by Gauss-Newton.
+    """Fits steps to all profiles by Gauss-Newton.
 
     Args:
         lines: the profiles.
@@ -86,7 +86,7 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
     prior = np.zeros((len(lines.color), n, n))
     prior[:, at, at] = 0.1
     prior[:, outer, outer] = rise.T @ rise
-    # the edge's color is near the inner one, or that of a strip of another material
+    # the edge's colour is near the inner one, or that of a strip of another material
     tie = _tone_prior(lines.color * lines.tone, strip, paper)
     prior[:, edge, edge] = tie
     prior[:, inner, inner] = _tone_prior(lines.color, np.zeros_like(strip), paper) + tie
@@ -103,16 +103,16 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
         strip_share = np.where(strip[:, None], ndtr(beyond), 0.0)[..., None]
         fall = np.exp(-0.5 * beyond**2)[..., None] / np.sqrt(2.0 * np.pi) / blur
         lit_background = lines.behind * np.maximum(1.0 + x[:, outer] @ knots.T, 0.0)[..., None]
-        first = (lines.color * lines.tone + x[:, edge])[:, None]
-        second = (lines.color + x[:, inner])[:, None]
+        edge_color = (lines.color * lines.tone + x[:, edge])[:, None]
+        inner_color = (lines.color + x[:, inner])[:, None]
         residual = (
             lines.light
             - lit_background
-            - covered * (first - lit_background)
-            - strip_share * (second - first)
+            - covered * (edge_color - lit_background)
+            - strip_share * (inner_color - edge_color)
         )
         J = np.zeros((*residual.shape, n), np.float32)
-        J[..., at] = slope * (first - lit_background) + fall * (second - first)
+        J[..., at] = slope * (edge_color - lit_background) + fall * (inner_color - edge_color)
         J[..., outer] = ((1.0 - covered) * lines.behind)[..., None] * knots[:, None]
         for channel in range(3):
             J[..., channel, edge.start + channel] = (covered - strip_share)[..., 0]
@@ -130,12 +130,12 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Edge
     variance = 2.0 * np.linalg.inv(normal)[:, at, at]
     rms = np.sqrt((lines.used[..., None] * residual**2).sum(axis=(1, 2)) / count)
     here = int(np.argmin(np.abs(t)))
-    contrast = np.linalg.norm(first[:, 0] - lit_background[:, here], axis=1) / np.sqrt(3.0)
-    return EdgeSteps(x[:, at], variance, rms, contrast, first[:, 0])
+    contrast = np.linalg.norm(edge_color[:, 0] - lit_background[:, here], axis=1) / np.sqrt(3.0)
+    return EdgeSteps(x[:, at], variance, rms, contrast, edge_color[:, 0])
 
 
 def _tone_prior(color: Array, strip: Booleans, paper: float) -> Array:
-    """(N, 3, 3) inverse covariance of colors (N, 3), which vary more in brightness than in tone."""
+    """(N, 3, 3) inverse covariance of colours (N, 3); they vary less in tone than in brightness."""
     surface_sds = (0.15, 0.03)  # Relative brightness and tone of the object at its edge ...
     strip_sds = (0.8, 0.15)  # ... and of a strip of another material.
     bright, tone = np.where(strip[:, None], strip_sds, surface_sds).T
@@ -151,7 +151,7 @@ def _tone_prior(color: Array, strip: Booleans, paper: float) -> Array:
 PROFILE_STEP_PX = 0.5
 """Spacing of samples on a normal, in pixels."""
 MIN_EDGE_CONTRAST = 0.05
-"""Contrast of an edge, at least, as a fraction of that of paper and ink."""
+"""Least contrast of an edge, as a fraction of the contrast of paper and ink."""
 FINE_SEARCH_PX = 5.0
 """Pixels on both sides of an outline that the fine search covers."""
 
@@ -161,13 +161,13 @@ class PhotoEdges:
     """Edges of a photo on the normals of an outline.
 
     Attributes:
-        offset: (N,) their distances outwards from the outline [pixels].
-        deviation: (N,) their standard deviations [pixels].
+        offset: (N,) distance of each edge outwards from the outline [pixels].
+        deviation: (N,) standard deviation of each offset [pixels].
         shading: (N,) inward shift of the measured edge per relative darkening of the object at its
             edge, as of round objects [pixels].
-        found: (N,) an edge was found.
-        expected: (N,) an edge should be visible: nothing occludes it, and both sides of the outline
-            look different.
+        found: (N,) True where an edge was found.
+        expected: (N,) True where an edge should be visible: nothing occludes it, and the two sides
+            of the outline look different.
     """
 
     offset: Array
@@ -185,13 +185,13 @@ class NormalProfiles:
         t: (T,) distances from the outline [pixels].
         light: (N, T, 3) the photo, linear.
         board: (N, T, 3) the board without objects and shadows.
-        evidence: (N, T) evidence that something stands there.
-        known: (N, T) `board` can be relied on.
-        covered: (N, T) the object covers it.
-        strip: (N,) inner end of the surface that begins at the outline: a bend, another material,
+        evidence: (N, T) evidence of an object, see `EmptyBoard`.
+        known: (N, T) True where `board` can be relied on.
+        covered: (N, T) True where the object is seen, if nothing occludes it.
+        strip: (N,) inner end of the strip of surface next to the outline: a bend, another material,
             or a part behind it [pixels]; -infinity if there is none.
-        tone: (N, 3) ratio of its reflectance to that of the surface inside.
-        occluded: (N, T) another object covers it.
+        tone: (N, 3) ratio of the strip's reflectance to that of the surface inside.
+        occluded: (N, T) True where another object is in front.
     """
 
     t: Array
@@ -208,11 +208,11 @@ class NormalProfiles:
 def sample_normal_profiles(
     contour: ImageContour,
     light: Single,
-    picture: EmptyBoard,
+    background: EmptyBoard,
     others: Array,
     reach: float,
 ) -> NormalProfiles:
-    """Sample a photo on the normals of an outline.
+    """Samples a photo on the normals of an outline.
 
     Args:
         contour: the outline.
@@ -232,33 +232,34 @@ def sample_normal_profiles(
         return np.asarray(found).reshape(len(contour), len(t), *values.shape[2:])
 
     other = np.isfinite(sample_nearest(others, points, np.inf))
-    known = (sample_nearest(picture.sheet, points, 0.0) > 0.0) & ~other
+    known = (sample_nearest(background.sheet, points, 0.0) > 0.0) & ~other
     return NormalProfiles(
         t,
         sampled(light),
-        sampled(picture.color),
-        sampled(picture.evidence.astype(np.float32)),
+        sampled(background.color),
+        sampled(background.evidence.astype(np.float32)),
         known,
-        *contour.inside(points, t),
+        *contour.surface_strip(points, t),
         other,
     )
 
 
-def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
-    """Find the best step from object to background on each normal: by evidence on the sheet, by
-    colors outside it.
+def find_far_edges(profiles: NormalProfiles, background: EmptyBoard) -> PhotoEdges:
+    """Finds the best step from object to background on each normal: by evidence on the sheet, by
+    colours outside it.
     """
-    t, reach = on.t, float(on.t[-1])
+    t, light, covered = profiles.t, profiles.light, profiles.covered
+    reach = float(t[-1])
     far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
-    usable: Booleans = np.asarray((on.covered & far_in).any(axis=1))
-    usable &= ~(on.occluded & (t > -1.0)).any(axis=1)
-    tolerance = 2.0 * MIN_EDGE_CONTRAST * picture.contrast
-    inner = _mean_of_samples(on.light, on.covered & far_in)
-    outer = _mean_of_samples(on.light, np.broadcast_to(far_out, on.covered.shape))
-    off_object = np.minimum(np.linalg.norm(on.light - inner[:, None], axis=-1) / tolerance, 1.0)
-    off_outer = np.minimum(np.linalg.norm(on.light - outer[:, None], axis=-1) / tolerance, 1.0)
-    inside = np.where(on.known, np.maximum(-on.evidence, 0.0), off_object**2)
-    outside = np.where(on.known, np.maximum(on.evidence, 0.0), off_outer**2)
+    usable: Booleans = np.asarray((covered & far_in).any(axis=1))
+    usable &= ~(profiles.occluded & (t > -1.0)).any(axis=1)
+    tolerance = 2.0 * MIN_EDGE_CONTRAST * background.contrast
+    inner = _mean_of_samples(light, covered & far_in)
+    outer = _mean_of_samples(light, np.broadcast_to(far_out, covered.shape))
+    off_object = np.minimum(np.linalg.norm(light - inner[:, None], axis=-1) / tolerance, 1.0)
+    off_outer = np.minimum(np.linalg.norm(light - outer[:, None], axis=-1) / tolerance, 1.0)
+    inside = np.where(profiles.known, np.maximum(-profiles.evidence, 0.0), off_object**2)
+    outside = np.where(profiles.known, np.maximum(profiles.evidence, 0.0), off_outer**2)
     cost = np.cumsum(inside, axis=1) + (outside.sum(axis=1)[:, None] - np.cumsum(outside, axis=1))
     best = cost.argmin(axis=1)
     ends = np.minimum(cost[:, 0], cost[:, -1])
@@ -268,47 +269,48 @@ def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     return PhotoEdges(t[best] + PROFILE_STEP_PX / 2, even + 1.0, even, found, usable)
 
 
-def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
-    """Find edges near the outline by least squares: a blurred step between two modelled sides.
+def find_near_edges(profiles: NormalProfiles, background: EmptyBoard) -> PhotoEdges:
+    """Finds edges near the outline by least squares: a blurred step between two modelled sides.
 
     The outside is the board B(t) in a light g(t), which varies most at the object, where its shadow
-    begins. The inside is the object's color F. With the blurred step s the photo is g B + s(offset
-    - t) (F - g B). Where F is grey as well, a shadow's edge looks like the object's; the offset's
-    standard deviation includes this, as g is fitted as well. An outline with the board on both
-    sides is a shadow's and not an edge.
+    begins. The inside is the object's colour F. With the blurred step s the photo is g B + s(offset
+    - t) (F - g B). Where F is grey as well, the edge of a shadow looks like the object's edge; the
+    offset's standard deviation includes this, as g is fitted as well. An outline with the board on
+    both sides belongs to a shadow and is no edge.
     """
     inner_width = 0.6  # Pixels over which the object's colour is sampled; many objects have a rim.
     outer_width = 3.0  # Pixels over which the light outside is sampled.
     max_rms_share = 0.2  # Residual of a good edge, as a fraction of the contrast of paper and ink.
-    t = on.t
+    t, light = profiles.t, profiles.light
+    covered, occluded = profiles.covered, profiles.occluded
     # Pixels. Standard deviation from pixel area and interpolation.
-    blur = float(np.hypot(picture.blur, 0.4))
+    blur = float(np.hypot(background.blur, 0.4))
     # Blur standard deviations from an edge at which it is no longer seen.
     clear = max(1.75 * blur, 0.9)
-    core = on.covered & np.roll(on.covered, round(clear / PROFILE_STEP_PX), axis=1)
+    core = covered & np.roll(covered, round(clear / PROFILE_STEP_PX), axis=1)
     # Pixels. Thickest strip of another material along an outline.
-    strip = np.where(on.strip > -clear - inner_width - 2.5, on.strip, -np.inf)
-    # the object's color, sampled inside a strip of another material if there is one
+    strip = np.where(profiles.strip > -clear - inner_width - 2.5, profiles.strip, -np.inf)
+    # the object's colour, sampled inside a strip of another material if there is one
     start = -clear + np.where(np.isfinite(strip), strip, 0.0)[:, None]
     inner = core & (t <= start) & (t >= start - inner_width)
-    outer = (t >= clear) & (t <= clear + outer_width) & ~on.covered
-    usable = inner.any(axis=1) & outer.any(axis=1) & ~(on.covered & (t > 0.7)).any(axis=1)
-    mixed = (on.occluded & (t > 0.0)).any(axis=1) & ~(on.occluded | (t < 0.0)).all(axis=1)
-    usable &= ~mixed & ~(on.occluded & (t < 0.0) & (t > -2.0) & ~on.covered).any(axis=1)
-    color = _mean_of_samples(on.light, inner)
-    behind, left_outside = _background_light(on, outer)
+    outer = (t >= clear) & (t <= clear + outer_width) & ~covered
+    usable = inner.any(axis=1) & outer.any(axis=1) & ~(covered & (t > 0.7)).any(axis=1)
+    mixed = (occluded & (t > 0.0)).any(axis=1) & ~(occluded | (t < 0.0)).all(axis=1)
+    usable &= ~mixed & ~(occluded & (t < 0.0) & (t > -2.0) & ~covered).any(axis=1)
+    color = _mean_of_samples(light, inner)
+    behind, left_outside = _background_light(profiles, outer)
     used = (core | (t > -1.0)) & (t > start - inner_width) & (t < clear + outer_width)
-    paper = picture.contrast
+    paper = background.contrast
     seen = used.any(axis=0)
     lines = StepLines(
-        t[seen], on.light[:, seen], behind[:, seen], color, on.tone, strip, used[:, seen]
+        t[seen], light[:, seen], behind[:, seen], color, profiles.tone, strip, used[:, seen]
     )
-    fit = fit_steps(lines, blur, picture.noise, paper)
+    fit = fit_steps(lines, blur, background.noise, paper)
     # Pixels at the contrast of paper and ink; grows as the contrast falls.
     variance = fit.variance + (0.08 * paper / np.maximum(fit.contrast, 1e-4)) ** 2
-    known: Booleans = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
+    known: Booleans = np.asarray(np.all(profiles.known[:, t >= 0.0], axis=1))
     # Evidence inside the outline below which the board is seen there.
-    board_inside = known & (_mean_of_samples(on.evidence[..., None], inner)[:, 0] < -0.4)
+    board_inside = known & (_mean_of_samples(profiles.evidence[..., None], inner)[:, 0] < -0.4)
     explained = ~known | (left_outside < max_rms_share * paper)
     # Pixels. Edges with a larger standard deviation are dropped.
     expected = usable & (explained | board_inside) & (variance < 1.5**2)
@@ -320,21 +322,21 @@ def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     return PhotoEdges(fit.offset, np.sqrt(variance), shading, found, expected)
 
 
-def _background_light(on: NormalProfiles, outer: Booleans) -> tuple[Array, Array]:
-    """(N, T, 3) background behind the object, and (N,) its root mean square residual outside. The
-    mean of the outside where the board is unknown.
+def _background_light(profiles: NormalProfiles, outer: Booleans) -> tuple[Array, Array]:
+    """(N, T, 3) background behind the object: the board, or the mean light outside where the board
+    is unknown; and (N,) root mean square residual of the board outside.
     """
-    known: Booleans = np.asarray(np.all(on.known[:, on.t >= 0.0], axis=1))
-    B = np.where(outer[..., None], on.board, 0.0)
-    level = (B * on.light).sum(axis=(1, 2)) / ((B * B).sum(axis=(1, 2)) + 1e-9)
-    model = on.board * level[:, None, None]
-    square_error = (((on.light - model) ** 2).mean(axis=-1) * outer).sum(axis=1)
-    mean = np.broadcast_to(_mean_of_samples(on.light, outer)[:, None], model.shape)
+    known: Booleans = np.asarray(np.all(profiles.known[:, profiles.t >= 0.0], axis=1))
+    B = np.where(outer[..., None], profiles.board, 0.0)
+    level = (B * profiles.light).sum(axis=(1, 2)) / ((B * B).sum(axis=(1, 2)) + 1e-9)
+    model = profiles.board * level[:, None, None]
+    square_error = (((profiles.light - model) ** 2).mean(axis=-1) * outer).sum(axis=1)
+    mean = np.broadcast_to(_mean_of_samples(profiles.light, outer)[:, None], model.shape)
     model = np.where(known[:, None, None], model, mean)
     return model, np.sqrt(square_error / np.maximum(outer.sum(axis=1), 1))
 
 
 def _mean_of_samples(values: Array, where: Booleans) -> Array:
-    """(N, C) mean of (N, T, C) at some samples (N, T) of each line; 0 where there is none."""
+    """(N, C) mean of values (N, T, C) at some samples (N, T) of each line; 0 without samples."""
     count = np.maximum(where.sum(axis=1), 1)
     return (values * where[..., None]).sum(axis=1) / count[:, None]

@@ -21,7 +21,7 @@ class ImageWindow:
     Attributes:
         left, top: first column and row of the image.
         width, height: columns and rows of the image.
-        scale: raster pixels per pixel of the image, each way.
+        scale: raster pixels per pixel of the image, along both axes.
     """
 
     left: int
@@ -35,9 +35,12 @@ class ImageWindow:
         """Rows and columns of the raster."""
         return round(self.height * self.scale), round(self.width * self.scale)
 
-    def scaled(self, scale: float) -> ImageWindow:
-        """The same part, with a raster of another scale."""
-        return replace(self, scale=scale)
+    def with_raster(self, pixel_count: int) -> ImageWindow:
+        """The same part, with a raster of at most about `pixel_count` pixels, no finer than the
+        image.
+        """
+        pitch = max(1.0, float(np.sqrt(self.width * self.height / pixel_count)))
+        return replace(self, scale=1.0 / pitch)
 
     def overlaps(self, other: ImageWindow) -> bool:
         """Whether two windows overlap in the image."""
@@ -64,8 +67,8 @@ class PinholeView:
 
     Attributes:
         K: (3, 3) camera matrix, pixel centres at integers.
-        size: width and height of its image [pixels].
-        X_SC: (4, 4) its pose.
+        size: width and height of the image [pixels].
+        X_SC: (4, 4) pose of the camera.
         blind: (H, W) pixels without image content; None if there are none.
     """
 
@@ -76,11 +79,11 @@ class PinholeView:
 
     @cached_property
     def X_CS(self) -> Array:
-        """(4, 4) scene frame in the camera's."""
+        """(4, 4) pose of the scene frame in the camera frame."""
         return inverse(self.X_SC)
 
     def project(self, p_SQ: Array) -> tuple[Array, Array]:
-        """Transform points (N, 3) from S to the camera frame and project them to pixels (N, 2)."""
+        """Points (N, 3) in S, transformed to the camera frame (N, 3), and their pixels (N, 2)."""
         p_CQ = transform_points(self.X_CS, p_SQ)
         depth = np.maximum(p_CQ[:, 2:], MIN_POINT_DEPTH)
         return p_CQ, p_CQ[:, :2] / depth * self.K[[0, 1], [0, 1]] + self.K[:2, 2]
@@ -96,7 +99,7 @@ class PinholeView:
         return np.stack([x, y], axis=1) @ self.X_CS[:3, :3]
 
     def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[Indices, Array]:
-        """Cast rays through image points at a displaced shape.
+        """Casts rays through image points at a displaced shape.
 
         Args:
             shape: the object.
@@ -128,7 +131,7 @@ class PinholeView:
         return np.asarray(transform_points(X_SC, p_CQ.reshape(-1, 3)).reshape(p_CQ.shape))
 
     def buffer(self, shape: TargetShape, q: Array, window: ImageWindow) -> Array:
-        """Depth of a displaced shape at the pixels of a window's raster; see `hits`."""
+        """(H, W) depth of a displaced shape at the pixels of a window's raster; see `hits`."""
         return self.hits(shape, q, window.pixels())[1]
 
     def window(self, shape: TargetShape, q: Array, margin: float) -> ImageWindow:
@@ -191,7 +194,7 @@ def window_slices(window: ImageWindow) -> tuple[slice, slice]:
 
 
 def sample_nearest(values: NDArray[Any], pixels: Array, outside: float) -> Array:
-    """Sample values (H, W) at the pixels nearest to image points (..., 2); `outside` beyond the
+    """Samples values (H, W) at the pixels nearest to image points (..., 2); `outside` beyond the
     image.
     """
     at = np.round(pixels).astype(int)
@@ -202,7 +205,7 @@ def sample_nearest(values: NDArray[Any], pixels: Array, outside: float) -> Array
 
 
 OUTLINE_TEST_OFFSETS_PX = np.array([0.6, 1.2, -0.6])
-"""Pixels outward from an outline point, which must be free, free and covered."""
+"""Pixels outward from an outline point; the three test points must be free, free and covered."""
 OCCLUSION_DEPTH_STEP = 2e-3
 """Metres by which an occluder must be nearer than an outline point."""
 
@@ -215,17 +218,18 @@ class ImageContour:
         pixels: (N, 2) in the image.
         normals: (N, 2) unit vectors in the image, out of the object.
         p_SQ: (N, 3) the points in S [m].
-        along: (N, 3) pixels along the normal per x, y [m] and angle [rad] of the displacement.
-        camera: (N, 6) pixels along the normal per error of the camera, as `BoardEstimate` has it:
-            rotation [rad], then translation [m].
+        displacement_jacobian: (N, 3) motion along the normal [pixels] by x, y [m] and angle [rad]
+            of the displacement.
+        camera_jacobian: (N, 6) motion along the normal [pixels] by the error of the camera's pose,
+            which is defined in `BoardEstimate`: rotation [rad], then translation [m].
         view, shape, q: camera, object and its displacement.
     """
 
     pixels: Array
     normals: Array
     p_SQ: Array
-    along: Array
-    camera: Array
+    displacement_jacobian: Array
+    camera_jacobian: Array
     view: PinholeView
     shape: TargetShape
     q: Array
@@ -237,17 +241,18 @@ class ImageContour:
         """(N, T, 2) points on the normals, at distances (T,) from the outline [pixels]."""
         return self.pixels[:, None] + offsets[:, None] * self.normals[:, None]
 
-    def inside(self, pixels: Array, t: Array) -> tuple[Booleans, Array, Array]:
-        """Find which points (N, T, 2) on the normals the object covers, and where its surface ends.
+    def surface_strip(self, pixels: Array, t: Array) -> tuple[Booleans, Array, Array]:
+        """Finds the points on the normals that the object covers, and the strip of its surface next
+        to the outline.
 
         Args:
-            pixels: the points.
-            t: (T,) their distances from the outline, rising.
+            pixels: (N, T, 2) points on the normals.
+            t: (T,) distances of the points from the outline, rising [pixels].
 
         Returns:
-            (N, T) covered points; (N,) distance at which the surface that begins at the outline
-            ends inwards (bend, other material, part behind it), -infinity if it does not; and (N,
-            3) ratio of its reflectance to that of the surface inside.
+            (N, T) True for covered points; (N,) distance of the strip's inner end (a bend, another
+            material, or a part behind it), -infinity if there is none; and (N, 3) ratio of the
+            strip's reflectance to that of the surface inside.
         """
         face, depth = self.view.hits(self.shape, self.q, pixels)
         covered = np.isfinite(depth)
@@ -312,9 +317,9 @@ def visible_outline(view: PinholeView, shape: TargetShape, q: Array, others: Arr
     J = np.einsum("ni,nij->nj", normal, view.jacobian(p_SQ))
     arm = p_SQ - shape.p_SR - (q[0], q[1], 0.0)
     turn = arm[:, 0] * J[:, 1] - arm[:, 1] * J[:, 0]
-    moved = np.concatenate([-np.cross(p_SQ - view.X_SC[:3, 3], J), -J], axis=1)
-    along = np.column_stack([J[:, 0], J[:, 1], turn])
-    return ImageContour(pixels, normal, p_SQ, along, moved, view, shape, q)
+    by_camera = np.concatenate([-np.cross(p_SQ - view.X_SC[:3, 3], J), -J], axis=1)
+    by_displacement = np.column_stack([J[:, 0], J[:, 1], turn])
+    return ImageContour(pixels, normal, p_SQ, by_displacement, by_camera, view, shape, q)
 
 
 def _sample_segments(view: PinholeView, ends: Array) -> tuple[Array, Indices]:

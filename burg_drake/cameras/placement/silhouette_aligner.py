@@ -8,7 +8,9 @@ from burg_drake.cameras.placement.alignment import (
     Alignment,
     DisplacementFit,
     fit_displacement,
+    limit_step,
     outline_sectors,
+    step_units,
 )
 from burg_drake.cameras.placement.board_background import EmptyBoard
 from burg_drake.cameras.placement.object_shape import TargetShape
@@ -27,7 +29,7 @@ from burg_drake.cameras.placement.pinhole_view import (
     sample_nearest,
     visible_outline,
 )
-from burg_drake.core import Array, Booleans, Bytes, Single, srgb_to_linear
+from burg_drake.core import Array, Booleans, Bytes, srgb_to_linear
 
 MIN_RESIDUAL_PX = 0.1
 """Smaller residuals of an outline are treated as this one, in pixels."""
@@ -38,23 +40,23 @@ class SilhouetteAligner:
     """Aligns objects with one photo.
 
     Args:
-        view: its camera.
-        image: (H, W, 3) without lens distortion, sRGB.
-        picture: the predicted empty board.
+        view: camera of the photo.
+        image: (H, W, 3) photo without lens distortion, sRGB.
+        background: prediction of the empty board.
     """
 
-    def __init__(self, view: PinholeView, image: Bytes, picture: EmptyBoard) -> None:
+    def __init__(self, view: PinholeView, image: Bytes, background: EmptyBoard) -> None:
         self.view = view
         self.convincing_rating, self.required_gain = 3.4, 0.15
         self.min_rating_margin, self.checks_depth = 0.08, False
-        self.sees_colors, self.smear = True, picture.smear
-        self.evidence = picture.evidence
+        self.sees_colors, self.smear = True, background.smear
+        self.evidence = background.evidence
         # Pixels per pixel of blur. Fits of the right object leave less.
-        self.max_residual = 0.8 * max(1.0, picture.blur)
+        self.max_residual = 0.8 * max(1.0, background.blur)
         self.residual_floor = MIN_RESIDUAL_PX
         self._light = srgb_to_linear(image)
-        self._relative_light = self._light / picture.paper
-        self._picture = picture
+        self._relative_light = self._light / background.paper
+        self._background = background
 
     def align(
         self, shape: TargetShape, q: Array, others: Array, *, far: bool = True, turn: bool = True
@@ -65,8 +67,8 @@ class SilhouetteAligner:
             shape: the object.
             q: (3,) initial displacement.
             others: (H, W) depth of other objects, infinity where there is none.
-            far: the initial displacement may be many pixels off.
-            turn: the angle is fitted, too.
+            far: whether the initial displacement may be many pixels off.
+            turn: whether the angle is fitted, too.
 
         Returns:
             The alignment; None if the photo does not determine the object's place.
@@ -78,19 +80,43 @@ class SilhouetteAligner:
         return self._fine_fit(shape, near, others, turn, rounds)
 
     def color_similarity(self, shape: TargetShape, q: Array, others: Array) -> float:
-        """Similarity of the photo's tones to those of a displaced object's mesh; see
-        `color_likeness`.
+        """Similarity of the photo's tones to those of a displaced object's mesh, from 0 to 1.
+
+        Args:
+            shape: the object.
+            q: (3,) displacement of the object.
+            others: (H, W) depth of other objects.
+
+        Returns:
+            Mean over the object's visible surface; 0.5 if its mesh has no colours, or nothing is
+            visible.
         """
-        return color_likeness(self.view, shape, q, others, self._relative_light)
+        if shape.colors is None:
+            return 0.5
+        at = self.view.window(shape, q, 0.0).with_raster(1200).pixels()
+        face, depth = self.view.hits(shape, q, at)
+        seen = np.isfinite(depth) & (depth < sample_nearest(others, at, np.inf))
+        if seen.sum() < 10:
+            return 0.5
+        column, row = np.round(at[seen]).astype(int).T
+        height, width = self._relative_light.shape[:2]
+        row, column = np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)
+        light = self._relative_light[row, column].astype(float)
+        reflectance = shape.colors[face[seen]]
+        total, expected = light.sum(axis=1, keepdims=True), reflectance.sum(axis=1, keepdims=True)
+        difference = np.linalg.norm(
+            light / np.maximum(total, 1e-3) - reflectance / np.maximum(expected, 1e-3), axis=1
+        )
+        # Fraction of paper's light below which a tone is unreliable.
+        weight = np.clip(np.minimum(total, expected)[:, 0] / (3 * 0.03), 0.05, 1.0)
+        # Difference of chromaticity at which the similarity is one half.
+        return float((weight / (1.0 + (difference / 0.08) ** 2)).sum() / weight.sum())
 
     def mismatch(
         self, shape: TargetShape, q: Array, others: Array, window: ImageWindow
     ) -> tuple[float, float]:
         """Area of a window that disagrees with a displaced object, without the area of other
-        objects.
-
-        Returns:
-            Disagreement, and the silhouette's area [raster pixels].
+        objects; and area of the object's silhouette [raster pixels].
         """
         at = window.pixels()
         own = np.isfinite(self.view.hits(shape, q, at)[1])
@@ -99,21 +125,23 @@ class SilhouetteAligner:
         return float(np.maximum(np.where(own, -evidence, evidence), 0.0).sum()), float(own.sum())
 
     def _coarse_fit(self, shape: TargetShape, q: Array, others: Array) -> Array | None:
-        """The displacement to about a pixel, from many pixels off; None without an outline."""
+        """The displacement to about a pixel, from a start that may be many pixels off; None
+        without an outline.
+        """
         # Search distance of each round, as a fraction of the image's width.
         for share in (1 / 45, 1 / 45, 1 / 80, 1 / 110):
             contour = visible_outline(self.view, shape, q, others)
             if len(contour) < MIN_OUTLINE_EDGES:
                 return None
-            on = self._sample_normals(contour, others, share * self.view.size[0])
-            solved = _solve_displacement(shape, contour, find_far_edges(on, self._picture))
+            profiles = self._sample_normals(contour, others, share * self.view.size[0])
+            solved = _solve_displacement(shape, contour, find_far_edges(profiles, self._background))
             if solved is None:
                 break
-            q = q + _limit_step(solved.step)
+            q = q + limit_step(solved.step)
         return q
 
     def _sample_normals(self, contour: ImageContour, others: Array, reach: float) -> NormalProfiles:
-        return sample_normal_profiles(contour, self._light, self._picture, others, reach)
+        return sample_normal_profiles(contour, self._light, self._background, others, reach)
 
     def _fine_fit(
         self, shape: TargetShape, q: Array, others: Array, turn: bool, rounds: int
@@ -124,16 +152,16 @@ class SilhouetteAligner:
             contour = visible_outline(self.view, shape, q, others)
             if len(contour) < MIN_OUTLINE_EDGES:
                 return None
-            on = self._sample_normals(contour, others, FINE_SEARCH_PX)
-            edges = find_near_edges(on, self._picture)
+            profiles = self._sample_normals(contour, others, FINE_SEARCH_PX)
+            edges = find_near_edges(profiles, self._background)
             solved = _solve_displacement(shape, contour, edges, turn)
             # Metres from the start; beyond, the alignment has failed.
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.03:
                 return None
-            q = q + _limit_step(solved.step)
+            q = q + limit_step(solved.step)
             result = _build_alignment(q, contour, edges, solved)
             # Pixels. Smaller motions of the outline end the rounds.
-            if np.abs(contour.along @ solved.step).max() < 0.04:
+            if np.abs(contour.displacement_jacobian @ solved.step).max() < 0.04:
                 break
         return result
 
@@ -144,28 +172,21 @@ def _solve_displacement(
     used = edges.found
     if used.sum() < MIN_OUTLINE_EDGES:
         return None
-    reach = float(np.linalg.norm(np.ptp(shape.p_SV[:, :2], axis=0))) / 2
-    unit = np.array([1e-3, 1e-3, 1e-3 / reach])
-    # Nuisances that move edges, by standard deviations: objects are darker at their edges by 15 %,
-    # outlines look larger by 0.2 pixels, and by 0.6 where they meet the board and its shadow, which
-    # ends 4 mm above it.
+    # Standard deviations of nuisances that move edges: objects are darker at their edges by 15 %,
+    # outlines look larger by 0.2 pixels, and by 0.6 where they meet the board and the object's
+    # shadow, which ends 4 mm above the board.
     height = np.maximum(contour.p_SQ[used, 2], 0.0)
     growth = np.full(used.sum(), 0.2)
     nuisance = np.column_stack([-0.15 * edges.shading[used], growth, 0.6 * np.exp(-height / 4e-3)])
     return fit_displacement(
-        contour.along[used],
+        contour.displacement_jacobian[used],
         edges.offset[used],
         edges.deviation[used],
         outline_sectors(contour)[used],
         shape.symmetric or not turn,
-        unit,
+        step_units(shape),
         nuisance,
     )
-
-
-def _limit_step(step: Array) -> Array:
-    """Limit a step to the range in which edges are searched."""
-    return np.clip(step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
 
 
 def _build_alignment(
@@ -173,22 +194,22 @@ def _build_alignment(
 ) -> Alignment:
     agreement_limit = 1.5  # Pixels between an edge and the outline.
     used: Booleans = edges.found
-    left = edges.offset[used] - contour.along[used] @ solved.step
-    agrees = (np.abs(left) < agreement_limit) & (solved.weights > 0.0)
-    residual = _weighted_rms(left[agrees], edges.deviation[used][agrees])
+    residuals = edges.offset[used] - contour.displacement_jacobian[used] @ solved.step
+    agrees = (np.abs(residuals) < agreement_limit) & (solved.weights > 0.0)
+    residual = _weighted_rms(residuals[agrees], edges.deviation[used][agrees])
     normals = contour.normals[used]
-    rough = max(residual, MIN_RESIDUAL_PX) if np.isfinite(residual) else agreement_limit
+    typical_residual = max(residual, MIN_RESIDUAL_PX) if np.isfinite(residual) else agreement_limit
     ends, sides = _ends_and_sides(contour.pixels[used], normals)
     # Standard deviation of an unexplained shift of the outline, in residuals.
-    shifted = 0.4 * rough * solved.sensitivity @ normals
-    # The same of its two ends against each other.
-    twisted = 0.35 * rough * solved.sensitivity @ (normals * ends[:, None])
-    # The same of its sides against its ends.
-    squeezed = 0.6 * rough * solved.sensitivity @ sides[:, None]
+    shifted = 0.4 * typical_residual * solved.sensitivity @ normals
+    # The same for a shift of the outline's two ends against each other.
+    twisted = 0.35 * typical_residual * solved.sensitivity @ (normals * ends[:, None])
+    # The same for a shift of the outline's sides against its ends.
+    squeezed = 0.6 * typical_residual * solved.sensitivity @ sides[:, None]
     return Alignment(
         q,
         solved.covariance + sum(s @ s.T for s in (shifted, twisted, squeezed)),
-        -solved.sensitivity @ contour.camera[used],
+        -solved.sensitivity @ contour.camera_jacobian[used],
         float(agrees.sum() / max(edges.expected.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
         residual,
@@ -196,8 +217,8 @@ def _build_alignment(
 
 
 def _ends_and_sides(pixels: Array, normals: Array) -> tuple[Array, Array]:
-    """(N,) 1 or -1, the end of the longest extent that each outline point belongs to; and (N,) from
-    1 at a side to -1 at an end.
+    """(N,) 1 or -1, the end of the outline's long axis that each point belongs to; and (N,) from 1
+    at a side of the outline to -1 at an end.
     """
     away = pixels - pixels.mean(axis=0)
     _, axes = np.linalg.eigh(away.T @ away)
@@ -205,46 +226,11 @@ def _ends_and_sides(pixels: Array, normals: Array) -> tuple[Array, Array]:
     return ends, np.asarray(2.0 * (normals @ axes[:, 0]) ** 2 - 1.0)
 
 
-def _weighted_rms(left: Array, deviation: Array) -> float:
+def _weighted_rms(residuals: Array, deviation: Array) -> float:
     """Root mean square, weighted by inverse variance; NaN without values."""
     weight = deviation**-2.0
-    return float(np.sqrt((weight * left**2).sum() / weight.sum())) if len(left) else float("nan")
-
-
-def color_likeness(
-    view: PinholeView, shape: TargetShape, q: Array, others: Array, light: Single
-) -> float:
-    """Similarity of the photo's tones to those of a displaced object's mesh, from 0 to 1.
-
-    Args:
-        view: the camera.
-        shape: the object.
-        q: (3,) its displacement.
-        others: (H, W) depth of other objects.
-        light: (H, W, 3) light of the photo relative to paper.
-
-    Returns:
-        Mean over its visible surface; 0.5 if its mesh has no colors, or nothing is visible.
-    """
-    if shape.colors is None:
-        return 0.5
-    window = view.window(shape, q, 0.0)
-    # Approximate number of an object's pixels that are compared.
-    pitch = max(1.0, float(np.sqrt(window.width * window.height / 1200)))
-    at = window.scaled(1.0 / pitch).pixels()
-    face, depth = view.hits(shape, q, at)
-    seen = np.isfinite(depth) & (depth < sample_nearest(others, at, np.inf))
-    if seen.sum() < 10:
-        return 0.5
-    column, row = np.round(at[seen]).astype(int).T
-    height, width = light.shape[:2]
-    r = light[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(float)
-    known = shape.colors[face[seen]]
-    total, expected = r.sum(axis=1, keepdims=True), known.sum(axis=1, keepdims=True)
-    difference = np.linalg.norm(
-        r / np.maximum(total, 1e-3) - known / np.maximum(expected, 1e-3), axis=1
+    return (
+        float(np.sqrt((weight * residuals**2).sum() / weight.sum()))
+        if len(residuals)
+        else float("nan")
     )
-    # Fraction of paper's light below which a tone is unreliable.
-    weight = np.clip(np.minimum(total, expected)[:, 0] / (3 * 0.03), 0.05, 1.0)
-    # Difference of chromaticity at which the similarity is one half.
-    return float((weight / (1.0 + (difference / 0.08) ** 2)).sum() / weight.sum())

@@ -24,8 +24,8 @@ class BoardEstimate:
         reprojection_error: root mean square reprojection error of the markers' corners [pixels].
         covariance: (6, 6) of a small rotation [rad], then translation [m], both in S, from the true
             to the estimated pose: `R_SC = exp(rotation) R_true`, `p_SC = p_true + translation`.
-        ids: markers that were used.
-        corners: (N, 4, 2) where their corners were seen [pixels].
+        ids: ids of the markers that were used.
+        corners: (N, 4, 2) measured corners of these markers [pixels].
         scale: size of the printed board relative to the document, if measured (from depth, or a
             known camera pose); NaN otherwise.
     """
@@ -45,10 +45,10 @@ class LocatedCamera:
     """The measured pose of a station's camera.
 
     Attributes:
-        camera: to be written into the station document; a pinhole camera, even if the real one
-            has lens distortion.
-        X_WC: (4, 4) its pose, unrounded.
-        apart: largest distance [m] and angle [rad] to the pose of a single image.
+        camera: entry for the station document; a pinhole camera, even if the real one has lens
+            distortion.
+        X_WC: (4, 4) pose of the camera, unrounded.
+        apart: largest distance [m] and angle [rad] from the pose of a single image.
     """
 
     camera: Camera
@@ -59,10 +59,10 @@ class LocatedCamera:
 def locate_camera(
     station: StationLike, estimates: Sequence[BoardEstimate], intrinsics: Intrinsics
 ) -> LocatedCamera:
-    """Locate a fixed camera from several images.
+    """Locates a fixed camera from several images.
 
     Args:
-        station: has the pose of the board.
+        station: station with the pose of the board.
         estimates: one per image; invalid ones are ignored.
         intrinsics: of the camera.
 
@@ -98,7 +98,7 @@ def locate_camera(
 
 
 def _round_pose(X_WC: Array) -> Pose:
-    """Round to a hundredth of a millimetre and a thousandth of a degree."""
+    """Rounds a pose to a hundredth of a millimetre and a thousandth of a degree."""
     pose = Pose.from_matrix(X_WC)
     assert pose.rpy_deg is not None
     (x, y, z), (roll, pitch, yaw) = pose.translation, pose.rpy_deg

@@ -82,10 +82,10 @@ class BoardPose:
         Args:
             image: (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
             depth: (H, W) depth image of the same camera [m], to measure the print's size.
-            X_SC_known: (4, 4) known pose of the camera, for the same purpose.
+            X_SC_known: (4, 4) known pose of the camera, also to measure the print's size.
 
         Raises:
-            InvalidInputError: not an image, or one of another size than the intrinsics.
+            InvalidInputError: the image is none, or has another size than the intrinsics.
         """
         grey = grey_image(image)
         self.intrinsics.require_size(grey.shape[1], grey.shape[0], "the image")
@@ -106,7 +106,7 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """Detect markers and estimate the pose from corners, then edges."""
+        """Detects markers and estimates the pose from corners, then edges."""
         seen = self._detector.detect(grey)
         if len(seen.duplicated) >= MIN_FOREIGN_MARKERS:
             # It is unknown on which of the sheets the objects belong.
@@ -130,7 +130,7 @@ class BoardPose:
         wrong = self._wrong_print_reason(refined)
         if wrong:
             return BoardEstimate(reason=wrong)
-        return self._estimate(grey, light, refined, depth, X_SC_known)
+        return self._build_estimate(grey, light, refined, depth, X_SC_known)
 
     def _refine(
         self,
@@ -159,14 +159,19 @@ class BoardPose:
                     f"{format_marker_count(len(found))} in sight: two poses fit equally well; move"
                     " closer or show more of the board"
                 )
-            apart = pose_difference(best.X_SC, rounds[1].X_SC)
-            best = replace(best, covariance=best.covariance + np.outer(apart, apart))
-        known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
-        # Fraction of the camera's distance from the board.
-        if known > 0.05 * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
+            step = pose_difference(best.X_SC, rounds[1].X_SC)
+            best = replace(best, covariance=best.covariance + np.outer(step, step))
+        position_sd = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
+        max_position_sd = (
+            0.05
+            * np.linalg.norm(  # a fraction of the distance from the board
+                best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))
+            )
+        )
+        if position_sd > max_position_sd:
             return None, (
                 f"{format_marker_count(len(found))} in sight: the position of the camera is only"
-                f" known to {1e3 * known:.0f} mm; move closer or show more of the board"
+                f" known to {1e3 * position_sd:.0f} mm; move closer or show more of the board"
             )
         own = np.isin(self._edges.marker[best.views.which], found)
         # Fraction of the read markers' edges that must be seen.
@@ -187,7 +192,7 @@ class BoardPose:
         own = np.isin(self._edges.marker[last.views.which], found)
         return float(np.median(np.abs(last.residual[own])))
 
-    def _estimate(
+    def _build_estimate(
         self,
         grey: Bytes,
         light: Single,
@@ -195,7 +200,7 @@ class BoardPose:
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
-        """Build the estimate of a refined pose."""
+        """Builds the estimate of a refined pose."""
         wrong = self._wrong_board.describe_foreign_markers(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
@@ -232,17 +237,11 @@ class BoardPose:
         reprojection error [pixels].
         """
         marker = self._edges.marker[refined.views.which]
-        weight = refined.weight / refined.sd**2
-        normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
         count = np.bincount(marker[refined.weight > 0.0], minlength=len(self._p_SQ))
-        outer = weight[:, None, None] * normal[:, :, None] * normal[:, None]
-        total = np.zeros((len(self._p_SQ), 2, 2))
-        np.add.at(total, marker, outer)
-        toward = np.zeros((len(self._p_SQ), 2))
-        np.add.at(toward, marker, (weight * refined.residual)[:, None] * normal)
-        # Visible edges of a marker that counts as used.
-        used = np.flatnonzero((count >= 6) & (np.linalg.cond(total) < 1e3))
-        shift = np.linalg.solve(total[used], toward[used][..., None])[..., 0]
+        G, g = refined.shift_equations(self._edges)
+        # A used marker shows 6 edges at least.
+        used = np.flatnonzero((count >= 6) & (np.linalg.cond(G) < 1e3))
+        shift = np.linalg.solve(G[used], g[used][..., None])[..., 0]
         p_C = (self._p_SQ[used] - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3]
         error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
         return used, self.intrinsics.project(p_C) + shift[:, None], error
@@ -261,8 +260,8 @@ class BoardPose:
         )
 
     def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """Reason if markers beside the board belong to a second print of it or to a larger board,
-        else empty.
+        """Reason why there are two boards: markers beside the board belong to a second print of it
+        or to a larger board; else empty.
         """
         min_copy_markers = 3  # Markers of a second print of the board.
         rest = ~coarse.inliers
@@ -285,7 +284,7 @@ class BoardPose:
         )
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """Reason if the detected markers are of another board, else empty."""
+        """Reason why the detected markers belong to another board, else empty."""
         deviation = abs(coarse.marker_scale - 1.0)
         # Overexposure shifts sides by a pixel.
         if deviation > 0.05 and deviation * _median_side(seen.corners) / 2.0 > 1.5:
@@ -296,7 +295,7 @@ class BoardPose:
         return ""
 
     def _wrong_print_reason(self, refined: RefinedPose) -> str:
-        """Reason if the print is of another board, else empty."""
+        """Reason why the print is of another board, else empty."""
         at = self.intrinsics.project((self._p_SQ - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3])
         used = np.unique(self._edges.marker[refined.views.which[refined.weight > 0.0]])
         marker_scale = wrong_marker_size(refined.disturbance, _median_side(at[used]))
@@ -362,7 +361,7 @@ def _median_side(corners: Array) -> float:
 
 
 def _residual_doubt(error: float) -> str:
-    """Describe too large residuals; empty if they are small."""
+    """Describes a too large reprojection error; empty if it is small."""
     if error > 0.3:  # Pixels. With more, intrinsics are wrong or the board is not flat.
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"

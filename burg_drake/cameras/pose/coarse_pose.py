@@ -21,7 +21,7 @@ class CoarsePose:
     """Poses from the markers' corners.
 
     Attributes:
-        X_SC: up to two (4, 4) poses above the sheet, the better first.
+        X_SC: up to two poses (4, 4) above the sheet, the better one first.
         inliers: (N,) True for markers in their places on the board.
         marker_scale: size of the markers relative to their distances; 1 as in the document.
     """
@@ -32,7 +32,7 @@ class CoarsePose:
 
 
 def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePose:
-    """Estimate the pose from corners.
+    """Estimates the pose from corners.
 
     Args:
         p_SQ: (N, 4, 3) corners on the board [m].
@@ -60,7 +60,7 @@ def estimate_coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) ->
 
 
 def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], list[float]]:
-    """Poses and their root mean square errors [pixels], the best first."""
+    """Poses (4, 4) and their root mean square errors [pixels], the best first."""
 
     p, q = p_SQ.reshape(-1, 3), np.ascontiguousarray(straight.reshape(-1, 2))
     _, rotations, translations, errors = cv2.solvePnPGeneric(p, q, K, None, flags=cv2.SOLVEPNP_IPPE)
@@ -85,7 +85,7 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
 
 
 def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Booleans:
-    """Find markers whose corners fit a homography, by RANSAC, within a distance [pixels]."""
+    """Finds markers whose corners fit a homography, by RANSAC, within a distance [pixels]."""
 
     cv2.setRNGSeed(0)
     _, fits = cv2.findHomography(
@@ -97,7 +97,9 @@ def consistent_markers(p_SQ: Array, straight: Array, misplaced: float) -> Boolea
 
 
 def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
-    """Size of the markers by a homography that fits their centres; 1 if there is none."""
+    """Size of the markers relative to their distances, by a homography of their centres; 1 if none
+    fits.
+    """
 
     if len(p_SQ) <= 4:
         return 1.0
@@ -112,7 +114,9 @@ def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
 
 
 def _marker_scale(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -> float:
-    """Size of the markers, fitted together with the pose: linear least squares of small changes."""
+    """Size of the markers relative to their distances, fitted together with small changes of the
+    pose.
+    """
     pinhole = replace(intrinsics, model="perspective", distortion=())
     q_S = p_SQ.reshape(-1, 3) - X_SC[:3, 3]
     at, by_C = project_with_derivatives(pinhole, q_S @ X_SC[:3, :3])

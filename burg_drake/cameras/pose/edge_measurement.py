@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from burg_drake.core import Array, Booleans, Indices, Single
 from burg_drake.scene import MarkerLayout
 
 NEIGHBOUR_EDGES = 2
-"""Edges before and behind an edge that its surroundings include."""
+"""Neighbour edges before and behind an edge that are modelled with it."""
 NEIGHBOUR_OFFSETS = np.arange(-NEIGHBOUR_EDGES, NEIGHBOUR_EDGES + 1)
-"""Cells from an edge to its neighbour edges."""
+"""Distances from an edge to its neighbour edges, in cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +31,11 @@ class MarkerEdges:
     Attributes:
         p_SE: (N, 3) middles of the edges [m].
         axis: (N,) 0 if u runs along x, 1 if along y.
-        steps: (N, 3, 2 n + 1) change of color at u = -n ... n, where n is `NEIGHBOUR_EDGES`: 1 from
-            black to white, -1 from white to black, 0 none, in the rows of cells around v = -1, 0
-            and 1.
-        marker: (N,) index of the layout's marker.
-        from_center: (N, 3) from the middle of its marker [m].
+        steps: (N, 3, 2 n + 1) changes of colour in the rows of cells around v = -1, 0 and 1, at
+            u = -n ... n, where n is `NEIGHBOUR_EDGES`: 1 from black to white, -1 from white to
+            black, 0 for none.
+        marker: (N,) index of each edge's marker in the layout.
+        from_center: (N, 3) middle of each edge relative to the middle of its marker [m].
         cell: (2,) size of a cell along x and y [m].
     """
 
@@ -47,11 +48,11 @@ class MarkerEdges:
 
 
 def marker_edges(layout: MarkerLayout, scale: tuple[float, float] = (1.0, 1.0)) -> MarkerEdges:
-    """Build the table of a board's marker edges.
+    """Builds the table of a board's marker edges.
 
     Args:
         layout: the markers.
-        scale: size of the print against the document, along x and y, from S's origin.
+        scale: size of the print relative to the document along x and y, from S's origin.
     """
     parts = [_edges_along_axis(layout, axis) for axis in (0, 1)]
     p_SE, steps, marker = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -95,7 +96,7 @@ def _edges_along_axis(layout: MarkerLayout, axis: int) -> tuple[Array, Array, In
 EDGE_MARGIN_PX = 8
 """Distance of edges from the image's border, in pixels."""
 MIN_VISIBLE_DEPTH = 1e-3
-"""Metres before the camera from which on points are visible."""
+"""Least depth of visible points, in metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +105,12 @@ class EdgeViews:
 
     Attributes:
         which: (N,) indices into the table of edges.
-        at: (N, 2) middles in the image [pixels].
+        at: (N, 2) middles of the edges in the image [pixels].
         across, along: (N, 2) gradients of u and v in the image [cells per pixel].
-        motion: (N, 6) how far an edge moves along `across` [pixels] with a small rotation [rad] and
+        motion: (N, 6) motion of each edge along `across` [pixels] by a small rotation [rad] and
             translation [m] of the camera, both in S as in `BoardEstimate.covariance`.
-        print: (N, 2) the same per relative stretch of the print along y with equal shortening along
-            x, about S's origin; and per relative growth of each marker about its middle [pixels].
+        print: (N, 2) the same by a relative stretch of the print along y with equal shortening
+            along x, about S's origin; and by a relative growth of each marker about its middle.
         bloom: (N,) the same per pixel by which white grows on all sides: 1 or -1.
     """
 
@@ -121,6 +122,11 @@ class EdgeViews:
     print: Array
     bloom: Array
 
+    @cached_property
+    def normal(self) -> Array:
+        """(N, 2) unit vectors along `across`."""
+        return np.asarray(self.across / np.sqrt((self.across**2).sum(axis=1, keepdims=True)))
+
 
 def project_edges(
     edges: MarkerEdges,
@@ -129,14 +135,14 @@ def project_edges(
     X_SC: Array,
     bloom: float = 0.0,
 ) -> EdgeViews:
-    """Project edges into the image and drop those outside.
+    """Projects edges into the image and drops those outside.
 
     Args:
-        edges: table.
+        edges: table of edges.
         which: indices of the edges to project.
         intrinsics: of the camera.
         X_SC: (4, 4) pose.
-        bloom: by which white is larger on all sides [pixels].
+        bloom: distance by which white is larger on all sides [pixels].
     """
     R_SC = X_SC[:3, :3]
     q_S = edges.p_SE[which] - X_SC[:3, 3]
@@ -171,8 +177,8 @@ def project_edges(
 
 
 def project_with_motion(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[Array, Array]:
-    """Image points (N, 2) of points (N, 3) and (N, 2, 6) their derivatives by a small rotation and
-    translation of the camera, see `BoardEstimate.covariance`. Undefined behind the camera.
+    """Image points (N, 2) of points (N, 3), and their derivatives (N, 2, 6) by a small rotation
+    and translation of the camera, see `BoardEstimate.covariance`. Undefined behind the camera.
     """
     q_S = p_S - X_SC[:3, 3]
     p_C = q_S @ X_SC[:3, :3]
@@ -185,7 +191,7 @@ def project_with_motion(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tupl
 def predict_pixels(
     p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
 ) -> tuple[Array, Array]:
-    """Image points (..., 2) of points (..., 3) [pixels], and their variance (...) along the larger
+    """Image points (..., 2) of points (..., 3) [pixels], and their variances (...) along the larger
     axis [pixels^2], infinite behind the camera.
     """
     p_S = p_SQ.reshape(-1, 3)
@@ -202,9 +208,9 @@ def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array
     Args:
         X_SC: (4, 4) pose.
         step: (6,) rotation [rad] and translation [m].
-        p_SA: (3,) centre of the rotation, which follows the translation; the camera if None. It
-            makes no difference to first order. A point in the middle of the view keeps longer steps
-            accurate.
+        p_SA: (3,) centre of the rotation, which follows the translation; the camera if None. The
+            centre makes no difference to first order, but one in the middle of the view keeps
+            longer steps accurate.
     """
     R = Rotation.from_rotvec(step[:3]).as_matrix()
     X = np.eye(4)
@@ -224,7 +230,7 @@ def pose_difference(X_SC: Array, X_SC_new: Array) -> Array:
 
 
 def project_with_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
-    """Image points (N, 2) and their derivatives (N, 2, 3) by the points in the camera's frame."""
+    """Image points (N, 2), and their derivatives (N, 2, 3) by the points in the camera frame."""
     step = 1e-4  # Finite difference for the derivatives of the distortion.
     x = p_CQ[:, :2] / p_CQ[:, 2:]
     by_C = np.zeros((len(x), 2, 3))
@@ -269,14 +275,13 @@ class EdgeFits:
     """Measured edges.
 
     Attributes:
-        offset: (N,) from the predicted place, along the gradient of u [pixels].
-        contrast: (N,) white minus black [linear light]; negative if colors are the wrong
-            way round.
-        information: (N,) inverse variance of the offset for noise that equals the contrast
+        offset: (N,) distance from each edge's predicted place, along the gradient of u [pixels].
+        contrast: (N,) white minus black [linear light]; negative if the colours are swapped.
+        information: (N,) inverse variance of the offset if the noise equalled the contrast
             [1/pixels^2].
         noise: (N,) root mean square residual of the fit [linear light].
-        widening: (N, 2) numerator and denominator of the increase of the blur's variance across the
-            edge that would fit it better [pixels^2].
+        widening: (N, 2) numerator and denominator of the best-fitting increase of the blur's
+            variance across the edge [pixels^2].
     """
 
     offset: Array
@@ -291,8 +296,8 @@ def fit_edges(light: Single, edges: MarkerEdges, views: EdgeViews, blur: Array) 
 
     Args:
         light: (H, W) image in linear light.
-        edges: table.
-        views: N of them.
+        edges: table of edges.
+        views: N projected edges.
         blur: covariance of lens, motion and pixel together [pixels^2], (2, 2) of all edges or
             (N, 2, 2) of each.
     """
@@ -306,16 +311,16 @@ def fit_edges(light: Single, edges: MarkerEdges, views: EdgeViews, blur: Array) 
     columns = nearest[:, :1] + np.where(in_row, window, 0)
     rows = nearest[:, 1:] + np.where(in_row, 0, window)
     dx, dy = columns - views.at[:, :1], rows - views.at[:, 1:]
-    # Half the memory and time of doubles, and 1e-5 pixels at worst.
+    # Single precision: half the memory and time, and errors of 1e-5 pixels at worst.
     u = (views.across[:, :1] * dx + views.across[:, 1:] * dy).astype(np.float32)
     v = (views.along[:, :1] * dx + views.along[:, 1:] * dy).astype(np.float32)
 
     before, _ = _normal_cdf_and_density((-0.5 - v) / sigma_v)
     behind, _ = _normal_cdf_and_density((v - 0.5) / sigma_v)
-    share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of the rows of cells
-    # Pixels. Larger cells keep what is two cells away out of the window.
-    wide = bool((normal * 2.2 < 1.0).all() and (sigma**2 < blurred_variance).all())
-    reach = 1 if wide else NEIGHBOUR_EDGES
+    share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of each row of cells
+    # Pixels. In larger cells the window does not reach edges two cells away.
+    is_large = bool((normal * 2.2 < 1.0).all() and (sigma**2 < blurred_variance).all())
+    reach = 1 if is_large else NEIGHBOUR_EDGES
     near = slice(NEIGHBOUR_EDGES - reach, NEIGHBOUR_EDGES + reach + 1)
     steps = share @ edges.steps[views.which][:, :, near]
     z = (u[..., None] - NEIGHBOUR_OFFSETS[near].astype(np.float32)) / sigma_u[..., None]
@@ -328,12 +333,12 @@ def fit_edges(light: Single, edges: MarkerEdges, views: EdgeViews, blur: Array) 
 
 
 def has_expected_profile(fits: EdgeFits) -> Booleans:
-    """Select edges with the right colors, enough contrast, and a profile that fits."""
-    right = fits.contrast > 0.0
-    if not right.any():
-        return right
-    usual = np.quantile(fits.contrast[right], 0.75)
-    noise = np.median(fits.noise[right])
+    """Selects edges with the right colours, enough contrast, and a profile that fits."""
+    upright = fits.contrast > 0.0
+    if not upright.any():
+        return upright
+    usual = np.quantile(fits.contrast[upright], 0.75)
+    noise = np.median(fits.noise[upright])
     return np.asarray(
         (fits.contrast > 0.25 * usual)
         & (fits.noise < 0.15 * fits.contrast + 2.0 * noise)  # 0.15 besides the image's noise
@@ -343,8 +348,8 @@ def has_expected_profile(fits: EdgeFits) -> Booleans:
 
 
 def offset_variance(fits: EdgeFits, good: Booleans) -> Array:
-    """(N,) variance of offsets by the image's noise [pixels^2], which grows with the root of the
-    light.
+    """(N,) variance of offsets by the image's noise, which grows with the root of the light
+    [pixels^2].
     """
     contrast = np.maximum(np.abs(fits.contrast), 4e-6)
     noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))

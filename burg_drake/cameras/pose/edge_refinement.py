@@ -27,7 +27,15 @@ from burg_drake.cameras.pose.sheet_deviations import (
     SheetModes,
     residuals_within_markers,
 )
-from burg_drake.core import Array, Booleans, Indices, Single
+from burg_drake.core import (
+    TUKEY_LIMIT,
+    Array,
+    Booleans,
+    Indices,
+    Single,
+    robust_sd,
+    tukey_weights,
+)
 
 INITIAL_BLURS = np.array(
     [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
@@ -48,8 +56,8 @@ class LightSpread:
 
     Attributes:
         blur: (2, 2) covariance of lens, motion and pixel together [pixels^2].
-        bloom: by which white is larger on all sides than the print has it: overexposure, another
-            encoding of the levels than sRGB, ink that is short [pixels].
+        bloom: distance by which white areas are larger on all sides than in the print [pixels]:
+            from overexposure, an encoding other than sRGB, or too little ink.
     """
 
     blur: Array
@@ -66,11 +74,12 @@ class EdgeRound:
     """Edges and pose of one refinement round.
 
     Attributes:
-        X_SC: (4, 4).
-        covariance: (6, 6), see `BoardEstimate`.
-        views, fits: edges as seen by the pose before the round, and where they were found.
-        weight: (N,) of each edge, 0 to 1; 0 for outliers.
-        residual: (N,) of each edge [pixels].
+        X_SC: (4, 4) pose after the round.
+        covariance: (6, 6) of the pose, see `BoardEstimate`.
+        views: edges as predicted by the pose before the round.
+        fits: edges as measured.
+        weight: (N,) weight of each edge, 0 to 1; 0 for outliers.
+        residual: (N,) residual of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
         spread: how light spreads.
         rms_motion: root mean square motion of the edges in this round [pixels].
@@ -85,6 +94,18 @@ class EdgeRound:
     sd: Array
     spread: LightSpread
     rms_motion: float
+
+    def shift_equations(self, edges: MarkerEdges) -> tuple[Array, Array]:
+        """(M, 2, 2) and (M, 2) normal equations of a shift of each marker by its edges' residuals
+        [pixels].
+        """
+        marker, normal = edges.marker[self.views.which], self.views.normal
+        information = self.weight / self.sd**2
+        count = edges.marker.max() + 1
+        G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
+        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+        np.add.at(g, marker, (information * self.residual)[:, None] * normal)
+        return G, g
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,23 +142,23 @@ class EdgeRefinement:
             light: (H, W) image in linear light.
             X_SC: (4, 4) pose, accurate to about a pixel at the edges of `markers`.
             markers: indices of the detected markers in the layout.
-            corners: (N, 4, 2) of them in the image [pixels].
+            corners: (N, 4, 2) corners of these markers in the image [pixels].
 
         Returns:
-            The last round; None if too few edges look as they should.
+            The last round; None if too few edges have the expected profile.
         """
         read = np.zeros(len(self._corners), dtype=bool)
         read[markers] = True
         found = np.flatnonzero(read[self._edges.marker])
         first, last = found[:FIRST_EDGES], found[:LAST_EDGES]
-        result = self._iterate(light, X_SC, first, self._first_spread(light, X_SC, first))
+        result = self._iterate(light, X_SC, first, self._initial_spread(light, X_SC, first))
         # Pixels. A first step that moves an edge farther is repeated.
         if result and np.abs(result.fits.offset - result.residual).max() > 0.3:
             result = self._iterate(light, result.X_SC, first, result.spread)
-        others = self._missed_markers(result, read) if result else read
-        # Unread over read markers above which unread ones are added.
-        if result and others.sum() > 0.25 * read.sum():
-            unread = np.flatnonzero(others[self._edges.marker])
+        missed = self._missed_markers(result, read) if result else read
+        # Ratio of missed to detected markers above which missed ones are added.
+        if result and missed.sum() > 0.25 * read.sum():
+            unread = np.flatnonzero(missed[self._edges.marker])
             which = np.concatenate([first, unread[:320]])
             result = self._iterate(light, result.X_SC, which, result.spread)
             if result is not None:
@@ -152,15 +173,15 @@ class EdgeRefinement:
         shift = np.zeros((len(self._corners), 2))
         p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
         shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
-        # Fraction of read markers above which misplaced markers are searched.
+        # Fraction of the detected markers above which a search for misplaced markers starts.
         if self._count_misplaced_markers(result, shift) > max(2.0, 0.05 * len(markers)):
-            for _ in range(2):  # Rounds of that search.
+            for _ in range(2):  # Rounds of the search.
                 result, shift = self._iterate_by_marker(light, result, last, shift)
         return result
 
     def _count_misplaced_markers(self, result: EdgeRound, shift: Array) -> int:
-        """Count markers whose corners and most edges are not where the pose puts them. Unclear
-        edges alone do not count: small or half hidden markers have them, too.
+        """Counts markers whose corners and most edges are not where the pose puts them. Unclear
+        edges alone do not count, as small or half hidden markers have them, too.
         """
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
@@ -176,23 +197,23 @@ class EdgeRefinement:
         shift: Array,
         step: bool = True,
     ) -> tuple[EdgeRound, Array]:
-        """Run a round that allows each marker a shift and weights its edges by how well they fit
-        each other, not the pose. Otherwise misplaced pages would be rejected as outliers.
+        """Runs a round that allows a shift of each marker. Its edges are weighted by how well they
+        fit each other, not the pose, which would reject misplaced pages as outliers.
 
         Args:
             light: (H, W) image in linear light.
             last: previous round.
-            which: indices of edges.
-            shift: (M, 2) of each marker from where the pose puts it [pixels].
-            step: move the pose to the best fit of all markers.
+            which: indices of the edges.
+            shift: (M, 2) shift of each marker from its place by the pose [pixels].
+            step: whether to move the pose to the best fit of all markers.
 
         Returns:
-            The new round, or `last` if too few edges are left, and the shifts relative to its pose.
+            The new round, or `last` if too few edges are left; and (M, 2) the shifts relative to
+            the pose of that round.
         """
         max_shift = EDGE_MARGIN_PX / 2.0  # Pixels. The fit across an edge stays within the image.
         views = project_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
         marker = self._edges.marker[views.which]
-        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
         shift = np.clip(shift, -max_shift, max_shift)
         shifted_views = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, shifted_views, last.spread.blur)
@@ -203,11 +224,11 @@ class EdgeRefinement:
         weight = good.astype(float)
         for _ in range(WEIGHT_ROUNDS):
             information = weight / sd**2
-            rest = (
-                residuals_within_markers(normal, views.print, fits.offset, information, marker) / sd
+            residual = residuals_within_markers(
+                views.normal, views.print, fits.offset, information, marker
             )
-            weight = good * _tukey_weight(rest, good)
-        offset = fits.offset + (normal * shift[marker]).sum(axis=1)
+            weight = _robust_weights(residual / sd, good)
+        offset = fits.offset + (views.normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
         motion = _weighted_step(J / sd[:, None], offset / sd, weight) if step else np.zeros(7)
         middle = self._edges.p_SE[views.which].mean(axis=0)
@@ -220,48 +241,40 @@ class EdgeRefinement:
             residual=offset - J @ motion,
             sd=sd,
         )
-        return found, self._shifts_by_marker(found, found.residual)
+        return found, self._shifts_by_marker(found)
 
-    def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
-        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]; 0 for markers
-        without edges."""
-        views = found.views
-        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
-        marker = self._edges.marker[views.which]
-        information = found.weight / found.sd**2
-        G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
-        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
-        np.add.at(g, marker, (information * offset)[:, None] * normal)
+    def _shifts_by_marker(self, found: EdgeRound) -> Array:
+        """(M, 2) shifts of the markers by the residuals of their edges [pixels]; 0 for markers
+        without edges.
+        """
+        G, g = found.shift_equations(self._edges)
         G += np.eye(2) / MAX_EDGE_OFFSET_PX**2
         return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
     def with_disturbance(self, light: Single, last: EdgeRound) -> RefinedPose:
-        """The pose of the last round, corrected for marker shifts."""
-        found = self._disturbance(last)
+        """Corrects the pose of the last round for shifts of the markers."""
+        found = self._fit_disturbance(last)
         if replace(found.shifts, size=0.0) != MarkerShifts():
-            # Weights by how edges fit the pose leave out those that shifts move most, so that
+            # Weights by the fit to the pose leave out the edges with the largest shifts, so that
             # shifts look smaller than they are.
             last = self._fit_shifted(light, last, found)
-            found = self._disturbance(last)
+            found = self._fit_disturbance(last)
             good = has_expected_profile(last.fits)
-            last = replace(last, weight=good * _tukey_weight(found.residual / last.sd, good))
-            found = self._disturbance(last)
-        X_SC = perturbed_pose(last.X_SC, found.step)
+            last = replace(last, weight=_robust_weights(found.residual / last.sd, good))
+            found = self._fit_disturbance(last)
         covariance = found.covariance.copy()
-        covariance[:3, :3] += self._shift_by_blur(last)
-        covariance[3:, 3:] += found.mean_square_aspect * self._unknown_size(X_SC[:3, 3])
-        residual = last.residual - last.views.motion @ found.step
-        last = replace(last, X_SC=X_SC, covariance=covariance, residual=residual)
-        return RefinedPose(**vars(last), disturbance=found)
+        covariance[:3, :3] += self._blur_covariance(last)
+        last = _apply_disturbance(last, found)
+        covariance[3:, 3:] += found.mean_square_aspect * self._stretch_covariance(last.X_SC[:3, 3])
+        return RefinedPose(**vars(replace(last, covariance=covariance)), disturbance=found)
 
     def _fit_shifted(self, light: Single, last: EdgeRound, found: Disturbance) -> EdgeRound:
-        """Run a round that measures the edges at their shifted markers."""
-        rest = last.residual - last.views.motion @ found.step
-        there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
-        shift = self._shifts_by_marker(there, rest)
-        return self._iterate_by_marker(light, there, last.views.which, shift, step=False)[0]
+        """Runs a round that measures the edges at their shifted markers."""
+        last = _apply_disturbance(last, found)
+        shift = self._shifts_by_marker(last)
+        return self._iterate_by_marker(light, last, last.views.which, shift, step=False)[0]
 
-    def _disturbance(self, last: EdgeRound) -> Disturbance:
+    def _fit_disturbance(self, last: EdgeRound) -> Disturbance:
         return DisturbanceFit(
             last.views,
             last.residual,
@@ -271,23 +284,24 @@ class EdgeRefinement:
             self._intrinsics.height,
         ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
 
-    def _unknown_size(self, p_SC: Array) -> Array:
-        """(3, 3) covariance of the camera's position per relative stretch of the print along one
-        axis. The image shows neither which axis is right nor which part of the sheet is S's origin.
+    def _stretch_covariance(self, p_SC: Array) -> Array:
+        """(3, 3) covariance of the camera's position per squared relative stretch of the print
+        along one axis. The image does not show which axis has the right length, nor which part of
+        the sheet is at S's origin.
         """
         middle = np.r_[self._modes.middle, 0.0]
         arm = p_SC - middle
         return np.asarray(0.25 * (np.outer(arm, arm) + np.diag(middle**2)))
 
-    def _shift_by_blur(self, last: EdgeRound) -> Array:
+    def _blur_covariance(self, last: EdgeRound) -> Array:
         """(3, 3) covariance of the rotation that an asymmetric blur causes."""
         sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
-        # Square pixels of lens and pixel in a sharp image.
-        beyond = max(last.spread.variance - 0.5, 0.0)
+        # Square pixels. Lens and pixel alone cause 0.5 in a sharp image.
+        excess = max(last.spread.variance - 0.5, 0.0)
         # Shift by motion or defocus, as a fraction of the blur's standard deviation.
-        return np.asarray(0.04**2 * beyond * sideways @ sideways.T)
+        return np.asarray(0.04**2 * excess * sideways @ sideways.T)
 
-    def _first_spread(self, light: Single, X_SC: Array, which: Indices) -> LightSpread:
+    def _initial_spread(self, light: Single, X_SC: Array, which: Indices) -> LightSpread:
         """The initial blur under which the edges fit best."""
         candidates = np.tile(which[: FIRST_EDGES // len(INITIAL_BLURS)], len(INITIAL_BLURS))
         views = project_edges(self._edges, candidates, self._intrinsics, X_SC)
@@ -300,7 +314,7 @@ class EdgeRefinement:
         return LightSpread(INITIAL_BLURS[int(np.argmin(np.median(noise_by_blur, axis=1)))])
 
     def _missed_markers(self, result: EdgeRound, read: Booleans) -> Booleans:
-        """(N,) unread markers in the image whose position the pose predicts well enough."""
+        """(N,) markers in the image that were not read and that the pose predicts well enough."""
         at, variance = predict_pixels(
             self._corners, self._intrinsics, result.X_SC, result.covariance
         )
@@ -313,7 +327,7 @@ class EdgeRefinement:
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         read = np.unique(self._edges.marker[found])
-        share = 0.2 if len(read) >= 3 else 0.5  # of a marker's edges must have their profile
+        share = 0.2 if len(read) >= 3 else 0.5  # of a marker's edges must be good
         seen = np.asarray(good > share * np.maximum(np.bincount(marker, minlength=n), 1))
         seen[read] = True
         return np.flatnonzero(seen[self._edges.marker])
@@ -333,7 +347,7 @@ class EdgeRefinement:
         J = np.column_stack([views.motion, views.bloom])
         step, weight = _robust_step(J, fits.offset, sd, good)
         residual = fits.offset - J @ step
-        blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
+        blur = _updated_blur(spread.blur, views, fits.widening, weight > 0.5)
         bloom = float(np.clip(spread.bloom + step[6], -max_bloom, max_bloom))
         spread = LightSpread(blur, bloom)
         return EdgeRound(
@@ -349,14 +363,14 @@ class EdgeRefinement:
         )
 
     def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
-        """Covariance (6, 6) of a step, by the residuals' own scale.
+        """Covariance (6, 6) of a step, scaled by the residuals.
 
-        Model errors are correlated within a marker and count once per marker, not per edge.
+        Model errors are correlated within a marker: they count once per marker, not per edge.
         """
         total = weight.sum()
         markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
         scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
-        # Pixels. Part of the error that edges of one marker share.
+        # 0.006 pixels of error are common to the edges of a marker.
         shared_variance = max(total / max(markers, 1) - 1.0, 0.0) * 0.006**2
         J = np.column_stack([views.motion, views.bloom])
         J = J * np.sqrt(weight / (scale * sd**2 + shared_variance))[:, None]
@@ -364,15 +378,21 @@ class EdgeRefinement:
         return covariance
 
 
+def _apply_disturbance(last: EdgeRound, found: Disturbance) -> EdgeRound:
+    """The round with its pose and residuals corrected by the disturbance's step."""
+    residual = last.residual - last.views.motion @ found.step
+    return replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=residual)
+
+
 def _bloom_prior() -> Array:
-    """(7, 7) prior information about a step."""
+    """(7, 7) prior information about a step of pose (6,) and bloom."""
     prior = np.zeros((7, 7))
     prior[6, 6] = 1.0  # White may look larger on all sides, by about a pixel.
     return prior
 
 
-def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: Booleans) -> Array:
-    """(2, 2) updated blur, under which the edges fit better; unchanged along axes without edges."""
+def _updated_blur(blur: Array, views: EdgeViews, widening: Array, good: Booleans) -> Array:
+    """(2, 2) blur under which the edges fit better; unchanged along axes without edges."""
     n = views.across[good]
     n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
     across, information = widening[good].T
@@ -390,22 +410,22 @@ def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: Booleans)
 
 
 def _robust_step(motion: Array, offset: Array, sd: Array, good: Booleans) -> tuple[Array, Array]:
-    """Least squares with Tukey's weights: step (7,), pose and bloom, and weights (N,)."""
+    """Robust least squares: step (7,) of pose and bloom, and weights (N,) of the edges."""
     J, e = motion / sd[:, None], offset / sd
     weight = good.astype(float)
     step = _weighted_step(J, e, weight)
     for _ in range(WEIGHT_ROUNDS):
         rest = e - J @ step
-        weight = good * _tukey_weight(rest, good)
+        weight = _robust_weights(rest, good)
         step = _weighted_step(J, e, weight)
     return step, weight
 
 
-def _tukey_weight(rest: Array, good: Booleans) -> Array:
-    """(N,) weights of residuals (N,) by the spread of the good ones."""
-    scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
-    # 95 % efficiency on normal residuals.
-    return np.asarray(np.maximum(1.0 - (rest / (4.685 * scale)) ** 2, 0.0) ** 2)
+def _robust_weights(rest: Array, good: Booleans) -> Array:
+    """(N,) Tukey's weights of residuals (N,), by the standard deviation of the good ones; 0 for the
+    others.
+    """
+    return good * tukey_weights(rest / (TUKEY_LIMIT * robust_sd(rest[good])))
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:

@@ -13,7 +13,7 @@ from burg_drake.core import Array, Booleans, Bytes, Indices, Single, linear_leve
 from burg_drake.scene import MarkerLayout, marker_dictionary
 
 MIN_CELL_CONTRAST = 10.0
-"""Between black and white cells of a marker, in 8-bit levels."""
+"""Least contrast of black and white cells of a marker, in 8-bit levels."""
 
 
 def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimeter: float) -> Array:
@@ -22,7 +22,7 @@ def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimete
     Args:
         grey: (H, W) image.
         window: odd side of the neighbourhood whose mean is the threshold [pixels].
-        constant: least difference to that mean [8-bit levels].
+        constant: least difference to the mean [8-bit levels].
         perimeter: least length of a contour [pixels].
     """
     border = 3  # Pixels between corners and the image's border: OpenCV's value.
@@ -58,7 +58,7 @@ def find_dark_quadrilaterals(grey: Bytes, window: int, constant: float, perimete
 
 
 def read_cells(grey: Bytes, corners: Array, cells: int) -> tuple[Booleans, Array]:
-    """Read the black cells of quadrilaterals, in rows from the first corner toward the second.
+    """Reads the black cells of quadrilaterals, in rows from the first corner toward the second.
 
     Args:
         grey: (H, W) image.
@@ -96,8 +96,8 @@ def _from_unit_square(corners: Array, x: Array, y: Array) -> tuple[Single, Singl
 
 
 def _otsu_split(means: Array, shape: tuple[int, ...]) -> tuple[Booleans, Array]:
-    """Split each row of brightnesses where the between-class variance is largest (Otsu, A Threshold
-    Selection Method from Gray-Level Histograms, 1979).
+    """Splits each row of brightnesses where the between-class variance is largest (Otsu, A
+    Threshold Selection Method from Gray-Level Histograms, 1979).
     """
     ordered = np.sort(means, axis=1)
     count = np.arange(1, means.shape[1])
@@ -115,13 +115,13 @@ FIRST_SEARCH = ((13,), 15.0)
 MARKER_SEARCHES = (True, FIRST_SEARCH), (False, FIRST_SEARCH), (True, ((5, 21, 37), 5.0))
 """Use of the encoded image (or its linear light), windows and contrast of each search."""
 MIN_PERIMETER = 0.06
-"""Perimeter of a marker, at least, as a fraction of the image's longer side."""
+"""Least perimeter of a marker, as a fraction of the image's longer side."""
 MAX_BORDER_ERRORS = 0.35
 """Fraction of a marker's border cells that may be white: OpenCV's value."""
 MAX_BIT_CORRECTION = 0.6
 """Fraction of the correctable cells that may be wrong: OpenCV's value."""
 MIN_FOREIGN_MARKERS = 2
-"""Markers of another board that are not found by chance."""
+"""Least number of foreign markers that are not found by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +130,9 @@ class Detection:
 
     Attributes:
         index: (N,) indices into the layout's markers.
-        corners: (N, 4, 2) their corners, in the order of the layout's [pixels].
-        candidates: number of other squares that may be markers of another board.
-        duplicated: (M,) markers that were found at several places; not in `index`.
+        corners: (N, 4, 2) corners of these markers, in the layout's order [pixels].
+        candidates: number of other squares, which may be markers of another board.
+        duplicated: (M,) indices of markers that were found at several places; not in `index`.
     """
 
     index: Indices = field(default_factory=lambda: np.empty(0, dtype=np.intp))
@@ -142,7 +142,7 @@ class Detection:
 
     @property
     def count(self) -> int:
-        """Markers of the board that were read."""
+        """Number of the board's markers that were read."""
         return len(self.index) + len(self.duplicated)
 
 
@@ -153,14 +153,14 @@ class MarkerDetector:
         turned = [np.rot90(layout.black, -turns, axes=(1, 2)) for turns in range(4)]
         self._cells = layout.cells
         self._border = np.pad(np.zeros((layout.cells - 2,) * 2, bool), 1, constant_values=True)
-        # (4 N,) of markers turned clockwise by quarters.
+        # (4 N,) patterns of the markers, turned clockwise by quarter turns.
         self._patterns = _pack_bits(np.concatenate(turned)[:, ~self._border])
         correctable = marker_dictionary(layout.dictionary).maxCorrectionBits
         self._tolerance = int(MAX_BIT_CORRECTION * correctable)
-        self._sufficient_count = min(3, len(layout.ids))  # The first search suffices with as many.
+        self._sufficient_count = min(3, len(layout.ids))  # markers with which the search ends
 
     def detect(self, grey: Bytes) -> Detection:
-        """Find markers in an image (H, W). Markers that are found twice are left out."""
+        """Finds markers in an image (H, W). Markers that are found twice are left out."""
         found = Detection()
         for encoded, (windows, constant) in MARKER_SEARCHES:
             image = grey if encoded else linear_levels(srgb_to_linear(grey))
@@ -194,7 +194,7 @@ class MarkerDetector:
         return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()), twice)
 
     def _refined_corners(self, grey: Bytes, corners: Array) -> Array:
-        """Refine corners to the intersections of the sides' lines."""
+        """Refines corners to the intersections of the sides' lines."""
 
         if not len(corners):
             return corners
@@ -223,8 +223,10 @@ def side_lengths(corners: Array) -> Array:
 
 
 def _remove_duplicates(index: Indices, corners: Array) -> tuple[Indices, Array, Indices]:
-    """Merge duplicates: markers found at one place, by its largest quadrilateral, and markers found
-    at several.
+    """Removes duplicates: keeps the largest quadrilateral of a marker that was found at one place.
+
+    Returns:
+        Indices and corners of the markers at one place, and indices of markers at several places.
     """
     side, middle = side_lengths(corners), corners.mean(axis=1)
     order = np.lexsort((-side, index))
@@ -242,8 +244,8 @@ class ForeignMarkers:
     """Markers that do not belong to a board.
 
     Attributes:
-        dictionary: OpenCV's name of their dictionary, without `DICT_`.
-        ids: their numbers.
+        dictionary: OpenCV's name of the markers' dictionary, without `DICT_`.
+        ids: numbers of the markers.
     """
 
     dictionary: str
@@ -256,7 +258,7 @@ def format_ids(ids: tuple[int, ...] | list[int]) -> str:
 
 
 def no_markers_reason(grey: Bytes, layout: MarkerLayout, candidates: int) -> str:
-    """Explain why no marker of a board was found in an image (H, W)."""
+    """Explains why no marker of a board was found in an image (H, W)."""
     other = find_foreign_markers(grey, layout) if candidates else None
     if other is None:
         return "no marker of the board in sight"
@@ -270,7 +272,7 @@ def no_markers_reason(grey: Bytes, layout: MarkerLayout, candidates: int) -> str
 
 
 def misplaced_reason(count: int, fit: int) -> str:
-    """Explain that the markers are of another board, as only some are in their places."""
+    """Explains that the markers are of another board, as only some are in their places."""
     return (
         f"another board: only {fit} of {format_marker_count(count)} in sight are where this one"
         " has them; are columns, rows and first_id right?"
@@ -283,12 +285,12 @@ def format_marker_count(count: int) -> str:
 
 
 def find_foreign_markers(grey: Bytes, layout: MarkerLayout) -> ForeignMarkers | None:
-    """Find markers that a board does not have, of its dictionary and other common ones.
+    """Finds markers that a board does not have, of its dictionary and other common ones.
 
     Takes as long as eight detections.
 
     Returns:
-        The markers of the most frequent dictionary; None with fewer than `MIN_FOREIGN_MARKERS`.
+        The markers of the most frequent dictionary; None if fewer than `MIN_FOREIGN_MARKERS`.
     """
     # Dictionaries of other boards.
     others = ["ARUCO_MIP_36h12", "4X4_250", "5X5_250", "6X6_250", "7X7_250", "APRILTAG_36h11"]

@@ -35,15 +35,15 @@ SHIFT_SIGMAS: dict[str, tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class MarkerShifts:
-    """Standard deviations of marker shifts by their cause; 0 for a cause that is absent.
+    """Standard deviations of marker shifts by cause; 0 for an absent cause.
 
     Attributes:
-        marker: of single markers [pixels].
-        in_plane: along the sheet [m].
+        marker: of shifts of single markers [pixels].
+        in_plane: of shifts along the sheet [m].
         out_of_plane: of the sheet's height [m].
-        rows: while the rows of the image are exposed [pixels].
-        aspect: of the print's length along y for that along x [-].
-        size: of the markers for their distances [-].
+        rows: of the camera's motion while the image's rows are exposed [pixels].
+        aspect: of the ratio of the print's length along y to that along x [-].
+        size: of the ratio of the markers' size to their distances [-].
     """
 
     marker: float = MARKER_SIGMAS_PX[0]
@@ -59,18 +59,18 @@ class Disturbance:
     """A correction of a pose that accounts for marker shifts.
 
     Attributes:
-        step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
-        covariance: (6, 6) of it.
-        shifts: how large they are.
-        in_plane: largest shift along the sheet of a visible marker [m]. This and the following
-            fields are 0 where the residuals do not show such a shift beyond chance.
+        step: (6,) from the pose at which the edges were measured, see `perturbed_pose`.
+        covariance: (6, 6) of the step.
+        shifts: standard deviations of the shifts.
+        in_plane: largest shift of a visible marker along the sheet [m]. This and the following
+            shifts are 0 where the residuals do not show them beyond chance.
         out_of_plane: largest height of a visible marker [m].
         rows: root mean square motion of markers from the first to the last row of the image
             [pixels].
         aspect: excess length of the print along y over x [-].
         size: excess size of the markers relative to their distances [-].
-        mean_square_aspect: expected square of the excess length along y over x, whether it is
-            reported or not [-].
+        mean_square_aspect: expected square of the excess length along y over x, whether `aspect`
+            is reported or 0 [-].
         residual: (N,) offsets of all edges minus the most probable shifts [pixels].
     """
 
@@ -89,13 +89,13 @@ class Disturbance:
 class SheetModes:
     """Independent shift patterns of a board's edges. The first few explain nearly all variance.
 
-    The frame S of a sheet with errors is the one that fits all its markers best, so that a pattern
-    neither shifts nor turns the sheet as a whole.
+    The frame S of a sheet with errors is the frame that fits all its markers best. So a pattern
+    neither shifts nor turns the whole sheet.
 
     Attributes:
-        middle: (2,) of the markers [m].
-        in_plane: (N, 2, K) of shifts along x and y, of unit variance.
-        out_of_plane: (N, L) of heights, of unit variance.
+        middle: (2,) middle of the markers [m].
+        in_plane: (N, 2, K) patterns of shifts along x and y, of unit variance.
+        out_of_plane: (N, L) patterns of heights, of unit variance.
     """
 
     def __init__(self, p_SQ: Array, p_SE: Array) -> None:
@@ -111,7 +111,7 @@ class SheetModes:
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _covariance_modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
-        # Not only the markers' middles: a curling sheet rises most beyond the last middle.
+        # Corners, not only middles: a curling sheet rises most beyond the outermost middles.
         corners = p_SQ.reshape(-1, 3)
         # Metres within which heights are correlated.
         alike, between = _correlated_covariance(corners, p_SE, 0.14)
@@ -120,8 +120,8 @@ class SheetModes:
 
 
 def _correlated_covariance(points: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
-    """(M, M) covariance of shifts of points (M, 3), correlated within a distance [m], and (N, M)
-    interpolation of edge shifts from them.
+    """(M, M) covariance of shifts of points (M, 3), correlated within a distance [m]; and (N, M)
+    interpolation of shifts of edges (N, 3) from the shifts of the points.
     """
     covariance, to_edges = (
         np.exp(-((p[:, None] - points) ** 2).sum(axis=-1) / (2.0 * within**2))
@@ -136,21 +136,21 @@ def _covariance_modes(covariance: Array, whole: Array) -> Array:
     Q, _ = np.linalg.qr(whole)
     rest = np.eye(len(covariance)) - Q @ Q.T
     variance, patterns = np.linalg.eigh(rest @ covariance @ rest)
-    # Patterns of each kind of shift.
+    # At most 40 patterns of a kind of shift.
     kept = np.flatnonzero(variance > MIN_MODE_VARIANCE * variance[-1])[-40:]
     return np.asarray(patterns[:, kept] * np.sqrt(variance[kept]))
 
 
 @dataclass(frozen=True, eq=False)
 class _ShiftSolution:
-    """The pose step for one assumed size of the shifts.
+    """The pose step for assumed standard deviations of the shifts.
 
     Attributes:
         logarithm: log likelihood of the measurements, up to a constant.
-        shifts: assumed size of the shifts.
-        x, covariance: (K,) and (K, K) step of pose and bloom, then amplitudes of the shift
-            patterns.
-        columns: (K,) which columns of the full problem are used.
+        shifts: assumed standard deviations.
+        x: (K,) step of pose and bloom, then amplitudes of the shift patterns.
+        covariance: (K, K) of `x`.
+        columns: (K,) indices of the columns of the full problem that are used.
     """
 
     logarithm: float
@@ -164,10 +164,11 @@ class DisturbanceFit:
     """Fits shifts of markers to the edges of an image.
 
     Args:
-        views: edges as seen by a pose.
-        offset: (N,) of each from there [pixels].
-        information: (N,) inverse variance of each by the image's noise, 0 for excluded edges.
-        marker: (N,) marker that each edge belongs to.
+        views: edges as predicted by a pose.
+        offset: (N,) offset of each measured edge from the predicted one [pixels].
+        information: (N,) inverse variance of each offset by the image's noise, 0 for excluded
+            edges.
+        marker: (N,) index of each edge's marker.
         modes: patterns of shifts of the sheet.
         height: of the image [pixels].
     """
@@ -184,18 +185,18 @@ class DisturbanceFit:
         kept = information > 0.0
         used, belongs = np.unique(marker, return_inverse=True)
         self._kept, self._marker = kept, belongs
-        self._normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        self._normal = views.normal
         self._offset = offset
-        # sums of edges by marker, weighted
+        # Weighted sums over the edges of each marker.
         self._sums = np.zeros((len(used), len(belongs)))
         self._sums[belongs, np.arange(len(belongs))] = information
-        self._sums /= self._spread_within_markers(views, information)
+        self._sums /= self._variance_ratio_within_markers(views, information)
         self._modes = modes.in_plane[views.which], modes.out_of_plane[views.which]
         J = views.motion
         row = views.at[:, 1:] / height - 0.5
-        x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
+        x, y = modes.middle  # of the stretch: S is the frame that fits best
         strength = np.sqrt((J[kept] ** 2).mean(axis=0)) + 1e-9
-        # What the camera does from the first row to the last one moves each edge by [pixels].
+        # Pixels. Motion of each edge by the camera's motion from the first row to the last one.
         self._rolling_motion = J / strength / np.sqrt(6.0)
         parts = {
             "pose": np.column_stack([J, views.bloom]),
@@ -213,10 +214,10 @@ class DisturbanceFit:
         self._equations = {sd: self._normal_equations(sd) for sd in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
-        """Find the most probable shifts and the pose step they imply.
+        """Finds the most probable shifts and the pose step they imply.
 
         Args:
-            prior: (7, 7) information about the step of pose and bloom that is known before.
+            prior: (7, 7) prior information about the step of pose and bloom.
             center: standard deviation of the camera's principal point along u and v [pixels].
         """
         solved = {s: self._solve(s, prior) for s in map(MarkerShifts, MARKER_SIGMAS_PX)}
@@ -228,29 +229,29 @@ class DisturbanceFit:
             if better is best:
                 break
             best = better
-        return self._disturbance(best, list(solved.values()), center)
+        return self._build_disturbance(best, list(solved.values()), center)
 
-    def _by_marker(self) -> tuple[Array, Array]:
-        """(n, 2, 2) information about the shift of each marker, and (n, 2) right-hand sides."""
+    def _shift_equations(self) -> tuple[Array, Array]:
+        """(n, 2, 2) normal matrix of each marker's shift, and (n, 2) right-hand sides."""
         G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
         return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
 
-    def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
-        """Ratio of the offsets' variance within markers to that of the image's noise."""
+    def _variance_ratio_within_markers(self, views: EdgeViews, information: Array) -> float:
+        """Ratio of the offsets' variance within markers to the variance by the image's noise."""
         common_motions = np.column_stack([views.motion, views.bloom, views.print])
         rest = residuals_within_markers(
             self._normal, common_motions, self._offset, information, self._marker
         )
         markers = len(np.unique(self._marker[self._kept]))
         freedom = np.count_nonzero(self._kept) - 2 * markers - common_motions.shape[1]
-        if freedom < 5:  # Degrees of freedom from which on the spread is known.
+        if freedom < 5:  # too few degrees of freedom for an estimate
             return 1.0
         # Relative to noise; keeps probabilities finite.
         return float(max((information * rest**2).sum() / freedom, 1e-3))
 
     def _sum_equations(self) -> None:
         """Sum the normal equations over all edges and by marker."""
-        G, g = self._by_marker()
+        G, g = self._shift_equations()
         both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
         both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)
         self._G, self._shares = G, both  # (n, 2, 2), (n, 2, K + 1)
@@ -287,14 +288,14 @@ class DisturbanceFit:
             1 + (sds[k] == SHIFT_SIGMAS[k][-1] and len(SHIFT_SIGMAS[k]) > 1)
             for k in _present_kinds(shifts)
         )
-        # For each kind of shift; twice for its largest size.
+        # A penalty for each kind of shift, twice for the largest standard deviation of a kind.
         logarithm -= float(np.log(known).sum()) + 6.0 * penalty_count
         return _ShiftSolution(logarithm, shifts, x, covariance, columns)
 
-    def _disturbance(
+    def _build_disturbance(
         self, best: _ShiftSolution, solved: list[_ShiftSolution], center: float
     ) -> Disturbance:
-        """The best solution, with step and covariance averaged over all solutions by probability.
+        """The shifts of the best solution, and the step averaged over all solutions by probability.
         The step assumes the given principal point, so that the pose fits the image with it.
         """
         x = np.zeros(self._J.shape[1])
@@ -302,21 +303,21 @@ class DisturbanceFit:
         chosen = _present_kinds(best.shifts)
         for kind in SHIFT_SIGMAS:
             without = (s for s in solved if not _present_kinds(s.shifts) - (chosen - {kind}))
-            # Gain of log probability from which on a kind of shift is reported.
+            # A kind of shift is reported if it raises the log likelihood by 8.
             if best.logarithm - max(s.logarithm for s in without) < 8.0:
                 x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (
             x[self._columns[kind]] for kind in SHIFT_SIGMAS
         )
-        # Divides log probabilities: the patterns only approximate a real sheet.
+        # The division flattens the probabilities: the patterns only approximate a real sheet.
         weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / 4.0)
         weight /= weight.sum()
         aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
         steps = np.array([s.x[:6] for s in solved])
         step = weight @ steps
-        apart = steps - step
+        differences = steps - step
         covariance = np.einsum("s,sij->ij", weight, [s.covariance[:6, :6] for s in solved])
-        covariance += (apart * weight[:, None]).T @ apart
+        covariance += (differences * weight[:, None]).T @ differences
         A, _, _ = self._equations[best.shifts.marker]
         by_center = (best.covariance @ A[np.ix_(best.columns, self._columns["center"])])[:6]
         covariance += center**2 * by_center @ by_center.T
@@ -335,19 +336,19 @@ class DisturbanceFit:
 
 
 def residuals_within_markers(
-    normal: Array, alike: Array, offset: Array, information: Array, marker: Indices
+    normal: Array, common_motions: Array, offset: Array, information: Array, marker: Indices
 ) -> Array:
     """(N,) edge offsets that neither a shift of each marker nor changes common to all markers
     explain [pixels].
 
     Args:
         normal: (N, 2) directions of the offsets.
-        alike: (N, K) motion of edges by the common changes.
-        offset: (N,) of edges [pixels].
+        common_motions: (N, K) motion of the edges by each common change.
+        offset: (N,) offsets of the edges [pixels].
         information: (N,) inverse variance of each offset.
-        marker: (N,) that each belongs to.
+        marker: (N,) index of each edge's marker.
     """
-    seen = np.column_stack([alike, offset])
+    seen = np.column_stack([common_motions, offset])
     n = marker.max() + 1
     G, g = np.zeros((n, 2, 2)), np.zeros((n, 2, seen.shape[1]))
     weighted = information[:, None, None] * normal[:, :, None]
@@ -373,24 +374,24 @@ def _neighbouring_shifts(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
 
 
 MIN_SCALE_DEVIATION = 0.01
-"""Relative scale error that is reported; depth cameras err by as much."""
+"""Least deviation of the print's scale that is reported; depth cameras err by as much."""
 
 
 def wrong_marker_size(found: Disturbance, side: float) -> float:
-    """Size of the markers relative to their distances if lighting cannot explain it and this is
-    another board; 1 otherwise.
+    """Size of the markers relative to their distances if they belong to another board, as light
+    cannot explain that size; 1 otherwise.
 
     Args:
-        found: in the image.
-        side: of a marker in the image [pixels].
+        found: disturbance in the image.
+        side: side of a marker in the image [pixels].
     """
-    # Pixels. Shift of a marker's outline that overexposure may cause.
-    other = abs(found.size) > 0.015 and abs(found.size) * side / 2.0 > 0.5
-    return 1.0 + found.size if other else 1.0
+    # Overexposure may shift a marker's outline by half a pixel.
+    is_other_board = abs(found.size) > 0.015 and abs(found.size) * side / 2.0 > 0.5
+    return 1.0 + found.size if is_other_board else 1.0
 
 
 def implausible_reason(found: Disturbance) -> str:
-    """Explain why no print of the board can look like that; empty if it can."""
+    """Explains why no print of the board can look like that; empty if it can."""
     if abs(found.aspect) > 0.05:
         return (
             f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
@@ -405,7 +406,7 @@ def implausible_reason(found: Disturbance) -> str:
 
 
 def print_doubt(found: Disturbance) -> str:
-    """Describe doubts about the print, its flatness, or camera motion; empty if there are none."""
+    """Describes doubts about the print, its flatness, or camera motion; empty if there are none."""
     if abs(found.aspect) > 0.003:
         return (
             f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"
@@ -443,8 +444,8 @@ def scale_by_depth(
 
     Args:
         p_SQ: (..., 3) points of the board that are in sight [m].
-        intrinsics: of the depth image too.
-        X_SC: (4, 4) pose that the image gives with the document's size.
+        intrinsics: of the camera and its depth image.
+        X_SC: (4, 4) pose that the image gives if the print has the document's size.
         depth: (H, W) distance along the optical axis [m]; 0, NaN or infinite where unknown.
     """
     p_C = (p_SQ.reshape(-1, 3) - X_SC[:3, 3]) @ X_SC[:3, :3]

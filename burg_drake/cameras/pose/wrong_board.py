@@ -30,7 +30,7 @@ class WrongBoardCheck:
     Args:
         board: of the document.
         intrinsics: of the camera.
-        scale: size of the print against the document along x and y.
+        scale: size of the print relative to the document along x and y.
     """
 
     def __init__(self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float]) -> None:
@@ -48,7 +48,7 @@ class WrongBoardCheck:
         last_pixel = intrinsics.width - 1, intrinsics.height - 1
         corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * last_pixel
         slopes = (intrinsics.undistort(corners) - intrinsics.center) / intrinsics.focal
-        # Largest slope of a ray that is used, relative to the image's corners.
+        # Largest slope of a used ray: 2 % more than at the image's corners.
         self._max_slope = 1.02 * float(np.linalg.norm(slopes, axis=1).max())
         cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
         # Middles of the border's cells, and the white beside them, in half sides.
@@ -60,7 +60,7 @@ class WrongBoardCheck:
         self._blank_offsets = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
     def describe_foreign_markers(self, grey: Bytes, light: Single, X_SC: Array) -> str:
-        """Describe markers around the grid, where the document has none.
+        """Describes markers around the grid, where the document has none.
 
         Args:
             grey: (H, W) image.
@@ -70,15 +70,14 @@ class WrongBoardCheck:
         Returns:
             A message, empty if there are none.
         """
-        min_foreign = 2  # Markers beyond the document's that show another board.
+        min_foreign = 2  # Markers outside the document's grid that prove another board.
         at, seen = self._project_places(X_SC, self._outer_places, self._border_offsets)
         if not seen.any():
             return ""
         values = _sample_light(light, at[seen])
-        # Fraction of the light of the white frame.
-        darker = (values[:, :4] < 0.6 * values[:, 4:]).sum(axis=1)
-        # Sides of four that must look like a marker's border.
-        suspects = self._outer_places[seen][darker >= 3]
+        # Sides on which the border is darker than 0.6 of the light of the white frame.
+        dark_sides = (values[:, :4] < 0.6 * values[:, 4:]).sum(axis=1)
+        suspects = self._outer_places[seen][dark_sides >= 3]
         ids = self._read_ids(grey, X_SC, suspects) if len(suspects) >= min_foreign else []
         if len(ids) < min_foreign:
             return ""
@@ -89,7 +88,7 @@ class WrongBoardCheck:
         )
 
     def describe_blank_line(self, light: Single, X_SC: Array, used: Indices) -> str:
-        """Describe a row or column that should have markers but is blank paper.
+        """Describes a row or column that should have markers but is blank paper.
 
         Args:
             light, X_SC: see `describe_foreign_markers`.
@@ -131,9 +130,9 @@ class WrongBoardCheck:
         if not in_image.any():
             return False
         paper = np.median(_sample_light(light, white[in_image]), axis=1)
-        # Light falls unevenly: the paper beside the nearest markers that are in sight counts.
-        away = self._marker_places[which][seen][:, None] - self._marker_places[used][in_image]
-        nearest = paper[(away**2).sum(axis=2).argmin(axis=1)]
+        # As light is uneven, compare with the paper beside the nearest visible marker.
+        offset = self._marker_places[which][seen][:, None] - self._marker_places[used][in_image]
+        nearest = paper[(offset**2).sum(axis=2).argmin(axis=1)]
         return bool((np.abs(values - nearest[:, None]) < max_difference * nearest[:, None]).all())
 
     def _blank_line_reason(self, across: bool, line: int, first: int, last: int) -> str:
@@ -155,7 +154,7 @@ class WrongBoardCheck:
 
         Args:
             X_SC: (4, 4).
-            middles: (N, 2) places [m].
+            middles: (N, 2) middles of the places [m].
             offsets: (M, 2) of the points [half sides of a marker].
         """
         p_S = np.zeros((len(middles), len(offsets), 3))
@@ -171,7 +170,7 @@ class WrongBoardCheck:
         return at, seen.all(axis=1)
 
     def _read_ids(self, grey: Bytes, X_SC: Array, middles: Array) -> list[int]:
-        """Unique ids of upright markers at places (N, 2)."""
+        """Ids of the upright markers at places (N, 2)."""
         at, _ = self._project_places(X_SC, middles, CORNER_DIRECTIONS)
         black, _ = read_cells(grey, at, self._layout.cells)
         border = np.pad(np.zeros((self._layout.cells - 2,) * 2, bool), 1, constant_values=True)
