@@ -31,7 +31,6 @@ from burg_drake.motion.ball_tree import (
     BallTrees,
     BodyBalls,
     bodies_with_shape,
-    hull_vertices,
 )
 from burg_drake.motion.self_clearance import (
     ClearanceTable,
@@ -41,7 +40,7 @@ from burg_drake.motion.self_clearance import (
     SelfClearance,
     collision_pairs,
 )
-from burg_drake.station import StationDiagram
+from burg_drake.station import StationDiagram, hull_vertices
 
 BALL_ARRAYS = ("center", "outer", "inner")
 """Arrays of `Balls`."""
@@ -156,7 +155,7 @@ class ArmShape:
         if key not in _kept:
 
             def make() -> Arrays:
-                trees = BallTrees.of(station_diagram, links)
+                trees = BallTrees.from_diagram(station_diagram, links)
                 return shape_to_arrays(
                     trees, SelfClearance.of(station_diagram, links, trees, limits)
                 )
@@ -198,7 +197,7 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
         case Box():
             sizes = shape.size().tolist()
         case Convex() | Mesh():
-            sizes = hull_vertices(inspector, geometry)
+            sizes = hull_vertices(shape)
         case _:
             sizes = []  # unknown shape; `cover_body` raises an error
     return [type(shape).__name__, sizes]

@@ -85,7 +85,7 @@ class DisplacementBound:
     def _from_axes(self, q: Array) -> Array:
         """(n, K) largest distance from each joint's axis to a point of the bodies beyond it."""
         poses = self._links.poses(q)
-        centers = self._trees.roots_placed(poses)
+        centers = self._trees.body_ball_centers(poses)
         largest = np.zeros((len(self._links.turns), len(q)))
         for i, turns in enumerate(self._links.turns):
             if turns:
@@ -216,7 +216,7 @@ class ArmProximity:
 
     def _bounds(self, q: Array, hand: bool) -> tuple[Single, Single]:
         poses = self.links.poses(q)
-        centers = self._trees.roots_placed(poses)
+        centers = self._trees.body_ball_centers(poses)
         counted = self._moving if hand else self._arm
         bound = self.field.lower_at(centers[:, counted]) - self._radius[counted]
         row, which = np.nonzero(bound < Bounding.refine_below)
@@ -237,7 +237,7 @@ class ArmProximity:
         for start in range(0, len(which), Bounding.chunk_size):
             part = slice(start, start + Bounding.chunk_size)
             k, at = which[part], node[part]
-            places = trees.placed(at, poses, k)
+            places = trees.node_ball_centers(at, poses, k)
             bound = self.field.lower_at(places) - trees.outer.take(at, axis=1)
             if trees.child[0, at[0]] >= 0:
                 i, f = np.nonzero(bound < Bounding.refine_below)

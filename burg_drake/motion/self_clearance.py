@@ -39,10 +39,9 @@ from burg_drake.motion.arm_links import ArmLinks, LinkPoses
 from burg_drake.motion.ball_tree import (
     BallTrees,
     BodyBalls,
-    hull_vertices,
     unsupported_shape_error,
 )
-from burg_drake.station import StationDiagram
+from burg_drake.station import StationDiagram, hull_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +158,7 @@ def _core(inspector: SceneGraphInspector, geometry: GeometryId) -> _Core:
             signs = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
             return _Core(signs * shape.size())
         case Convex() | Mesh():
-            return _Core(hull_vertices(inspector, geometry))
+            return _Core(hull_vertices(shape))
     raise unsupported_shape_error(inspector, geometry)
 
 
@@ -482,7 +481,9 @@ class SelfClearance:
         for start in range(0, len(which), chunk_size):
             part = slice(start, start + chunk_size)
             k, a, b = which[part], one[part], two[part]
-            gap = trees.placed(a, poses, k)[:, :, None] - trees.placed(b, poses, k)[:, None]
+            centers_a = trees.node_ball_centers(a, poses, k)
+            centers_b = trees.node_ball_centers(b, poses, k)
+            gap = centers_a[:, :, None] - centers_b[:, None]
             distance = _norm(gap)
             bound = distance - (trees.outer[:, a][:, None] + trees.outer[:, b][None])
             below = trees.child[0, a[0]] >= 0

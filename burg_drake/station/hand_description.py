@@ -15,6 +15,7 @@ from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.scene import convex_polygon, polygon_area
 from burg_drake.station.hand_document import Finger, Hand
 from burg_drake.station.station_diagram import FloatingHand, StationDiagram
+from burg_drake.station.visible_triangles import hull_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,9 +334,7 @@ class _HandReader:
                 size = (shape.radius(), shape.length())
                 return HandShape(name, "cylinder", X_BC, size, none, friction)
             case Convex() | Mesh():
-                hull = inspector.GetConvexHull(geometry)
-                points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-                return HandShape(name, "mesh", X_BC, (), points, friction)
+                return HandShape(name, "mesh", X_BC, (), hull_vertices(shape), friction)
         raise self._error(
             f"collision geometry {name!r} is a {type(shape).__name__}; supported are"
             " boxes, spheres, cylinders and meshes (as their convex hulls)"

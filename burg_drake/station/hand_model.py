@@ -43,6 +43,7 @@ from burg_drake.station.model_file import (
     without_hydroelastic,
 )
 from burg_drake.station.station_document import Station
+from burg_drake.station.visible_triangles import hull_vertices
 
 STALL_FORCE_RATIO = 1.25
 """Servo force at standstill over grip force; above 1, the finger presses with the limit."""
@@ -413,9 +414,7 @@ class _HandBench:
         X_BC = self._inspector.GetPoseInFrame(geometry).GetAsMatrix4()
         shape = self._inspector.GetShape(geometry)
         if isinstance(shape, (Mesh, Convex)):
-            hull = self._inspector.GetConvexHull(geometry)
-            p_CV = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-            return transform_points(X_GB @ X_BC, p_CV)
+            return transform_points(X_GB @ X_BC, hull_vertices(shape))
         box = self._inspector.GetObbInGeometryFrame(geometry)
         corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * box.half_width()
         return transform_points(X_GB @ X_BC @ box.pose().GetAsMatrix4(), corners)
