@@ -35,7 +35,7 @@ from burg_drake.motion.hand_sweep import HandSweep, SweepResult
 from burg_drake.motion.home_posture import require_free_home
 from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.ik_solutions import IkRoutine, RoutineSolutions
-from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_poses import HandPath
 from burg_drake.motion.line_search import LineSearch, SuccessiveLineSearch
 from burg_drake.motion.motion_search import GraspBatch, MotionSearch
 from burg_drake.motion.motion_settings import ReachSettings
@@ -288,8 +288,8 @@ class ArmReach:
         self._sweep = HandSweep(scene, station, self.motion)
         X_WA = arm.X_WA.matrix()
         self._X_AW = inverse(X_WA)
-        self._lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
-        self._search = _line_search(self, self._proximity, self._lines, home, ik)
+        self._hand_path = HandPath.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
+        self._search = _line_search(self, self._proximity, self._hand_path, home, ik)
         self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
@@ -394,13 +394,13 @@ class ArmReach:
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
             self._searches[height] = self._search.lifted(height)
-        size = min(GRASPS_PER_BATCH, max_poses // len(replace(self._lines, lift=height).layers))
+        size = min(GRASPS_PER_BATCH, max_poses // len(replace(self._hand_path, lift=height).layers))
         for k in range(0, len(left), size):
             part = left[k : k + size]
             X_WG, clearance = paths.X_both[part], hand.clearance[part]
-            lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
-            task = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
-            verdicts = MotionSearch(task, lines, self._tree, self.settings).run()
+            search = self._searches[height].begin(self._X_AW @ X_WG, clearance)
+            grasps = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
+            verdicts = MotionSearch(grasps, search, self._tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None
                 found[index] = replace(verdict, lift=height) if reached else verdict
@@ -408,8 +408,8 @@ class ArmReach:
 
 
 def _with_swapped_fingers(X_WG: Array, X_AW: Array) -> Array:
-    """(N, 2, 4, 4) grasps in the world and their twins with swapped fingers, in the same order
-    whichever of the two was given."""
+    """(N, 2, 4, 4) both finger assignments of grasps in the world, in an order that does not depend
+    on which of the two is given."""
     twins = np.stack([X_WG, swap_fingers(X_WG)], axis=1)
     closing_A = (X_AW[:3, :3] @ X_WG[:, :3, :1])[..., 0]
     largest = np.take_along_axis(closing_A, np.abs(closing_A).argmax(axis=1)[:, None], axis=1)
@@ -421,7 +421,7 @@ def _with_swapped_fingers(X_WG: Array, X_AW: Array) -> Array:
 def _line_search(
     reach: ArmReach,
     proximity: ArmProximity,
-    lines: LinePoses,
+    hand_path: HandPath,
     home: Array,
     routine: IkRoutine | None,
 ) -> LineSearch:
@@ -430,14 +430,14 @@ def _line_search(
     margin = settings.limit_margin
     if routine is not None:
         return NumericLineSearch(
-            *(arm, lines, proximity, home, settings),
+            *(arm, hand_path, proximity, home, settings),
             solutions=RoutineSolutions(arm, routine, margin),
             unlimited_solutions=RoutineSolutions(arm, routine, margin, limited=False),
         )
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:
-        return NumericLineSearch(arm, lines, proximity, home, settings)
-    rest = lines, proximity, home
+        return NumericLineSearch(arm, hand_path, proximity, home, settings)
+    rest = hand_path, proximity, home
     few = replace(settings, starts=settings.starts[:1])  # more found nothing more in 3,000 grasps
     return SuccessiveLineSearch(
         ClosedFormLineSearch(arm, ik.within(margin), *rest, settings),
