@@ -26,7 +26,7 @@ class HandParts:
     Attributes:
         shapes: the parts, in the grasp frame G.
         half: (H, 3) half extents of their bounding boxes [m].
-        radius: (H,) of their bounding spheres [m].
+        radius: (H,) radii of their bounding spheres [m].
         X_HG: (H,) poses of G in the parts' frames.
         is_box: (H,) whether a part is a box.
     """
@@ -62,7 +62,7 @@ class Body:
 
     Args:
         X_WB: (4, 4) pose of the body.
-        pieces: at least one, in the body's frame.
+        pieces: its convex pieces in the body's frame, at least one.
 
     Attributes:
         X_WB: the pose.

@@ -27,7 +27,7 @@ class SceneBoxes:
 
     Args:
         hand: convex parts of the open hand.
-        bodies: at least one.
+        bodies: the bodies, at least one.
 
     Attributes:
         X_BW: (B,) poses of the world in the bodies.
@@ -106,7 +106,7 @@ class _NearestSearch:
 
     Args:
         X_WG: N grasps at which the hand overlaps nothing.
-        boxes: of the scene, which has at least one body.
+        boxes: boxes of the scene, which has at least one body.
 
     Attributes:
         nearest, distance: (N,) indices of the nearest bodies found so far and their distances [m].
@@ -201,7 +201,7 @@ class HandScreen:
 
     Args:
         hand: convex parts of the open hand, in the grasp frame.
-        bodies: by name.
+        bodies: the bodies of the scene by name.
 
     Attributes:
         bodies: the bodies.

@@ -76,9 +76,9 @@ def read_shapes(
         station_diagram: the diagram to read.
         plant_context: the plant's part of a Context in which the open hand's grasp frame is the
             world.
-        query: of the scene graph in that Context.
+        query: geometry queries of the scene graph in that Context.
         body_of: bodies of the geometries, see `filter_hand_pairs`.
-        names: of the bodies.
+        names: names of the bodies.
 
     Returns:
         Shapes of the open hand in the grasp frame, and bodies by name.

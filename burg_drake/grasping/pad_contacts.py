@@ -190,7 +190,7 @@ class Contacts:
         touching: (N,) whether both pads touch, facing each other; all other arrays are NaN if not.
         p_OC: (N, 2, 3) centres of pressure on the object's surface [m].
         normal: (N, 2, 3) mean inward normals in the object frame, weighted by pressure; unit.
-        area: (N, 2) of the patches, as the pad's face sees them [m^2].
+        area: (N, 2) areas of the patches, as the pad's face sees them [m^2].
         torsion_radius: (N, 2) mean distance from the centre of pressure, weighted by pressure [m].
             Times normal force and friction it is the torque that turns the patch in place.
         indentation: (N, 2) largest indentations of the pads [m].
@@ -220,7 +220,7 @@ def grasp_contacts(surface: Surface, X_OG: Array, jaws: Jaws = PANDA_JAWS) -> Co
     open pad is inside the object, are ignored.
 
     Args:
-        surface: of the object, in its frame O.
+        surface: surface of the object, in its frame O.
         X_OG: (N, 4, 4) grasps.
         jaws: the hand.
     """
@@ -396,11 +396,11 @@ def slide_to_rest(
     """Lets objects slide until they need less friction than there is.
 
     Args:
-        surface: of the object.
+        surface: surface of the object.
         X_OG: (N, 4, 4) grasps.
         jaws: the hand.
         friction: coefficient.
-        contacts: of these grasps, before sliding.
+        contacts: contacts of the grasps before sliding.
 
     Returns:
         Contacts at rest, and sliding distances (N,) [m]: 0 if the pads hold at once; NaN unless

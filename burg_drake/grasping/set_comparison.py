@@ -89,12 +89,12 @@ class Nearest:
     """For each grasp of a set, the nearest grasp of another set.
 
     Attributes:
-        index: (N,) in the other set, see `find_nearest` for ties; -1 if it has no grasp of that
-            object. Distance, translation and angle are infinite then.
+        index: (N,) indices in the other set, see `find_nearest` for ties; -1 if it has no grasp of
+            that object. Distance, translation and angle are infinite then.
         distance: (N,) combined distance [m].
         translation: (N,) [m].
         angle: (N,) modulo the swap of the fingers [rad].
-        lever: of the combined distance [m/rad].
+        lever: lever of rotations in the combined distance [m/rad].
         version: `DISTANCE_VERSION`.
     """
 
@@ -198,8 +198,8 @@ class Distribution:
     Attributes:
         count: number of finite values.
         missing: number of other values.
-        mean: of the finite values; NaN if there are none.
-        quantiles: at `DISTRIBUTION_QUANTILES`, from smallest to largest; NaN if there are none.
+        mean: mean of the finite values; NaN if there are none.
+        quantiles: values at `DISTRIBUTION_QUANTILES`, rising; NaN if there are none.
     """
 
     count: int
@@ -223,7 +223,7 @@ class ObjectSummary:
         duplicates: number of grasps that equal another grasp of the same object and instance.
         neighbour: distances to the nearest other grasp [m], see `neighbour_distances`.
         width: distance of the contacts [m].
-        score: of the grasps.
+        score: scores of the grasps.
     """
 
     grasps: int

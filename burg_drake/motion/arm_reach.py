@@ -54,7 +54,7 @@ class HandVerdicts:
 
     Attributes:
         blocked_by: (N, 2) verdict that names the first obstacle; None where the hand is free.
-        clearance: (N, 2) of the hand on its path, negative where it is not free [m].
+        clearance: (N, 2) clearance of the hand on its path, negative where it is not free [m].
     """
 
     blocked_by: NDArray[np.object_]
@@ -75,7 +75,7 @@ class HandVerdicts:
         return verdict
 
     def record(self, flip: int, rows: Indices, sweep: SweepResult, outcome: Outcome) -> None:
-        """Enters the sweep of grasps (S,) with one finger assignment."""
+        """Enters the result of the sweep of grasps `rows` (S,) with one finger assignment."""
         blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
         room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
         self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
@@ -111,23 +111,23 @@ class HandPaths:
         """Checks approach and retreat."""
         shape = self.X_both.shape[:2]
         found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
-        for name, flip, at in self._to_check(found):
-            sweep = self.sweep.approach(name, self.X_both[at, flip])
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_APPROACH)
-        for name, flip, at in self._to_check(found) if self.retreats else ():
-            sweep = self.sweep.retreat(name, self.X_both[at, flip], self.width[at])
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_RETREAT)
+        for name, flip, rows in self._list_checks(found):
+            sweep = self.sweep.approach(name, self.X_both[rows, flip])
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_APPROACH)
+        for name, flip, rows in self._list_checks(found) if self.retreats else ():
+            sweep = self.sweep.retreat(name, self.X_both[rows, flip], self.width[rows])
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_RETREAT)
         return self._copy_if_symmetric(found)
 
     def check_lift(self, before: HandVerdicts, height: float) -> HandVerdicts:
         """Checks the lift to a height [m], too."""
         found = before[np.arange(len(before.blocked_by))]
-        for name, flip, at in self._to_check(found):
-            sweep = self.sweep.lift(name, self.X_both[at, flip], self.width[at], height)
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_LIFT)
+        for name, flip, rows in self._list_checks(found):
+            sweep = self.sweep.lift(name, self.X_both[rows, flip], self.width[rows], height)
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_LIFT)
         return self._copy_if_symmetric(found)
 
-    def _to_check(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
+    def _list_checks(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
         """Targets, finger assignments, and indices of the grasps that are free so far."""
         flips = (0,) if self.sweep.symmetric else (0, 1)
         free = found.clearance >= 0.0
@@ -152,22 +152,22 @@ LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether rows (S,) are free up to a level."""
 
 
-def lift_heights(least: float, most: float) -> Array:
-    """Heights to try, rising from `least` to `most` in steps of 1 cm [m]."""
-    rising = np.arange(least, most - 1e-9, 0.01)
+def lift_heights(shortest: float, whole: float) -> Array:
+    """Heights to try, rising from `shortest` to `whole` in steps of 1 cm [m]."""
+    rising = np.arange(shortest, whole - 1e-9, 0.01)
     rising[1:] = np.round(rising[1:], 9)  # sums of steps have rounding errors
-    return np.append(rising, most)
+    return np.append(rising, whole)
 
 
 def raise_lifts(
-    whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
+    whole: Sequence[Reach], heights: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
     """Searches the largest free lift of grasps for which the whole lift is not free.
 
     Args:
         whole: N verdicts with the whole lift.
-        tried: (H,) rising heights; the last is the whole lift [m].
-        judge: gives verdicts at other heights.
+        heights: (H,) rising heights; the last is the whole lift [m].
+        judge: judges grasps at other heights.
         hand_is_free: checks the hand alone at other heights.
 
     Returns:
@@ -182,34 +182,34 @@ def raise_lifts(
         Outcome.JOINT_LIMIT,
     )
     found = list(whole)
-    asked = _true_indices(
+    grasps = _true_indices(
         reach.outcome is not None and reach.outcome not in height_independent for reach in whole
     )
-    low, high = np.full(len(asked), -1), np.full(len(asked), len(tried) - 1)
+    low, high = np.full(len(grasps), -1), np.full(len(grasps), len(heights) - 1)
 
-    def reached(level: int, rows: Indices) -> Booleans:
-        verdicts = judge(tried[level], asked[rows])
-        for k, reach in zip(asked[rows], verdicts, strict=True):
+    def is_reachable(level: int, rows: Indices) -> Booleans:
+        verdicts = judge(heights[level], grasps[rows])
+        for k, reach in zip(grasps[rows], verdicts, strict=True):
             if reach.outcome is None:
                 found[k] = replace(reach, blocker=whole[k].blocker)
             elif level == 0:
                 found[k] = reach
         return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
 
-    by_hand = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in asked)
+    by_hand = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in grasps)
     free, _ = _bisect_levels(
         low[by_hand],
         high[by_hand],
-        lambda level, rows: hand_is_free(tried[level], asked[by_hand[rows]]),
+        lambda level, rows: hand_is_free(heights[level], grasps[by_hand[rows]]),
     )
     # The arm can often lift as high as the hand alone.
-    guess = np.full(len(asked), -1)
+    guess = np.full(len(grasps), -1)
     guess[by_hand] = np.maximum(free, 0)
     high[by_hand] = guess[by_hand] + 1
-    low, high = _narrow_levels(low, high, guess, reached)
+    low, high = _narrow_levels(low, high, guess, is_reachable)
     # If the lowest height is not free, no height is.
-    low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), reached)
-    _bisect_levels(low, high, reached)
+    low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), is_reachable)
+    _bisect_levels(low, high, is_reachable)
     return found
 
 
@@ -353,8 +353,8 @@ class ArmReach:
         whole = judge(motion.lift_height, np.arange(len(X)))
         if motion.shortest >= motion.lift_height:
             return whole
-        tried = lift_heights(motion.shortest, motion.lift_height)
-        return raise_lifts(whole, tried, judge, hand_is_free)
+        heights = lift_heights(motion.shortest, motion.lift_height)
+        return raise_lifts(whole, heights, judge, hand_is_free)
 
     def path_is_free(
         self,

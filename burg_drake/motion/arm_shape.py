@@ -127,7 +127,7 @@ class ArmShape:
 
     Attributes:
         links: its kinematics.
-        limits: (n, 2) of the joints' positions [rad or m].
+        limits: (n, 2) limits of the joints' positions [rad or m].
         trees: balls that cover it.
         itself: its clearance from itself.
         content: hash of the inputs.

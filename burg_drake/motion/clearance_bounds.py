@@ -58,7 +58,7 @@ class DisplacementBound:
     Args:
         links: the arm.
         trees: balls that cover it and its hand.
-        limits: (n, 2) of the joints' positions [rad or m].
+        limits: (n, 2) limits of the joints' positions [rad or m].
     """
 
     def __init__(self, links: ArmLinks, trees: BallTrees, limits: Array) -> None:

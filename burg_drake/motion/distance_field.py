@@ -106,7 +106,7 @@ class HullSolid:
 
     Attributes:
         normals: (F, 3) outward unit normals.
-        offsets: (F,) of its faces' planes [m].
+        offsets: (F,) offsets of its faces' planes [m].
         vertices: (V, 3) [m].
         bulge: how far the true shape may stick out of the faces [m].
     """

@@ -27,9 +27,9 @@ class PathChecks:
     through straight from row to row.
 
     Attributes:
-        transfer: with the hand open and empty.
-        approach: with the hand open and empty, near the target.
-        lift, retreat: with the target in the hand.
+        transfer: check with the hand open and empty.
+        approach: check with the hand open and empty, near the target.
+        lift, retreat: checks with the target in the hand.
     """
 
     transfer: IsFree | None = None

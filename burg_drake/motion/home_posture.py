@@ -19,7 +19,7 @@ class HomeClearance:
     """Clearance of the arm at home from the scene and from itself.
 
     Attributes:
-        distance: of the nearest pair of bodies, at most 1 [m].
+        distance: distance of the nearest pair of bodies, at most 1 [m].
         link, other: their names; empty if no pair is within 1 m.
     """
 

@@ -228,7 +228,7 @@ def time_line(
     Args:
         rows: (K, n) joint positions at waypoints of the line.
         kinematics: the arm.
-        limits: of its joints.
+        limits: limits of its joints.
         hand: limits of the hand.
         settings: tolerances.
         is_free: the collision check of everything but the polyline of the rows.

@@ -33,7 +33,7 @@ class ReachLayer:
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
             that cover the board.
-        height: of the middle between the pads above the board [m].
+        height: height of the middle between the pads above the board [m].
         yaw: (K,) rotations of the hand about the vertical [rad], over half a turn: the other half
             are the same grasps with the fingers swapped.
         reached: (Y, X, K) whether the arm can execute the grasp.
@@ -83,7 +83,7 @@ def reach_from_above(
     Args:
         station: arm, hand, obstacles, and the hand's approach, retreat and lift.
         board: A2 if None.
-        height: of the grasps above the board [m].
+        height: height of the grasps above the board [m].
         spacing: largest distance between neighbouring points [m].
         yaws: number of yaw angles, evenly over half a turn.
 

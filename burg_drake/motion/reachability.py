@@ -97,7 +97,7 @@ class ReachabilityMap:
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
             that cover the board.
-        heights: (Z,) of the points above the board [m].
+        heights: (Z,) heights of the points above the board [m].
         tilt: (K,) angle of each orientation's approach direction from straight down [rad].
         R_WG: (K, 3, 3) orientations of the grasp frame in the world.
         reached: (Z, Y, X, K) whether the arm reaches an orientation.

@@ -1,8 +1,8 @@
 """The arm's trial: servos follow a plan to the grasp, the hand closes, the arm lifts and holds.
 
 The arm starts at rest at the pregrasp, or at home if it also executes the transfer. Outcomes and
-margins are those of the hand's trial, and how well the arm followed its command, and what it
-pushed before the hand closed.
+margins are those of the hand's trial, with two more: how well the arm followed its commands, and
+what it pushed before the hand closed.
 """
 
 from __future__ import annotations
@@ -98,11 +98,11 @@ class ArmCarrier:
     desired at its end.
 
     Args:
-        world: of a trial with an arm, prepared for its start.
+        world: world of a trial with an arm, prepared for its start.
         target: the grasped body.
-        approach: from the pregrasp, or from further back, to the grasp.
-        segments: from the grasp on, at least one; the hand moves straight on each.
-        closed: how far the fingers can close at a grasp (4, 4) in the world before contact.
+        approach: commands from the pregrasp, or from further back, to the grasp.
+        segments: commands of each straight segment from the grasp on, at least one.
+        closed: returns how far the fingers can close at a grasp (4, 4) in the world before contact.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 

@@ -161,7 +161,7 @@ def predict_drift(
         once: stop at the first check at which an object drifts.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     watch = _DriftSimulation(built)
     watch.freeze_all_but(built.free if among is None else among)

@@ -146,7 +146,7 @@ class GraspTrial(ABC, Generic[W]):
             instance: the target.
             X_WG: (4, 4) grasp in the world.
             begin: prepares a world for the start of the trial.
-            friction, mass: of the target; the library's if None.
+            friction, mass: the target's; the library's if None.
             without_hull: avoid worlds in which parts of the robot meet the target's hull.
 
         Returns:
@@ -194,7 +194,7 @@ class GraspTrial(ABC, Generic[W]):
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world.
-            friction, mass: of the target; the library's if None.
+            friction, mass: the target's; the library's if None.
         """
         entry = self.scene.entry(instance)
         X_WO = instance_pose(self.scene, self.station, instance)

@@ -79,7 +79,7 @@ class Grip:
         friction: the target's coefficient in that run, if not the library's.
 
     Attributes:
-        weight: of the target [N].
+        weight: weight of the target [N].
         friction_force: total friction limit of both pads, 2 mu N [N].
     """
 
@@ -121,7 +121,7 @@ class Grip:
             True if both fingers touch the target, and it has not slid further, at every check.
 
         Raises:
-            RuntimeError, SystemExit: from Drake.
+            RuntimeError, SystemExit: Drake failed.
         """
         self._world.restore_state(self._time, self._state)
         self._world.simulator.Initialize()
@@ -218,7 +218,7 @@ def take_grip(
 
     Raises:
         InvalidInputError: as `HandTrial.run`.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift, without_hull=True)
     return Grip(trial, instance, friction) if result.outcome.held else result
@@ -242,7 +242,7 @@ class HoldForces:
         accelerations: largest load that the grip withstands in addition to gravity [g], by
             direction or axis of G; a load larger by the tolerance fails. 0 if the smallest tried
             load fails, infinity if the largest is withstood.
-        weight: of the target [N].
+        weight: weight of the target [N].
     """
 
     accelerations: Mapping[str, float]
@@ -274,7 +274,7 @@ def tug(
 
     Raises:
         UnknownNameError: no such direction.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
 
     def bears_load(direction: Array, amplitude: float) -> bool:
@@ -306,7 +306,7 @@ def shake(
 
     Raises:
         UnknownNameError: no such axis.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     omega = 2.0 * np.pi * settings.frequency
 
@@ -367,7 +367,7 @@ def friction_limit(
         trial: executes the trials.
         instance: the target.
         X_OG: (4, 4) grasp in the target's frame.
-        mass: of the target in place of the library's [kg].
+        mass: the target's mass in place of the library's [kg].
         lift: length of the lift in place of the motion's [m].
         settings: range of coefficients, and tolerance.
 

@@ -84,7 +84,7 @@ class HandLiftClearance:
         """Whether the path is free of collisions.
 
         Args:
-            world: in its present state.
+            world: the world in its present state.
             X_WG: (4, 4) grasp at which the path began; it sets the frames of the lift.
             length: remaining length of the path [m].
             direction_W: (3,) unit vector of the lift.
@@ -163,7 +163,7 @@ class ArmLiftClearance:
         """Whether the path is free of collisions.
 
         Args:
-            world: in its present state.
+            world: the world in its present state.
             q: (K, n) arm positions along the path.
         """
         context = self._plant_context
@@ -227,8 +227,8 @@ class FloatingCarrier(ABC, Generic[W]):
     `Carrier`.
 
     Args:
-        world: of a trial, prepared for its start: the floating hand is at the grasp, or at the
-            start of its approach, with the lift joint along the first path.
+        world: world of a trial, prepared for its start: the floating hand is at the grasp, or at
+            the start of its approach, with the lift joint along the first path.
         paths: straight paths of the hand from the grasp on, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
         approach: the path to the grasp; None if the hand starts there.

@@ -139,9 +139,9 @@ class BoardEdgeGuard:
 
 
 TUMBLING_ENGINE = Engine(name="tumbling", time_step=0.005, contact_model="point")
-"""For heaps in the air: point contact takes a third of the time of patches."""
+"""Engine for heaps in the air: point contact takes a third of the time of patches."""
 LANDING_ENGINE = Engine(name="landing", time_step=0.01)
-"""For the end of a fall, and where few objects fall."""
+"""Engine for the end of a fall, and for few falling objects."""
 
 
 def drop_onto_scene(
@@ -157,11 +157,11 @@ def drop_onto_scene(
         scene: the scene, with the falling objects above the board.
         station: table, pose of the board and obstacles.
         falling: names of the falling objects; all others stay in place.
-        shapes: of the library's objects.
+        shapes: shapes of the library's objects.
         margin: distance by which falling objects are kept within the board's edge [m].
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     if len(falling) == len(scene.instances):
         scene = _let_fall(scene, station, falling, shapes, margin, TUMBLING_ENGINE, 1.2)

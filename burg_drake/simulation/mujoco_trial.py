@@ -82,7 +82,7 @@ class WorldPicture:
     """Shows worlds of one scene in Meshcat.
 
     Args:
-        scene, station: of the worlds.
+        scene, station: scene and station of the worlds.
         meshcat: the viewer.
 
     Attributes:

@@ -83,7 +83,7 @@ class ModelIndex:
         spheres: geoms of each finger's pad.
         finger_geoms: geoms of both fingers.
         palm: geoms of the hand's body.
-        lift_joint, lift_qpos, lift_dof: of the carrier's joint.
+        lift_joint, lift_qpos, lift_dof: the carrier's joint, its position and its velocity.
         lift_place, lift_speed: position and velocity servos of the carrier.
         finger_qpos, finger_dofs, finger_servos: positions, velocities and servos of both fingers.
     """
@@ -193,7 +193,7 @@ class MujocoWorld:
         shown: called at each contact check.
 
     Attributes:
-        model, data: MuJoCo's.
+        model, data: MuJoCo's model and data.
         engine: as given.
         settings: as given, but `steady_time` is at least 0.1 s.
         free, standing, fixed: bodies by name: movable; movable only in another world; never
@@ -286,11 +286,11 @@ class MujocoWorld:
 
         Args:
             instance: the target.
-            X_WG: (4, 4) of the grasp frame in the world.
+            X_WG: (4, 4) start pose of the grasp frame in the world.
             closed: how far the fingers are closed at the start, from 0 (open) to 1 (pads together),
                 from where they close further; None if they stay open.
             direction_W: (3,) unit vector of the hand's first motion.
-            friction, mass: of the target, if not the library's.
+            friction, mass: the target's, if not the library's.
         """
         model, data, hand = self.model, self.data, self._station.hand
         target = self._index.objects[instance]

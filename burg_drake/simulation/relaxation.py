@@ -101,7 +101,7 @@ def _limit_length(vector: Array, limit: float) -> Array:
 RELAXING_ENGINE = Engine(name="relaxing", time_step=0.01)
 """Time step and contact model while objects relax."""
 TRIANGLE_RELAXING_ENGINE = replace(RELAXING_ENGINE, contact_surface="triangle")
-"""For wide, flat bodies, which rock by themselves on few large contact polygons."""
+"""Engine for wide, flat bodies, which rock by themselves on few large contact polygons."""
 STEPS_PER_WINDOW = 10
 """Time steps between two measurements of the speeds."""
 WINDOW_DURATION = STEPS_PER_WINDOW * RELAXING_ENGINE.time_step
@@ -144,7 +144,7 @@ def relax(
             and the moving bodies.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     relaxation = _Relaxation(built, {built.free[name] for name in moving})
     windows = max(1, round(time_limit / WINDOW_DURATION))

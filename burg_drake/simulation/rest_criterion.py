@@ -50,8 +50,8 @@ class BodySpeed:
     """Linear and angular speed of a body.
 
     Attributes:
-        speed: of its centre of mass [m/s].
-        turning: of its rotation [rad/s].
+        speed: speed of its centre of mass [m/s].
+        turning: angular speed [rad/s].
     """
 
     speed: float
@@ -88,7 +88,7 @@ def settle(
     """Advances a simulator until bodies are at rest, or the time limit is reached.
 
     Args:
-        simulator: of a diagram with `plant` in it; its context is advanced.
+        simulator: simulator of a diagram that contains `plant`; its context is advanced.
         plant: a finalized plant.
         bodies: bodies that have to come to rest.
         time_limit: simulated time allowed [s].
@@ -96,7 +96,7 @@ def settle(
         before_poll: called at the beginning of each poll interval; may change the state.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     context = plant.GetMyContextFromRoot(simulator.get_context())
     watched = [plant.get_body(index) for index in bodies]
@@ -148,8 +148,8 @@ class Displacement:
     """Displacement of an object.
 
     Attributes:
-        distance: of its centre of mass [m].
-        angle: of its rotation [rad].
+        distance: distance that its centre of mass has moved [m].
+        angle: angle by which it has turned [rad].
     """
 
     distance: float
@@ -161,7 +161,7 @@ def displacement_from_document(built: StationDiagram, name: str, X_WO: Array) ->
 
     Args:
         built: the diagram.
-        name: of the instance.
+        name: name of the instance.
         X_WO: (4, 4) current pose.
     """
     X_OO = inverse(built.X_WO(name)) @ X_WO
@@ -176,7 +176,7 @@ def depth_in_table(scene: Scene, X_WO: Array, name: str) -> float:
     Args:
         scene: the scene.
         X_WO: (4, 4) pose of the instance.
-        name: of the instance.
+        name: name of the instance.
     """
     p_OC = support_vertices(scene.library, scene.instance(name).object)
     return -float((p_OC @ X_WO[2, :3]).min() + X_WO[2, 3])

@@ -83,7 +83,7 @@ class DropTest:
 
     Raises:
         InvalidInputError: the SDF cannot be loaded.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
 
     def __init__(self, library: ObjectLibrary, name: str, support: Array) -> None:
@@ -112,7 +112,7 @@ class DropTest:
             side: azimuth in S towards which the object is tilted [rad].
 
         Raises:
-            RuntimeError, SystemExit: from Drake, or the object flew away.
+            RuntimeError, SystemExit: Drake failed, or the object flew away.
         """
         plant, context = self.built.plant, self._simulator.get_mutable_context()
         context.SetTimeStateAndParametersFrom(self._default)
@@ -127,7 +127,7 @@ class DropTest:
         """Continues until the object is at rest, for at most the time limit once more.
 
         Raises:
-            RuntimeError, SystemExit: from Drake, or the object flew away.
+            RuntimeError, SystemExit: Drake failed, or the object flew away.
         """
         plant = self.built.plant
         settled = settle(self._simulator, plant, [self._body.index()], DropSettings.time_limit)

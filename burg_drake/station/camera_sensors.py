@@ -54,7 +54,7 @@ class AreaCamera(LeafSystem):
     """Renders at a higher resolution and averages blocks of pixels.
 
     Ports:
-        geometry_query: of the scene graph.
+        geometry_query: query port of the scene graph.
         X_WC: pose of the camera's optical frame in the world.
         color_image: averaged image (output).
     """

@@ -29,7 +29,7 @@ class PadFront:
         area: area of the front [m^2].
         stiffness: pressure over depth [N/m^3].
         thickness: thickness of the pad behind the front [m].
-        corners: (M, 3) of the whole pad's convex hull, in P [m].
+        corners: (M, 3) corners of the whole pad's convex hull, in P [m].
     """
 
     X_BP: Array
@@ -160,7 +160,7 @@ class HandLink:
     """A rigid part of a hand, with the frame B.
 
     Attributes:
-        name: of the link in the model.
+        name: name of the link in the model.
         X_HB: (4, 4) pose in the hand's body, with the joint at 0.
         shapes: collision shapes; for a finger, without its pad.
         mass: [kg].
@@ -184,7 +184,7 @@ class FingerLink(HandLink):
         finger: the finger in the hand's document.
         axis_B: (3,) direction in which the joint moves it.
         pad: the collision shape that touches objects.
-        front: of the pad, where it is soft.
+        front: front of the pad, if the pad is soft.
     """
 
     finger: Finger

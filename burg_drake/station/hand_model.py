@@ -56,7 +56,8 @@ class HandModel:
     Attributes:
         instance: its model instance.
         body: the link that the arm carries.
-        fingers, joints, pads: of the two fingers, in the order of the document.
+        fingers, joints, pads: bodies, joints and pads of the two fingers, in the order of the
+            document.
     """
 
     instance: ModelInstanceIndex
