@@ -46,7 +46,8 @@ class TrialWorld:
     Attributes:
         diagram, hand, settings: as given.
         engine: time step and contact settings.
-        free, standing: bodies by name: movable, and movable only in the complete world.
+        free: bodies that can move, by name.
+        standing: bodies that can move only in the complete world, by name.
         robot: bodies of the robot.
         fingers: bodies of the two fingers.
         hand_document: the hand's document.
