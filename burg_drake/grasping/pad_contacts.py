@@ -103,7 +103,7 @@ def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
 
 
 TURN_RESISTANCE = 1e-3
-"""Added rotational stiffness over that of a full pad; makes the angle unique."""
+"""Ratio of the added rotational stiffness to that of a full pad. It makes the angle unique."""
 
 
 def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
@@ -125,15 +125,15 @@ def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
     resistance = TURN_RESISTANCE * float((yz[0] ** 2).sum())
     angle, share = np.zeros((len(gap), 2)), np.ones(len(gap))
     best, depth = _press_in(gap, total)
-    least = _energy(best, depth, total)
+    lowest = _energy(best, depth, total)
     # With more than 10 Newton steps, fewer than one grasp in a thousand changes.
     for _ in range(10):
         step = share[:, None] * _newton_step(best, y, z, angle, resistance)
         trial = np.clip(angle + step, -max_angle, max_angle)
         pressed, depth = _press_in(gap - _rise_of_springs(trial, y, z), total)
         energy = _energy(pressed, depth, total) + 0.5 * resistance * (trial**2).sum(axis=1)
-        better = energy < least
-        least = np.where(better, energy, least)
+        better = energy < lowest
+        lowest = np.where(better, energy, lowest)
         angle = np.where(better[:, None], trial, angle)
         best = np.where(better[:, None, None], pressed, best)
         share = np.where(better, np.minimum(1.0, 2.0 * share), 0.25 * share)
@@ -339,7 +339,7 @@ def _turn_object(X_OG: Array, touch: _PadTouch) -> Array:
 
 
 def _scatter_rows(values: Array, where: NDArray[np.bool_]) -> Array:
-    """Values (N, ...) that are `values` (M, ...) at the M grasps in `where`, NaN at the others."""
+    """Values (N, ...): `values` (M, ...) at the M grasps in `where`, NaN at the others."""
     full = np.full((len(where), *values.shape[1:]), np.nan)
     full[where] = values
     return full
@@ -411,19 +411,19 @@ def slide_to_rest(
     moving = np.flatnonzero(contacts.touching & ~(friction_needed(contacts) < friction))
     slide = np.where(contacts.touching, 0.0, np.nan)
     slide[moving] = np.inf
-    X, at = np.asarray(X_OG[moving], float).copy(), contacts.select(moving)
+    X, current = np.asarray(X_OG[moving], float).copy(), contacts.select(moving)
     step = min(np.ptp(jaws.y), np.ptp(jaws.z)) / SLIDE_STEPS
     for k in range(1, SLIDE_STEPS + 1):
         if not len(moving):
             break
-        X[:, :3, 3] -= step * _slide_direction(at)
-        at = grasp_contacts(surface, X, jaws)
-        held = at.touching & (friction_needed(at) < friction)
+        X[:, :3, 3] -= step * _slide_direction(current)
+        current = grasp_contacts(surface, X, jaws)
+        held = current.touching & (friction_needed(current) < friction)
         for name, values in rest.items():
-            values[moving[held]] = getattr(at, name)[held]
+            values[moving[held]] = getattr(current, name)[held]
         slide[moving[held]] = k * step
-        on = at.touching & ~held
-        moving, X, at = moving[on], X[on], at.select(on)
+        sliding = current.touching & ~held
+        moving, X, current = moving[sliding], X[sliding], current.select(sliding)
     return Contacts(**rest), slide
 
 

@@ -173,9 +173,7 @@ def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
     entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
     corners = support_corners(scene.library, entry)
     ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
-    rolling = [
-        direction for direction, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls
-    ]
+    rolling = [up_O for up_O, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
     center = np.array(entry.mass_properties.center_of_mass)
     carrying = carrying_corners(corners, up, center, settled_tolerance)
     placed = corners.copy()

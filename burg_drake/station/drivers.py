@@ -433,10 +433,8 @@ class HandDriver(_PlanFollower):
         position_gain = 50.0  # Ratio of finger speed to distance from the goal, 1/s.
         position, desired_state = self._connected_inputs(context, "hand")
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
-        q, planned = (
-            self._state.Eval(context)[self._fingers.position_index],
-            self._planned_command(context),
-        )
+        q = self._state.Eval(context)[fingers.position_index]
+        planned = self._planned_command(context)
         if planned is not None and planned.closed:
             return fingers.closed, fingers.closing_signs * fastest
         if planned is None and desired_state:
