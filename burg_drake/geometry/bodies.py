@@ -111,10 +111,10 @@ class Body:
             chosen = chosen[
                 bound[chosen] > np.maximum(depth[pairs.grasp[chosen]], CONTACT_TOLERANCE)
             ]
-            asked = pairs[chosen]
-            floor = np.maximum(depth[asked.grasp], CONTACT_TOLERANCE)
-            found = self._exact_depths(hand, asked, piece[chosen], floor, faces_only)
-            np.maximum.at(depth, asked.grasp, np.where(found > floor, found, 0.0))
+            chosen_pairs = pairs[chosen]
+            floor = np.maximum(depth[chosen_pairs.grasp], CONTACT_TOLERANCE)
+            found = self._exact_depths(hand, chosen_pairs, piece[chosen], floor, faces_only)
+            np.maximum.at(depth, chosen_pairs.grasp, np.where(found > floor, found, 0.0))
         return depth
 
     def _overlapping_boxes(

@@ -298,7 +298,7 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
             "average precision ranks grasps by score, but no grasp with a value of "
             f"{column!r} has a score"
         )
-    curves = [precision_recall(grasps.score, of_one) for of_one in good.T]
+    curves = [precision_recall(grasps.score, is_good) for is_good in good.T]
     return Ranking(
         column=column,
         criteria=criteria,

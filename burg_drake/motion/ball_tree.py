@@ -322,12 +322,12 @@ class BallTrees:
 
     def body_ball_centers(self, poses: LinkPoses) -> Single:
         """(3, B, K) centres of the bounding balls of the bodies."""
-        return poses.place_own(self._body_frames, self._body_centers)
+        return poses.transform_per_frame(self._body_frames, self._body_centers)
 
     def node_ball_centers(self, node: Indices, poses: LinkPoses, which: Indices) -> Single:
         """(3, W, F) centres of the balls of nodes (F,) in configurations `which` (F,)."""
         centers = self.centers.take(node, axis=2)
-        return poses.place_each(self.frame[node], centers, which)
+        return poses.transform_per_node(self.frame[node], centers, which)
 
 
 def bodies_with_shape(station_diagram: StationDiagram, links: ArmLinks) -> list[BodyIndex]:

@@ -179,8 +179,8 @@ def map_reachability(
         reached[clear] = _reached_grasps(scene, station, X_WG[clear], settings)
         return {"reached": reached}
 
-    asked = content_hash(world_content(scene, station), vars(settings))
-    reached = cached("reachability", asked, make)["reached"]
+    key = content_hash(world_content(scene, station), vars(settings))
+    reached = cached("reachability", key, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)
 

@@ -131,15 +131,10 @@ def _cores(
             cores.append(_core(inspector, geometry))
             poses.append(links.X_FB[body] @ inspector.GetPoseInFrame(geometry).GetAsMatrix4())
     vertices = [transform_points(X, core.vertices) for X, core in zip(poses, cores, strict=True)]
-    count = np.array([len(v) for v in vertices])
-    corners = np.arange(count.max())
-    filled = np.array([v[np.where(corners < len(v), corners, 0)] for v in vertices])
-    x, y, z = np.ascontiguousarray(np.moveaxis(filled, -1, 0))
-    X = np.array(poses)
-    return ShapeBatch(
-        *(x, y, z, count),
+    return ShapeBatch.from_vertices(
+        vertices,
+        np.array(poses),
         center=np.array([v.mean(axis=0) for v in vertices]),
-        disc_axes=(X[:, :3, 0].T.copy(), X[:, :3, 1].T.copy()),
         disc=np.array([core.disc for core in cores]),
         ball=np.array([core.ball for core in cores]),
     )

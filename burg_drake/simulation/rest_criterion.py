@@ -25,9 +25,9 @@ class RestCriterion:
     at rest alternates from step to step.
 
     Attributes:
-        speed: of its centre of mass, below this [m/s] ...
-        turning: ... and of its rotation, below this [rad/s] ...
-        duration: ... for this long [s]: something that rocks stands still twice a period.
+        speed: upper bound of the speed of its centre of mass [m/s].
+        turning: upper bound of its angular speed [rad/s].
+        duration: time for which both must hold [s]: a rocking body stands still twice a period.
         poll: interval between checks of the poses [s].
         dying: factor on both speeds for a body that gets slower from poll to poll.
     """
@@ -102,15 +102,15 @@ def settle(
     watched = [plant.get_body(index) for index in bodies]
     start = simulator.get_context().get_time()
     steps = max(1, round(time_limit / criterion.poll))
-    needed = max(1, round(criterion.duration / criterion.poll))
-    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
-    before = [body_place(body, context) for body in watched]
+    required_polls = max(1, round(criterion.duration / criterion.poll))
+    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=required_polls)
+    before = [center_pose(body, context) for body in watched]
     speeds: dict[BodyIndex, BodySpeed] = {}
     for step in range(1, steps + 1):
         if before_poll is not None:
             before_poll()
         simulator.AdvanceTo(start + step * criterion.poll)
-        after = [body_place(body, context) for body in watched]
+        after = [center_pose(body, context) for body in watched]
         moving = {}
         for body, old, new in zip(watched, before, after, strict=True):
             speed = mean_speed(old, new, criterion.poll)
@@ -119,13 +119,13 @@ def settle(
             speeds[body.index()] = speed
         before = after
         recent.append(moving)
-        if len(recent) == needed and not any(recent):
+        if len(recent) == required_polls and not any(recent):
             break
     moved = {index: speed for moving in recent for index, speed in moving.items()}
     return SettlingResult(simulator.get_context().get_time() - start, moved)
 
 
-def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
+def center_pose(body: RigidBody, context: Context) -> tuple[Array, Array]:
     """Rotation (3, 3) and centre of mass (3,) of a body in the world."""
     X_WO = body.EvalPoseInWorld(context)
     p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
