@@ -39,7 +39,7 @@ class TriangulatedBall:
         edges: (E, 2) vertices of the edges.
         sides: (E, 2) the triangles that meet at each edge.
         neighbors: (M, 3) the triangles next to each triangle.
-        volume: enclosed.
+        volume: enclosed volume.
     """
 
     vertices: Array
@@ -204,10 +204,10 @@ class ContactSlides:
     """Contributions of M slides of each contact to u = u0 + alpha_1 u_1 + alpha_2 u_2.
 
     Attributes:
-        u: (N, 2, M, 6).
+        u: (N, 2, M, 6) u_1 and u_2.
         zero: (N, 2, M, 2) with alpha_1 zero_1 + alpha_2 zero_2 = right.
         turn: (N, 2, M) cross products of right and zero.
-        u0: (N, 6).
+        u0: (N, 6) the part without alpha.
     """
 
     u: Array

@@ -196,16 +196,16 @@ def raise_lifts(
                 found[k] = reach
         return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
 
-    by_hand = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in grasps)
+    hand_blocked = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in grasps)
     free, _ = _bisect_levels(
-        low[by_hand],
-        high[by_hand],
-        lambda level, rows: hand_is_free(heights[level], grasps[by_hand[rows]]),
+        low[hand_blocked],
+        high[hand_blocked],
+        lambda level, rows: hand_is_free(heights[level], grasps[hand_blocked[rows]]),
     )
     # The arm can often lift as high as the hand alone.
     guess = np.full(len(grasps), -1)
-    guess[by_hand] = np.maximum(free, 0)
-    high[by_hand] = guess[by_hand] + 1
+    guess[hand_blocked] = np.maximum(free, 0)
+    high[hand_blocked] = guess[hand_blocked] + 1
     low, high = _narrow_levels(low, high, guess, is_reachable)
     # If the lowest height is not free, no height is.
     low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), is_reachable)

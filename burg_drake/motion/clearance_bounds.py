@@ -165,7 +165,7 @@ class ArmProximity:
         solids = _fixed_solids(station_diagram)
         self.field = DistanceField.of(solids)
         self.content = content_hash(shape.content, solids_hash(solids))
-        self._trees, self._itself = shape.trees, shape.itself
+        self._trees, self._self_clearance = shape.trees, shape.self_clearance
         self._bodies = self._trees.bodies
         hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
         moving = [i for i, body in enumerate(self._bodies) if body.frame]
@@ -175,7 +175,7 @@ class ArmProximity:
         self._radius = np.array([b.radius for b in self._bodies], dtype=np.float32)[:, None]
         self._roots = np.array([body.root for body in self._bodies])
         bodies = [body.body for body in self._bodies]
-        self.apart = [(bodies[i], bodies[j]) for i, j in self._itself.apart]
+        self.apart = [(bodies[i], bodies[j]) for i, j in self._self_clearance.apart]
         self._displacement = DisplacementBound(self.links, self._trees, shape.limits)
 
     def bounds(self, q: Array, *, hand: bool = True) -> ClearanceBounds:
@@ -224,7 +224,7 @@ class ArmProximity:
         lower = bound.min(axis=0, initial=np.inf)
         upper = np.full_like(lower, np.inf)
         self._descend(poses, which, self._roots[counted[row]], lower, upper)
-        low, up = self._itself.bounds(q, poses, centers, upper >= -Bounding.rounding)
+        low, up = self._self_clearance.bounds(q, poses, centers, upper >= -Bounding.rounding)
         lower, upper = np.minimum(lower, low), np.minimum(upper, up)
         return lower, np.where(upper < -Bounding.rounding, upper, np.float32(np.inf))
 

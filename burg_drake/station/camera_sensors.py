@@ -125,7 +125,7 @@ def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera
 def add_cameras(
     builder: RobotDiagramBuilder, station: Station, names: Iterable[str] | None = None
 ) -> None:
-    """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
+    """Adds a renderer and one `RgbdSensor` per camera; exports their ports as `camera.NAME.*`.
 
     Args:
         builder: builder of the diagram.
