@@ -26,7 +26,7 @@ class HandParts:
     Attributes:
         shapes: the parts, in the grasp frame G.
         half: (H, 3) half extents of their bounding boxes [m].
-        radius: (H,) of their bounding spheres [m].
+        radius: (H,) radii of their bounding spheres [m].
         X_HG: (H,) poses of G in the parts' frames.
         is_box: (H,) whether a part is a box.
     """
@@ -62,7 +62,7 @@ class Body:
 
     Args:
         X_WB: (4, 4) pose of the body.
-        pieces: at least one, in the body's frame.
+        pieces: its convex pieces in the body's frame, at least one.
 
     Attributes:
         X_WB: the pose.
@@ -111,10 +111,10 @@ class Body:
             chosen = chosen[
                 bound[chosen] > np.maximum(depth[pairs.grasp[chosen]], CONTACT_TOLERANCE)
             ]
-            asked = pairs[chosen]
-            floor = np.maximum(depth[asked.grasp], CONTACT_TOLERANCE)
-            found = self._exact_depths(hand, asked, piece[chosen], floor, faces_only)
-            np.maximum.at(depth, asked.grasp, np.where(found > floor, found, 0.0))
+            chosen_pairs = pairs[chosen]
+            floor = np.maximum(depth[chosen_pairs.grasp], CONTACT_TOLERANCE)
+            found = self._exact_depths(hand, chosen_pairs, piece[chosen], floor, faces_only)
+            np.maximum.at(depth, chosen_pairs.grasp, np.where(found > floor, found, 0.0))
         return depth
 
     def _overlapping_boxes(

@@ -46,22 +46,33 @@ class ShapeBatch:
     def of(cls, shapes: Sequence[Shape]) -> ShapeBatch:
         """A batch of at least one shape."""
         vertices = [transform_points(shape.X_BP, _core_vertices(shape)) for shape in shapes]
+        convex = [shape.convex for shape in shapes]
+        X_BP = np.array([shape.X_BP for shape in shapes])
+        return cls.from_vertices(
+            vertices,
+            X_BP,
+            center=X_BP[:, :3, 3],
+            disc=np.array([c.radius if isinstance(c, Cylinder) else 0.0 for c in convex]),
+            ball=np.array([c.radius if isinstance(c, Ball) else 0.0 for c in convex]),
+        )
+
+    @classmethod
+    def from_vertices(
+        cls, vertices: Sequence[Array], X: Array, *, center: Array, disc: Array, ball: Array
+    ) -> ShapeBatch:
+        """A batch of S shapes.
+
+        Args:
+            vertices: (V, 3) vertices of each shape [m].
+            X: (S, 4, 4) poses of the shapes, whose discs lie across z.
+            center, disc, ball: see the attributes.
+        """
         count = np.array([len(v) for v in vertices])
         corners = np.arange(count.max())
         filled = np.array([v[np.where(corners < len(v), corners, 0)] for v in vertices])
         x, y, z = np.ascontiguousarray(np.moveaxis(filled, -1, 0))
-        convex = [shape.convex for shape in shapes]
-        X_BP = np.array([shape.X_BP for shape in shapes])
-        return cls(
-            x,
-            y,
-            z,
-            count,
-            X_BP[:, :3, 3],
-            (X_BP[:, :3, 0].T.copy(), X_BP[:, :3, 1].T.copy()),
-            np.array([c.radius if isinstance(c, Cylinder) else 0.0 for c in convex]),
-            np.array([c.radius if isinstance(c, Ball) else 0.0 for c in convex]),
-        )
+        axes = X[:, :3, 0].T.copy(), X[:, :3, 1].T.copy()
+        return cls(x, y, z, count, center, axes, disc, ball)
 
     def support(self, shape: Indices, d: Array) -> Array:
         """Support points (3, L) of the shapes (L,) without their balls, along directions `d`
@@ -214,8 +225,8 @@ def _nearest_point(w: Array, corners: Array, may_contain: NDArray[np.bool_]) -> 
     second = np.where(best >= 3, (first + 1) % 3, first)
     kept = np.stack([w, corners[:, first, pair], corners[:, second, pair]], axis=1)
     nearest = points[:, best, pair]
-    asked = np.flatnonzero(may_contain)
-    nearest[:, asked[_contains_origin(w[:, asked], e[..., asked])]] = 0.0
+    tested = np.flatnonzero(may_contain)
+    nearest[:, tested[_contains_origin(w[:, tested], e[..., tested])]] = 0.0
     return nearest, kept
 
 

@@ -27,7 +27,7 @@ class SceneBoxes:
 
     Args:
         hand: convex parts of the open hand.
-        bodies: at least one.
+        bodies: the bodies, at least one.
 
     Attributes:
         X_BW: (B,) poses of the world in the bodies.
@@ -106,7 +106,7 @@ class _NearestSearch:
 
     Args:
         X_WG: N grasps at which the hand overlaps nothing.
-        boxes: of the scene, which has at least one body.
+        boxes: boxes of the scene, which has at least one body.
 
     Attributes:
         nearest, distance: (N,) indices of the nearest bodies found so far and their distances [m].
@@ -126,9 +126,9 @@ class _NearestSearch:
 
     def _measure_pairs(self, pairs: Pairs) -> None:
         """Measures pairs of parts and bodies, ordered by grasp, that may be the nearest."""
-        place, pieces, bound = self._boxes.piece_bounds(self.X_WG, pairs)
+        pair, pieces, bound = self._boxes.piece_bounds(self.X_WG, pairs)
         grasp, part, body = pairs
-        left = _PartPiecePairs(grasp[place], part[place], body[place], pieces, bound)
+        left = _PartPiecePairs(grasp[pair], part[pair], body[pair], pieces, bound)
         left = self._measure_lowest(left)
         left = left.with_bounds(self._boxes.refined_piece_bounds(self.X_WG, left.pairs, left.piece))
         left = self._measure_lowest(left)
@@ -146,14 +146,14 @@ class _NearestSearch:
         self._measure(left[is_lowest])
         return left[~is_lowest & (left.bound < self.distance[left.grasp])]
 
-    def _measure(self, asked: _PartPiecePairs) -> None:
-        asked = asked[asked.bound < self.distance[asked.grasp]]
-        if not len(asked.grasp):
+    def _measure(self, pairs: _PartPiecePairs) -> None:
+        pairs = pairs[pairs.bound < self.distance[pairs.grasp]]
+        if not len(pairs.grasp):
             return
-        grasp, body = asked.grasp, asked.body
+        grasp, body = pairs.grasp, pairs.body
         X_BG = self._boxes.X_BW[body] @ self.X_WG[grasp]
         found = shape_distances(
-            *(self._boxes.parts, asked.part, self._boxes.pieces, asked.piece, X_BG),
+            *(self._boxes.parts, pairs.part, self._boxes.pieces, pairs.piece, X_BG),
             self.distance[grasp],
         )
         order = np.lexsort((found, grasp))
@@ -201,7 +201,7 @@ class HandScreen:
 
     Args:
         hand: convex parts of the open hand, in the grasp frame.
-        bodies: by name.
+        bodies: the bodies of the scene by name.
 
     Attributes:
         bodies: the bodies.
@@ -213,8 +213,10 @@ class HandScreen:
         self.bodies = dict(bodies)
         self._boxes = SceneBoxes(self._hand, list(bodies.values())) if bodies else None
         sizes = [body.size for body in bodies.values()]
-        self._chunk = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sizes, default=1))))
-        self._chunk_of_all = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sum(sizes), 1))))
+        self._deepest_chunk, self._nearest_chunk = (
+            max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(pieces, 1))))
+            for pieces in (max(sizes, default=1), sum(sizes))
+        )
 
     def deepest(
         self, X_WG: Array, order: Sequence[str], *, faces_only: bool = False
@@ -232,8 +234,8 @@ class HandScreen:
             deepest overlap with that body [m].
         """
         names, depths = np.full(len(X_WG), "", dtype=object), np.zeros(len(X_WG))
-        for k in range(0, len(X_WG), self._chunk):
-            chunk = slice(k, k + self._chunk)
+        for k in range(0, len(X_WG), self._deepest_chunk):
+            chunk = slice(k, k + self._deepest_chunk)
             hand = _PlacedHand(self._hand, X_WG[chunk])
             left = np.arange(len(X_WG[chunk]))
             for name in order:
@@ -256,12 +258,12 @@ class HandScreen:
         names, distances = np.full(len(X_WG), "", dtype=object), np.full(len(X_WG), np.inf)
         if self._boxes is None:
             return names, distances
-        every = np.array(list(self.bodies), dtype=object)
-        for k in range(0, len(X_WG), self._chunk_of_all):
-            chunk = slice(k, k + self._chunk_of_all)
+        body_names = np.array(list(self.bodies), dtype=object)
+        for k in range(0, len(X_WG), self._nearest_chunk):
+            chunk = slice(k, k + self._nearest_chunk)
             search = _NearestSearch(Poses.of(X_WG[chunk]), self._boxes)
             search.run()
-            names[chunk], distances[chunk] = every[search.nearest], search.distance
+            names[chunk], distances[chunk] = body_names[search.nearest], search.distance
         return names, distances
 
 
@@ -273,11 +275,11 @@ class _PlacedHand:
         self._X_HW = hand.X_HG[None] @ Poses.of(X_WG)[:, None].inverse()
         self._p_WH = self._X_HW.inverse().p
 
-    def depths(self, body: Body, asked: Indices, faces_only: bool) -> Array:
-        """Depths (N,) in a body [m], see `Body.depths`; 0 at grasps not in `asked`."""
-        row, part = np.nonzero(body.is_near(self._p_WH[asked], self._hand.radius))
+    def depths(self, body: Body, grasps: Indices, faces_only: bool) -> Array:
+        """Depths (N,) in a body [m], see `Body.depths`; 0 at grasps not in `grasps`."""
+        row, part = np.nonzero(body.is_near(self._p_WH[grasps], self._hand.radius))
         if not len(row):
             return np.zeros(len(self._p_WH))
-        grasp = asked[row]
+        grasp = grasps[row]
         pairs = HandBodyPairs(grasp, part, self._X_HW[grasp, part] @ body.X_WB)
         return body.depths(self._hand, pairs, len(self._p_WH), faces_only=faces_only)

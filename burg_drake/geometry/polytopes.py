@@ -48,9 +48,9 @@ def hull_mesh(points: Array) -> trimesh.Trimesh:
     inward = (normal * hull.equations[:, :3]).sum(axis=1) < 0.0
     faces[inward] = faces[inward][:, ::-1]
     used = np.unique(faces)
-    place = np.zeros(len(points), dtype=int)
-    place[used] = np.arange(len(used))
-    return trimesh.Trimesh(points[used], place[faces], process=False)
+    number = np.zeros(len(points), dtype=int)
+    number[used] = np.arange(len(used))
+    return trimesh.Trimesh(points[used], number[faces], process=False)
 
 
 def reduced_hull(points: Array, max_vertices: int = 64, tolerance: float = 2e-4) -> trimesh.Trimesh:
@@ -147,7 +147,7 @@ class Polytope:
         return cls.from_points(np.concatenate(ends))
 
     def moved(self, X_AB: Array) -> Polytope:
-        """The polytope given in B, expressed in A: `X_AB` is (4, 4)."""
+        """The polytope, given in B, expressed in A; `X_AB` is (4, 4)."""
         vertices = transform_points(X_AB, self.vertices)
         normals = self.normals @ X_AB[:3, :3].T
         offsets = (vertices @ normals.T).max(axis=0)
@@ -197,11 +197,11 @@ def _cached_hull(data: bytes) -> Polytope:
     is_edge = faces[0] != faces[1]
     ends, faces = ends[is_edge], faces[:, is_edge].T
     once = np.sort(np.unique(ends @ (len(points), 1), return_index=True)[1])
-    place = np.full(len(points), -1)
-    place[hull.vertices] = np.arange(len(hull.vertices))
+    number = np.full(len(points), -1)
+    number[hull.vertices] = np.arange(len(hull.vertices))
     vertices, normals = points[hull.vertices], hull.equations[first, :3]
     offsets = (vertices @ normals.T).max(axis=0)
-    polytope = Polytope(vertices, normals, offsets, faces[once], place[ends[once]])
+    polytope = Polytope(vertices, normals, offsets, faces[once], number[ends[once]])
     for array in vars(polytope).values():
         array.flags.writeable = False
     return polytope

@@ -299,13 +299,13 @@ def sample_antipodal(
         raise InvalidInputError(f"n is {n}; give the number of grasps, 0 or more")
     state = json.loads(json.dumps(rng.bit_generator.state, default=np.ndarray.tolist))
     found = _collect_grasps(Surface.of(mesh, weights), n * settings.diverse, rng, settings, accept)
-    asked = asdict(settings)
-    diverse = asked.pop("diverse")
+    parameters = asdict(settings)
+    diverse = parameters.pop("diverse")
     provenance = {
         "sampler": "antipodal",
         "version": SAMPLER_VERSION,
         "n": int(n),
-        **asked,
+        **parameters,
         "finger_clearance": ContactPairSettings.finger_clearance,
         "weights": None if weights is None else content_hash(np.asarray(weights, float)),
         "tested": accept is not None,

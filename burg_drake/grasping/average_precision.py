@@ -274,7 +274,7 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
     """Average precision of the scores of a set, judged by one of its columns.
 
     Args:
-        grasps: with scores; equal scores are ties.
+        grasps: grasps with scores; equal scores are ties.
         column: one of three kinds. `friction_needed` is judged at several coefficients; colliding
             grasps (by `clearance`, `screened` or `outcome`) are bad. Of outcomes, `lifted` is good,
             or `reachable` without trials; grasps without an outcome are left out. Of truth values
@@ -298,7 +298,7 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
             "average precision ranks grasps by score, but no grasp with a value of "
             f"{column!r} has a score"
         )
-    curves = [precision_recall(grasps.score, of_one) for of_one in good.T]
+    curves = [precision_recall(grasps.score, is_good) for is_good in good.T]
     return Ranking(
         column=column,
         criteria=criteria,

@@ -25,7 +25,7 @@ from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.geometry import Body, Shape
-from burg_drake.station import StationDiagram, replace_meshes_by_pieces
+from burg_drake.station import StationDiagram, hull_vertices, replace_meshes_by_pieces
 
 
 def screened_bodies(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
@@ -76,9 +76,9 @@ def read_shapes(
         station_diagram: the diagram to read.
         plant_context: the plant's part of a Context in which the open hand's grasp frame is the
             world.
-        query: of the scene graph in that Context.
+        query: geometry queries of the scene graph in that Context.
         body_of: bodies of the geometries, see `filter_hand_pairs`.
-        names: of the bodies.
+        names: names of the bodies.
 
     Returns:
         Shapes of the open hand in the grasp frame, and bodies by name.
@@ -121,9 +121,7 @@ def shape_of(inspector: SceneGraphInspector, geometry: GeometryId, X_BP: Array) 
         case Cylinder():
             return Shape.cylinder(X_BP, shape.radius(), shape.length() / 2)
         case Convex() | Mesh():
-            hull = inspector.GetConvexHull(geometry)
-            points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-            return Shape.hull(X_BP, points)
+            return Shape.hull(X_BP, hull_vertices(shape))
     raise InvalidInputError(
         f"collision geometry {inspector.GetName(geometry)!r} is a {type(shape).__name__};"
         " the clearance check of the hand supports boxes, cylinders, spheres and convex"

@@ -103,7 +103,7 @@ def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
 
 
 TURN_RESISTANCE = 1e-3
-"""Added rotational stiffness over that of a full pad; makes the angle unique."""
+"""Ratio of the added rotational stiffness to that of a full pad. It makes the angle unique."""
 
 
 def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
@@ -125,15 +125,15 @@ def press_pads(gap: Array, yz: Array, total: float) -> tuple[Array, Array]:
     resistance = TURN_RESISTANCE * float((yz[0] ** 2).sum())
     angle, share = np.zeros((len(gap), 2)), np.ones(len(gap))
     best, depth = _press_in(gap, total)
-    least = _energy(best, depth, total)
+    lowest = _energy(best, depth, total)
     # With more than 10 Newton steps, fewer than one grasp in a thousand changes.
     for _ in range(10):
         step = share[:, None] * _newton_step(best, y, z, angle, resistance)
         trial = np.clip(angle + step, -max_angle, max_angle)
         pressed, depth = _press_in(gap - _rise_of_springs(trial, y, z), total)
         energy = _energy(pressed, depth, total) + 0.5 * resistance * (trial**2).sum(axis=1)
-        better = energy < least
-        least = np.where(better, energy, least)
+        better = energy < lowest
+        lowest = np.where(better, energy, lowest)
         angle = np.where(better[:, None], trial, angle)
         best = np.where(better[:, None, None], pressed, best)
         share = np.where(better, np.minimum(1.0, 2.0 * share), 0.25 * share)
@@ -190,7 +190,7 @@ class Contacts:
         touching: (N,) whether both pads touch, facing each other; all other arrays are NaN if not.
         p_OC: (N, 2, 3) centres of pressure on the object's surface [m].
         normal: (N, 2, 3) mean inward normals in the object frame, weighted by pressure; unit.
-        area: (N, 2) of the patches, as the pad's face sees them [m^2].
+        area: (N, 2) areas of the patches, as the pad's face sees them [m^2].
         torsion_radius: (N, 2) mean distance from the centre of pressure, weighted by pressure [m].
             Times normal force and friction it is the torque that turns the patch in place.
         indentation: (N, 2) largest indentations of the pads [m].
@@ -220,7 +220,7 @@ def grasp_contacts(surface: Surface, X_OG: Array, jaws: Jaws = PANDA_JAWS) -> Co
     open pad is inside the object, are ignored.
 
     Args:
-        surface: of the object, in its frame O.
+        surface: surface of the object, in its frame O.
         X_OG: (N, 4, 4) grasps.
         jaws: the hand.
     """
@@ -339,7 +339,7 @@ def _turn_object(X_OG: Array, touch: _PadTouch) -> Array:
 
 
 def _scatter_rows(values: Array, where: NDArray[np.bool_]) -> Array:
-    """Values (N, ...) that are `values` (M, ...) at the M grasps in `where`, NaN at the others."""
+    """Values (N, ...): `values` (M, ...) at the M grasps in `where`, NaN at the others."""
     full = np.full((len(where), *values.shape[1:]), np.nan)
     full[where] = values
     return full
@@ -396,11 +396,11 @@ def slide_to_rest(
     """Lets objects slide until they need less friction than there is.
 
     Args:
-        surface: of the object.
+        surface: surface of the object.
         X_OG: (N, 4, 4) grasps.
         jaws: the hand.
         friction: coefficient.
-        contacts: of these grasps, before sliding.
+        contacts: contacts of the grasps before sliding.
 
     Returns:
         Contacts at rest, and sliding distances (N,) [m]: 0 if the pads hold at once; NaN unless
@@ -411,19 +411,19 @@ def slide_to_rest(
     moving = np.flatnonzero(contacts.touching & ~(friction_needed(contacts) < friction))
     slide = np.where(contacts.touching, 0.0, np.nan)
     slide[moving] = np.inf
-    X, at = np.asarray(X_OG[moving], float).copy(), contacts.select(moving)
+    X, current = np.asarray(X_OG[moving], float).copy(), contacts.select(moving)
     step = min(np.ptp(jaws.y), np.ptp(jaws.z)) / SLIDE_STEPS
     for k in range(1, SLIDE_STEPS + 1):
         if not len(moving):
             break
-        X[:, :3, 3] -= step * _slide_direction(at)
-        at = grasp_contacts(surface, X, jaws)
-        held = at.touching & (friction_needed(at) < friction)
+        X[:, :3, 3] -= step * _slide_direction(current)
+        current = grasp_contacts(surface, X, jaws)
+        held = current.touching & (friction_needed(current) < friction)
         for name, values in rest.items():
-            values[moving[held]] = getattr(at, name)[held]
+            values[moving[held]] = getattr(current, name)[held]
         slide[moving[held]] = k * step
-        on = at.touching & ~held
-        moving, X, at = moving[on], X[on], at.select(on)
+        sliding = current.touching & ~held
+        moving, X, current = moving[sliding], X[sliding], current.select(sliding)
     return Contacts(**rest), slide
 
 

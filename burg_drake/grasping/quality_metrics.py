@@ -60,7 +60,7 @@ class Payload:
 
     Attributes:
         mass: [kg].
-        center_of_mass: in the object frame O [m].
+        center_of_mass: centre of mass in the object frame O [m].
         friction: coefficient between object and pads.
     """
 
@@ -109,7 +109,7 @@ class Quality:
             about the centre of mass over its largest distance from the surface. 0 if the pads never
             hold the object. Found by a search whose result is never too small; see
             `wrench_margins`.
-        volume: of the wrench space [-] (Miller and Allen, "Examples of 3D grasp quality
+        volume: volume of the wrench space [-] (Miller and Allen, "Examples of 3D grasp quality
             computations", ICRA 1999); 0 if the pads never hold the object. Coarser than epsilon:
             the friction ellipsoid is approximated by a polytope of equal volume with 80 faces.
         load_margin: largest force on the centre of mass that the grip bears in every direction,
@@ -121,7 +121,7 @@ class Quality:
             mass hangs below the pads. Of 1,000 trials on the objects of `tabletop_six` and two
             scans, 332 had a margin below 1: 282 were lifted, 149 of them turned by more than 5
             degrees. Of 451 with 1.5 or more, 436 were lifted, 24 turned.
-        patch_area: of the smaller of the two patches [m^2].
+        patch_area: area of the smaller of the two patches [m^2].
         contact_offset: distance between centre of mass and the line through the contacts [m].
     """
 
@@ -179,9 +179,9 @@ def grasp_quality(
 
     Args:
         X_OG: (N, 4, 4) grasps of one object.
-        surface: of the object.
+        surface: surface of the object.
         payload: mass, centre of mass and friction of the object.
-        jaws: of the hand.
+        jaws: jaws of the hand.
         up: (3,) or (N, 3) direction against gravity in the object frame; None if unknown.
 
     Raises:

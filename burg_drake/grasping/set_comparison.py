@@ -89,12 +89,12 @@ class Nearest:
     """For each grasp of a set, the nearest grasp of another set.
 
     Attributes:
-        index: (N,) in the other set, see `find_nearest` for ties; -1 if it has no grasp of that
-            object. Distance, translation and angle are infinite then.
+        index: (N,) indices in the other set, see `find_nearest` for ties; -1 if it has no grasp of
+            that object. Distance, translation and angle are infinite then.
         distance: (N,) combined distance [m].
         translation: (N,) [m].
         angle: (N,) modulo the swap of the fingers [rad].
-        lever: of the combined distance [m/rad].
+        lever: lever of rotations in the combined distance [m/rad].
         version: `DISTANCE_VERSION`.
     """
 
@@ -193,13 +193,13 @@ DISTRIBUTION_QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # Quantiles of
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics of the finite ones among numbers.
+    """Statistics of the finite values among numbers.
 
     Attributes:
         count: number of finite values.
         missing: number of other values.
-        mean: of the finite values; NaN if there are none.
-        quantiles: at `DISTRIBUTION_QUANTILES`, from smallest to largest; NaN if there are none.
+        mean: mean of the finite values; NaN if there are none.
+        quantiles: values at `DISTRIBUTION_QUANTILES`, rising; NaN if there are none.
     """
 
     count: int
@@ -223,7 +223,7 @@ class ObjectSummary:
         duplicates: number of grasps that equal another grasp of the same object and instance.
         neighbour: distances to the nearest other grasp [m], see `neighbour_distances`.
         width: distance of the contacts [m].
-        score: of the grasps.
+        score: scores of the grasps.
     """
 
     grasps: int
@@ -239,9 +239,9 @@ class SetSummary:
     """Statistics of a set of grasps.
 
     Attributes:
-        overall: of all grasps.
-        objects: by name of the object.
-        numbers: of each column of numbers, and of the coordinates `x`, `y`, `z` [m].
+        overall: statistics of all grasps.
+        objects: statistics of the grasps of each object, by its name.
+        numbers: distribution of each column of numbers, and of the coordinates `x`, `y`, `z` [m].
         truths: share of true values of each column of truth values.
         texts: count of each value of each text column, the most frequent first.
         version: `DISTANCE_VERSION`.
@@ -280,8 +280,8 @@ class SetComparison:
     """Comparison of two sets of grasps.
 
     Attributes:
-        overall: of all grasps.
-        objects: by name, of every object of either set.
+        overall: comparison of all grasps.
+        objects: comparison for every object of either set, by its name.
         shared_ids: number of identifiers in both sets.
         tolerance: bounds of a match.
         version: `DISTANCE_VERSION`.
@@ -330,7 +330,7 @@ def summarize(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> SetSummary:
             texts[name] = _count_values(values.tolist())
     return SetSummary(
         overall=_summarize_object(grasps, neighbour, everything),
-        objects={name: _summarize_object(grasps, neighbour, of) for name, of in objects.items()},
+        objects={n: _summarize_object(grasps, neighbour, rows) for n, rows in objects.items()},
         numbers=numbers,
         truths=truths,
         texts=texts,
@@ -353,14 +353,14 @@ def compare_grasps(
     nearest = nearest_grasps(reference, grasps, lever=tolerance.lever)
     back = nearest_grasps(grasps, reference, lever=tolerance.lever).distance
 
-    def part(of: Mask, others: Mask) -> ObjectComparison:
+    def part(rows: Mask, other_rows: Mask) -> ObjectComparison:
         return ObjectComparison(
-            coverage=_finite_share(covered[of]),
-            precision=_finite_share(precise[others]),
-            to_grasps=distribution(nearest.distance[of]),
-            to_reference=distribution(back[others]),
-            translation=distribution(nearest.translation[of]),
-            angle=distribution(nearest.angle[of]),
+            coverage=_finite_share(covered[rows]),
+            precision=_finite_share(precise[other_rows]),
+            to_grasps=distribution(nearest.distance[rows]),
+            to_reference=distribution(back[other_rows]),
+            translation=distribution(nearest.translation[rows]),
+            angle=distribution(nearest.angle[rows]),
         )
 
     names = np.union1d(reference.object, grasps.object).tolist()
@@ -372,15 +372,15 @@ def compare_grasps(
     )
 
 
-def _summarize_object(grasps: GraspSet, neighbour: Array, of: Mask) -> ObjectSummary:
+def _summarize_object(grasps: GraspSet, neighbour: Array, rows: Mask) -> ObjectSummary:
     instances = grasps.columns.get(INSTANCE_COLUMN)
     return ObjectSummary(
-        grasps=int(of.sum()),
-        instances=0 if instances is None else len(set(instances[of].tolist())),
-        duplicates=int((neighbour[of] == 0.0).sum()),
-        neighbour=distribution(neighbour[of]),
-        width=distribution(grasps.width[of]),
-        score=distribution(grasps.score[of]),
+        grasps=int(rows.sum()),
+        instances=0 if instances is None else len(set(instances[rows].tolist())),
+        duplicates=int((neighbour[rows] == 0.0).sum()),
+        neighbour=distribution(neighbour[rows]),
+        width=distribution(grasps.width[rows]),
+        score=distribution(grasps.score[rows]),
     )
 
 

@@ -84,7 +84,7 @@ def wrench_reaches(space: WrenchSpace, goals: Sequence[WrenchObjective]) -> list
     """Reach of the wrench spaces for several objectives.
 
     Args:
-        space: of N grasps.
+        space: wrench spaces of N grasps.
         goals: `ANY_WRENCH` gives epsilon; `ANY_FORCE` the largest force on the centre of mass that
             the grip bears in every direction; `force_along` the largest force along one direction.
 
@@ -239,8 +239,8 @@ def epsilon_bracket(space: WrenchSpace, subdivisions: int = 2) -> tuple[Array, A
 
     Args:
         space: the wrench spaces.
-        subdivisions: of the inscribed polytope of the lower bound. Its wrench space is part of the
-            true one, and its epsilon is computed from all of its facets.
+        subdivisions: subdivisions of the inscribed polytope of the lower bound. The wrench space of
+            this polytope is part of the true one; its epsilon is computed from all its facets.
 
     Returns:
         (N,) lower and upper bounds.

@@ -35,11 +35,11 @@ class TriangulatedBall:
         vertices: (V, 3).
         faces: (M, 3) vertices of the triangles, seen counter-clockwise from outside.
         normals: (M, 3) outward unit normals.
-        distances: (M,) of the triangles' planes from the centre.
+        distances: (M,) distances of the triangles' planes from the centre.
         edges: (E, 2) vertices of the edges.
         sides: (E, 2) the triangles that meet at each edge.
         neighbors: (M, 3) the triangles next to each triangle.
-        volume: enclosed.
+        volume: enclosed volume.
     """
 
     vertices: Array
@@ -120,9 +120,9 @@ class WrenchSpace:
         """Wrench spaces of contact patches with unit normal forces.
 
         Args:
-            contacts: of N grasps.
+            contacts: contacts of N grasps.
             friction: coefficient.
-            center_of_mass: (3,) in O [m]; torques are about it.
+            center_of_mass: (3,) centre of mass in O [m]; torques are about it.
             length: characteristic length; torques are divided by it [m].
             tangent: (N, 3) direction in O that the tangents of the contacts start from.
         """
@@ -204,10 +204,10 @@ class ContactSlides:
     """Contributions of M slides of each contact to u = u0 + alpha_1 u_1 + alpha_2 u_2.
 
     Attributes:
-        u: (N, 2, M, 6).
+        u: (N, 2, M, 6) u_1 and u_2.
         zero: (N, 2, M, 2) with alpha_1 zero_1 + alpha_2 zero_2 = right.
         turn: (N, 2, M) cross products of right and zero.
-        u0: (N, 6).
+        u0: (N, 6) the part without alpha.
     """
 
     u: Array

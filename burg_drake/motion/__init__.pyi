@@ -44,7 +44,7 @@ from .joint_limits import ArmLimits as ArmLimits
 from .line_poses import (
     ClosedFormFiller as ClosedFormFiller,
     DenseRows as DenseRows,
-    LinePoses as LinePoses,
+    HandPath as HandPath,
     straighten_rows as straighten_rows,
 )
 from .line_search import (

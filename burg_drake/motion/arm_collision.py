@@ -110,12 +110,12 @@ def release_geometry(
     own = plant.GetCollisionGeometriesForBody(plant.get_body(body))
     free = {*ignored} - {*anchored.values()}
     others = {g for b in free for g in plant.GetCollisionGeometriesForBody(plant.get_body(b))}
-    others |= {geometry for geometry, of in anchored.items() if of in ignored}
-    tied = {geometry for geometry, of in anchored.items() if of == body}
+    others |= {geometry for geometry, owner in anchored.items() if owner in ignored}
+    tied = {geometry for geometry, owner in anchored.items() if owner == body}
 
     def release(_: RobotDiagram, context: CollisionCheckerContext) -> None:
         graph_context = context.scene_graph_context()
-        known = {*context.GetQueryObject().inspector().GetAllGeometryIds()}  # each has its own
+        known = {*context.GetQueryObject().inspector().GetAllGeometryIds()}  # differs by context
         for geometry in tied & known:
             graph.RemoveRole(graph_context, source, geometry, Role.kProximity)
         for geometry in own if tied else ():
@@ -174,7 +174,7 @@ class InstanceShifts:
         self._moved: tuple[str, Array] | None = None
 
     def shift_only(self, name: str, p_W: ArrayLike) -> None:
-        """Shifts one instance, and returns all others to their placements.
+        """Shifts one instance, and moves all others back to their placements.
 
         Args:
             name: the instance; "" for none.
@@ -211,7 +211,7 @@ class Overlap:
     Attributes:
         link: the robot's link.
         other: instance, obstacle, `table`, or another link.
-        depth: of the deepest contact [m].
+        depth: depth of the deepest contact [m].
         carried: whether `link` is rigid with the hand and `other` is not part of the arm, so that
             every configuration with the hand at this pose has the same overlap.
     """
@@ -271,8 +271,8 @@ class ArmCollision:
             (plant.GetJointByName(finger.joint, hand).position_start(), finger)
             for finger in station_diagram.station.hand.fingers
         ]
-        self._carried = CarriedInstances(station_diagram)
-        self._carrying: dict[str, tuple[SceneGraphCollisionChecker, InstanceShifts]] = {}
+        self._instances = CarriedInstances(station_diagram)
+        self._carrying_checkers: dict[str, tuple[SceneGraphCollisionChecker, InstanceShifts]] = {}
         self._anchored: dict[GeometryId, BodyIndex] = {}
         self._base_obstacles = self._find_base_obstacles()
         self._in_hand = set(plant.GetBodyIndices(hand))
@@ -280,7 +280,7 @@ class ArmCollision:
         fingers = self._in_hand - {body.index()}  # checked with closed fingers, too
         self._apart = tuple(pair for pair in apart if not fingers & {*pair})
         self._empty_handed = self._make_anchored_checker()
-        self._shifts = self._carried.shifts_for(self.checker)
+        self._shifts = self._instances.shifts_for(self.checker)
         self._names = station_diagram.body_names
         self._with_hand = _hand_bodies(station_diagram)
 
@@ -297,7 +297,7 @@ class ArmCollision:
             q: (n,) arm positions.
             carried: the instance that the hand holds, if any.
             rise: its height above its placement [m].
-            width: distance between the pads [m]; the hand is open if that is NaN.
+            width: distance between the pads [m]; NaN if the hand is open.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -310,7 +310,7 @@ class ArmCollision:
             for index, finger in self._fingers:
                 positions[index] = finger.position(closed)
         if carried:
-            positions[self._carried.height_index(carried)] = rise
+            positions[self._instances.height_index(carried)] = rise
         return positions
 
     def is_free(
@@ -325,11 +325,11 @@ class ArmCollision:
 
         Args:
             q: (n,) arm positions.
-            carried: the instance that the hand holds; None or "" if it is empty. It is an obstacle
-                to the arm's links, but not to the hand and its fingers. Collisions between objects
-                are not checked.
+            carried: the instance that the hand holds; None or "" if the hand is empty. The instance
+                is an obstacle to the arm's links, but not to the hand and its fingers. Collisions
+                between objects are not checked.
             moved_W: (3,) displacement of that instance [m]; all others are at their placements.
-            width: distance between the pads [m]; the hand is open if that is NaN.
+            width: distance between the pads [m]; NaN if the hand is open.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -374,16 +374,16 @@ class ArmCollision:
 
     def _carrying_checker(self, carried: str) -> tuple[SceneGraphCollisionChecker, InstanceShifts]:
         """Clone of the checker for a carried instance, which does not collide with the hand."""
-        if carried not in self._carrying:
+        if carried not in self._carrying_checkers:
             checker = self._make_carrying_checker(self._diagram.free[carried])
-            self._carrying[carried] = checker, self._carried.shifts_for(checker)
-        return self._carrying[carried]
+            self._carrying_checkers[carried] = checker, self._instances.shifts_for(checker)
+        return self._carrying_checkers[carried]
 
     def _make_anchored_checker(self) -> SceneGraphCollisionChecker:
         """Clone of the checker in which all fixed geometry is attached to the world."""
         ignored_pair = 1  # A pair that is not checked, in Drake's filter matrix.
         diagram, checker = self._diagram, self.checker.Clone()
-        filtered = checker.GetFilteredCollisionMatrix().copy()  # set once: that costs 1 ms
+        filtered = checker.GetFilteredCollisionMatrix().copy()  # set once, as setting costs 1 ms
         for a, b in self._apart:
             filtered[int(a), int(b)] = filtered[int(b), int(a)] = ignored_pair
         checker.SetCollisionFilterMatrix(filtered)

@@ -35,16 +35,17 @@ class LinkPoses:
         """(3, K) origin of a frame [m]."""
         return self.table[3, :, frame]
 
-    def place(self, frame: int, points: Single) -> Single:
-        """(3, M, K) places in the world of points (M, 3) that are fixed in a frame."""
+    def transform_points(self, frame: int, points: Single) -> Single:
+        """(3, M, K) points in the world, given as points (M, 3) in a frame."""
         return _transform_points(self.table[:, :, frame, None], points.T[:, :, None])
 
-    def place_own(self, frames: Indices, points: Single) -> Single:
-        """(3, B, K) places of points (B, 3) that are fixed in frames (B,) each."""
+    def transform_per_frame(self, frames: Indices, points: Single) -> Single:
+        """(3, B, K) points in the world, given as points (B, 3) in frames (B,)."""
         return _transform_points(self.table.take(frames, axis=2), points.T[:, :, None])
 
-    def place_each(self, frame: Indices, centers: Single, which: Indices) -> Single:
-        """(3, M, F) places of points (3, M, F) in frames (F,) of configurations `which` (F,)."""
+    def transform_per_node(self, frame: Indices, centers: Single, which: Indices) -> Single:
+        """(3, M, F) points in the world, given as points (3, M, F) in frames (F,) of configurations
+        `which` (F,)."""
         flat = self.table.reshape(12, -1)
         poses = flat.take(frame * self.table.shape[3] + which, axis=1)
         return _transform_points(poses.reshape(4, 3, 1, -1), centers)

@@ -35,7 +35,7 @@ from burg_drake.motion.hand_sweep import HandSweep, SweepResult
 from burg_drake.motion.home_posture import require_free_home
 from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.ik_solutions import IkRoutine, RoutineSolutions
-from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_poses import HandPath
 from burg_drake.motion.line_search import LineSearch, SuccessiveLineSearch
 from burg_drake.motion.motion_search import GraspBatch, MotionSearch
 from burg_drake.motion.motion_settings import ReachSettings
@@ -54,7 +54,7 @@ class HandVerdicts:
 
     Attributes:
         blocked_by: (N, 2) verdict that names the first obstacle; None where the hand is free.
-        clearance: (N, 2) of the hand on its path, negative where it is not free [m].
+        clearance: (N, 2) clearance of the hand on its path, negative where it is not free [m].
     """
 
     blocked_by: NDArray[np.object_]
@@ -75,7 +75,7 @@ class HandVerdicts:
         return verdict
 
     def record(self, flip: int, rows: Indices, sweep: SweepResult, outcome: Outcome) -> None:
-        """Enters the sweep of grasps (S,) with one finger assignment."""
+        """Enters the result of the sweep of grasps `rows` (S,) with one finger assignment."""
         blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
         room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
         self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
@@ -111,23 +111,23 @@ class HandPaths:
         """Checks approach and retreat."""
         shape = self.X_both.shape[:2]
         found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
-        for name, flip, at in self._to_check(found):
-            sweep = self.sweep.approach(name, self.X_both[at, flip])
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_APPROACH)
-        for name, flip, at in self._to_check(found) if self.retreats else ():
-            sweep = self.sweep.retreat(name, self.X_both[at, flip], self.width[at])
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_RETREAT)
+        for name, flip, rows in self._list_checks(found):
+            sweep = self.sweep.approach(name, self.X_both[rows, flip])
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_APPROACH)
+        for name, flip, rows in self._list_checks(found) if self.retreats else ():
+            sweep = self.sweep.retreat(name, self.X_both[rows, flip], self.width[rows])
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_RETREAT)
         return self._copy_if_symmetric(found)
 
     def check_lift(self, before: HandVerdicts, height: float) -> HandVerdicts:
         """Checks the lift to a height [m], too."""
         found = before[np.arange(len(before.blocked_by))]
-        for name, flip, at in self._to_check(found):
-            sweep = self.sweep.lift(name, self.X_both[at, flip], self.width[at], height)
-            found.record(flip, at, sweep, Outcome.HAND_COLLISION_LIFT)
+        for name, flip, rows in self._list_checks(found):
+            sweep = self.sweep.lift(name, self.X_both[rows, flip], self.width[rows], height)
+            found.record(flip, rows, sweep, Outcome.HAND_COLLISION_LIFT)
         return self._copy_if_symmetric(found)
 
-    def _to_check(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
+    def _list_checks(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
         """Targets, finger assignments, and indices of the grasps that are free so far."""
         flips = (0,) if self.sweep.symmetric else (0, 1)
         free = found.clearance >= 0.0
@@ -152,22 +152,22 @@ LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether rows (S,) are free up to a level."""
 
 
-def lift_heights(least: float, most: float) -> Array:
-    """Heights to try, rising from `least` to `most` in steps of 1 cm [m]."""
-    rising = np.arange(least, most - 1e-9, 0.01)
+def lift_heights(shortest: float, whole: float) -> Array:
+    """Heights to try, rising from `shortest` to `whole` in steps of 1 cm [m]."""
+    rising = np.arange(shortest, whole - 1e-9, 0.01)
     rising[1:] = np.round(rising[1:], 9)  # sums of steps have rounding errors
-    return np.append(rising, most)
+    return np.append(rising, whole)
 
 
 def raise_lifts(
-    whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
+    whole: Sequence[Reach], heights: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
     """Searches the largest free lift of grasps for which the whole lift is not free.
 
     Args:
         whole: N verdicts with the whole lift.
-        tried: (H,) rising heights; the last is the whole lift [m].
-        judge: gives verdicts at other heights.
+        heights: (H,) rising heights; the last is the whole lift [m].
+        judge: judges grasps at other heights.
         hand_is_free: checks the hand alone at other heights.
 
     Returns:
@@ -182,34 +182,34 @@ def raise_lifts(
         Outcome.JOINT_LIMIT,
     )
     found = list(whole)
-    asked = _true_indices(
+    grasps = _true_indices(
         reach.outcome is not None and reach.outcome not in height_independent for reach in whole
     )
-    low, high = np.full(len(asked), -1), np.full(len(asked), len(tried) - 1)
+    low, high = np.full(len(grasps), -1), np.full(len(grasps), len(heights) - 1)
 
-    def reached(level: int, rows: Indices) -> Booleans:
-        verdicts = judge(tried[level], asked[rows])
-        for k, reach in zip(asked[rows], verdicts, strict=True):
+    def is_reachable(level: int, rows: Indices) -> Booleans:
+        verdicts = judge(heights[level], grasps[rows])
+        for k, reach in zip(grasps[rows], verdicts, strict=True):
             if reach.outcome is None:
                 found[k] = replace(reach, blocker=whole[k].blocker)
             elif level == 0:
                 found[k] = reach
         return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
 
-    by_hand = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in asked)
+    hand_blocked = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in grasps)
     free, _ = _bisect_levels(
-        low[by_hand],
-        high[by_hand],
-        lambda level, rows: hand_is_free(tried[level], asked[by_hand[rows]]),
+        low[hand_blocked],
+        high[hand_blocked],
+        lambda level, rows: hand_is_free(heights[level], grasps[hand_blocked[rows]]),
     )
     # The arm can often lift as high as the hand alone.
-    guess = np.full(len(asked), -1)
-    guess[by_hand] = np.maximum(free, 0)
-    high[by_hand] = guess[by_hand] + 1
-    low, high = _narrow_levels(low, high, guess, reached)
+    guess = np.full(len(grasps), -1)
+    guess[hand_blocked] = np.maximum(free, 0)
+    high[hand_blocked] = guess[hand_blocked] + 1
+    low, high = _narrow_levels(low, high, guess, is_reachable)
     # If the lowest height is not free, no height is.
-    low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), reached)
-    _bisect_levels(low, high, reached)
+    low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), is_reachable)
+    _bisect_levels(low, high, is_reachable)
     return found
 
 
@@ -288,8 +288,8 @@ class ArmReach:
         self._sweep = HandSweep(scene, station, self.motion)
         X_WA = arm.X_WA.matrix()
         self._X_AW = inverse(X_WA)
-        self._lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
-        self._search = _line_search(self, self._proximity, self._lines, home, ik)
+        self._hand_path = HandPath.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
+        self._search = _line_search(self, self._proximity, self._hand_path, home, ik)
         self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
@@ -353,8 +353,8 @@ class ArmReach:
         whole = judge(motion.lift_height, np.arange(len(X)))
         if motion.shortest >= motion.lift_height:
             return whole
-        tried = lift_heights(motion.shortest, motion.lift_height)
-        return raise_lifts(whole, tried, judge, hand_is_free)
+        heights = lift_heights(motion.shortest, motion.lift_height)
+        return raise_lifts(whole, heights, judge, hand_is_free)
 
     def path_is_free(
         self,
@@ -394,13 +394,13 @@ class ArmReach:
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
             self._searches[height] = self._search.lifted(height)
-        size = min(GRASPS_PER_BATCH, max_poses // len(replace(self._lines, lift=height).layers))
+        size = min(GRASPS_PER_BATCH, max_poses // len(replace(self._hand_path, lift=height).layers))
         for k in range(0, len(left), size):
             part = left[k : k + size]
             X_WG, clearance = paths.X_both[part], hand.clearance[part]
-            lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
-            task = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
-            verdicts = MotionSearch(task, lines, self._tree, self.settings).run()
+            search = self._searches[height].begin(self._X_AW @ X_WG, clearance)
+            grasps = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
+            verdicts = MotionSearch(grasps, search, self._tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None
                 found[index] = replace(verdict, lift=height) if reached else verdict
@@ -408,8 +408,8 @@ class ArmReach:
 
 
 def _with_swapped_fingers(X_WG: Array, X_AW: Array) -> Array:
-    """(N, 2, 4, 4) grasps in the world and their twins with swapped fingers, in the same order
-    whichever of the two was given."""
+    """(N, 2, 4, 4) both finger assignments of grasps in the world, in an order that does not depend
+    on which of the two is given."""
     twins = np.stack([X_WG, swap_fingers(X_WG)], axis=1)
     closing_A = (X_AW[:3, :3] @ X_WG[:, :3, :1])[..., 0]
     largest = np.take_along_axis(closing_A, np.abs(closing_A).argmax(axis=1)[:, None], axis=1)
@@ -421,7 +421,7 @@ def _with_swapped_fingers(X_WG: Array, X_AW: Array) -> Array:
 def _line_search(
     reach: ArmReach,
     proximity: ArmProximity,
-    lines: LinePoses,
+    hand_path: HandPath,
     home: Array,
     routine: IkRoutine | None,
 ) -> LineSearch:
@@ -430,14 +430,14 @@ def _line_search(
     margin = settings.limit_margin
     if routine is not None:
         return NumericLineSearch(
-            *(arm, lines, proximity, home, settings),
+            *(arm, hand_path, proximity, home, settings),
             solutions=RoutineSolutions(arm, routine, margin),
             unlimited_solutions=RoutineSolutions(arm, routine, margin, limited=False),
         )
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:
-        return NumericLineSearch(arm, lines, proximity, home, settings)
-    rest = lines, proximity, home
+        return NumericLineSearch(arm, hand_path, proximity, home, settings)
+    rest = hand_path, proximity, home
     few = replace(settings, starts=settings.starts[:1])  # more found nothing more in 3,000 grasps
     return SuccessiveLineSearch(
         ClosedFormLineSearch(arm, ik.within(margin), *rest, settings),

@@ -31,7 +31,6 @@ from burg_drake.motion.ball_tree import (
     BallTrees,
     BodyBalls,
     bodies_with_shape,
-    hull_vertices,
 )
 from burg_drake.motion.self_clearance import (
     ClearanceTable,
@@ -41,7 +40,7 @@ from burg_drake.motion.self_clearance import (
     SelfClearance,
     collision_pairs,
 )
-from burg_drake.station import StationDiagram
+from burg_drake.station import StationDiagram, hull_vertices
 
 BALL_ARRAYS = ("center", "outer", "inner")
 """Arrays of `Balls`."""
@@ -49,20 +48,20 @@ NODE_ARRAYS = ("frame", "centers", "outer", "inner", "child")
 """Arrays of `BallTrees`."""
 
 
-def shape_to_arrays(trees: BallTrees, itself: SelfClearance) -> Arrays:
+def shape_to_arrays(trees: BallTrees, self_clearance: SelfClearance) -> Arrays:
     """Arrays for `shape_from_arrays`, without the body indices of a diagram."""
     bodies = trees.bodies
     balls = Balls.joined([body.balls for body in bodies])
     arrays: dict[str, NDArray[Any]] = {
         "body_end": np.cumsum([len(body.balls.outer) for body in bodies]),
-        "pairs": _pairs_to_array(itself.pairs),
-        "apart": _pairs_to_array(itself.apart),
+        "pairs": _pairs_to_array(self_clearance.pairs),
+        "apart": _pairs_to_array(self_clearance.apart),
     }
     for name in ("frame", "center", "radius", "root"):
         arrays[f"body_{name}"] = np.array([getattr(body, name) for body in bodies])
     arrays |= {f"ball_{name}": getattr(balls, name) for name in BALL_ARRAYS}
     arrays |= {f"node_{name}": getattr(trees, name) for name in NODE_ARRAYS}
-    for k, (table, pairs) in enumerate(itself.tables):
+    for k, (table, pairs) in enumerate(self_clearance.tables):
         grid = table.grid
         arrays |= {
             f"table{k}_pairs": _pairs_to_array(pairs),
@@ -128,16 +127,16 @@ class ArmShape:
 
     Attributes:
         links: its kinematics.
-        limits: (n, 2) of the joints' positions [rad or m].
+        limits: (n, 2) limits of the joints' positions [rad or m].
         trees: balls that cover it.
-        itself: its clearance from itself.
+        self_clearance: its clearance from itself.
         content: hash of the inputs.
     """
 
     links: ArmLinks
     limits: Array
     trees: BallTrees
-    itself: SelfClearance
+    self_clearance: SelfClearance
     content: str
 
     @classmethod
@@ -156,7 +155,7 @@ class ArmShape:
         if key not in _kept:
 
             def make() -> Arrays:
-                trees = BallTrees.of(station_diagram, links)
+                trees = BallTrees.from_diagram(station_diagram, links)
                 return shape_to_arrays(
                     trees, SelfClearance.of(station_diagram, links, trees, limits)
                 )
@@ -164,11 +163,11 @@ class ArmShape:
             _kept[key] = shape_from_arrays(cached("robot", key, make))
         while len(_kept) > 16:  # shapes of robots kept in memory
             _kept.popitem(last=False)
-        trees, itself = _kept[key]
+        trees, self_clearance = _kept[key]
         own = dict(zip(bodies_with_shape(station_diagram, links), trees.bodies, strict=True))
         # In another scene the robot's bodies have other indices, in the same order.
         bodies = tuple(replace(known, body=body) for body, known in own.items())
-        return cls(links, limits, replace(trees, bodies=bodies), itself, key)
+        return cls(links, limits, replace(trees, bodies=bodies), self_clearance, key)
 
 
 def _arm_content(station_diagram: StationDiagram, links: ArmLinks) -> Iterator[Any]:
@@ -198,7 +197,7 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
         case Box():
             sizes = shape.size().tolist()
         case Convex() | Mesh():
-            sizes = hull_vertices(inspector, geometry)
+            sizes = hull_vertices(shape)
         case _:
             sizes = []  # unknown shape; `cover_body` raises an error
     return [type(shape).__name__, sizes]

@@ -31,13 +31,13 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.core import Array, Indices, InvalidInputError, Single, inverse, transform_points
 from burg_drake.geometry import Polytope
 from burg_drake.motion.arm_links import ArmLinks, LinkPoses
-from burg_drake.station import StationDiagram
+from burg_drake.station import StationDiagram, hull_vertices
 
 
 class Cover:
     """Accuracy of the balls that cover a shape."""
 
-    cell_size = 1.8  # Size of a cell over the overshoot.
+    cell_size = 1.8  # Cell size as a multiple of the overshoot.
     max_cells = 2_000  # Cells of a shape. Larger shapes are cut more coarsely.
     coarsening = 1.1  # Factor by which the overshoot rises until there are few enough cells.
     max_inner_radius = 0.08  # Metres. Radius of the largest balls inside a shape.
@@ -50,8 +50,8 @@ class Balls:
 
     Attributes:
         center: (M, 3) [m].
-        outer: (M,) radii with which they cover it [m].
-        inner: (M,) radii of the balls about the same centres inside the shape [m].
+        outer: (M,) radii of the covering balls [m].
+        inner: (M,) radii of balls with the same centres inside the shape [m].
     """
 
     center: Array
@@ -59,7 +59,7 @@ class Balls:
     inner: Array
 
     def moved(self, X_AB: Array) -> Balls:
-        """The balls given in B, expressed in A: `X_AB` is (4, 4)."""
+        """The balls, given in B, expressed in A; `X_AB` is (4, 4)."""
         return Balls(transform_points(X_AB, self.center), self.outer, self.inner)
 
     @classmethod
@@ -78,8 +78,8 @@ def cover_body(
     """Balls that cover the collision geometries of a body, in its frame.
 
     Args:
-        inspector: of the scene graph.
-        geometries: of one body.
+        inspector: inspector of the scene graph.
+        geometries: collision geometries of one body.
         overshoot: how far balls should stick out [m]; on shapes of several decimetres they stick
             out farther. For a convex mesh, its bounding box is covered.
 
@@ -87,8 +87,10 @@ def cover_body(
         InvalidInputError: a geometry is of a shape that cannot be covered.
     """
     balls = Balls(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-    by_rows = sorted(geometries, key=lambda g: not isinstance(inspector.GetShape(g), Capsule))
-    for geometry in by_rows:
+    capsules_first = sorted(
+        geometries, key=lambda g: not isinstance(inspector.GetShape(g), Capsule)
+    )
+    for geometry in capsules_first:
         X_BP = inspector.GetPoseInFrame(geometry).GetAsMatrix4()
         more = _cover(inspector, geometry, overshoot, balls.moved(inverse(X_BP)))
         balls = Balls.joined([balls, more.moved(X_BP)])
@@ -96,7 +98,7 @@ def cover_body(
 
 
 def _cover(
-    inspector: SceneGraphInspector, geometry: GeometryId, overshoot: float, given: Balls
+    inspector: SceneGraphInspector, geometry: GeometryId, overshoot: float, existing: Balls
 ) -> Balls:
     shape = inspector.GetShape(geometry)
     match shape:
@@ -104,13 +106,14 @@ def _cover(
             radius = np.array([shape.radius()])
             return Balls(np.zeros((1, 3)), radius, radius)
         case Capsule():
+            # Half the overshoot takes only about 1.4 times as many balls in a row.
             return _cover_capsule(shape.radius(), shape.length(), overshoot / 2)
         case Box():
-            return _cover_box(np.asarray(shape.size()) / 2, overshoot, given)
+            return _cover_box(np.asarray(shape.size()) / 2, overshoot, existing)
         case Cylinder():
-            return _cover_cylinder(shape.radius(), shape.length() / 2, overshoot, given)
+            return _cover_cylinder(shape.radius(), shape.length() / 2, overshoot, existing)
         case Convex() | Mesh():
-            return _cover_hull(hull_vertices(inspector, geometry), overshoot, given)
+            return _cover_hull(hull_vertices(shape), overshoot, existing)
     raise unsupported_shape_error(inspector, geometry)
 
 
@@ -125,12 +128,6 @@ def unsupported_shape_error(
     )
 
 
-def hull_vertices(inspector: SceneGraphInspector, geometry: GeometryId) -> Array:
-    """(V, 3) vertices of the convex hull of a mesh [m]."""
-    hull = inspector.GetConvexHull(geometry)
-    return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-
-
 def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
     """A row of balls along z. Half-way between centres, outer balls meet on the capsule's side."""
     step = 2.0 * np.sqrt((radius + overshoot) ** 2 - radius**2)
@@ -140,43 +137,43 @@ def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
     return Balls(np.column_stack([0 * z, 0 * z, z]), np.full(count, outer), np.full(count, radius))
 
 
-def _affordable_cells(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
+def _cell_counts(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
     """(3,) numbers of cells along a shape, and the overshoot for them [m]."""
     while np.prod(count := cells(overshoot)) > Cover.max_cells:
         overshoot *= Cover.coarsening
     return count.astype(int), overshoot
 
 
-def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
-    count, overshoot = _affordable_cells(
+def _cover_box(half: Array, overshoot: float, existing: Balls) -> Balls:
+    count, overshoot = _cell_counts(
         lambda s: np.ceil(2.0 * half / (Cover.cell_size * s)), overshoot
     )
     ticks = [np.linspace(-h, h, 2 * n + 1) for h, n in zip(half, count, strict=True)]
     lattice = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
-    centers = _middles_and_inner_corners(lattice)
+    centers = _candidate_centers(lattice)
     depth = (half - np.abs(centers)).min(axis=1)
-    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, given)
+    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, existing)
 
 
-def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: Balls) -> Balls:
+def _cover_cylinder(radius: float, half_length: float, overshoot: float, existing: Balls) -> Balls:
     """Covers sectors of the cylinder; their outer corners lie on a circumscribed polygon."""
     sides = np.array([2.0 * np.pi * radius, radius, 2.0 * half_length])
-    least = np.array([8, 1, 1])  # sectors, rings, layers
-    (sectors, rings, layers), overshoot = _affordable_cells(
-        lambda s: np.maximum(least, np.ceil(sides / (Cover.cell_size * s))), overshoot
+    min_count = np.array([8, 1, 1])  # sectors, rings, layers
+    (sectors, rings, layers), overshoot = _cell_counts(
+        lambda s: np.maximum(min_count, np.ceil(sides / (Cover.cell_size * s))), overshoot
     )
     angle = np.pi * np.arange(2 * sectors + 1) / sectors
     rho = radius / np.cos(np.pi / sectors) * np.linspace(0.0, 1.0, 2 * rings + 1)
     z = np.linspace(-half_length, half_length, 2 * layers + 1)
     r, a, h = np.meshgrid(rho, angle, z, indexing="ij")
     lattice = np.stack([r * np.cos(a), r * np.sin(a), h], axis=-1)
-    centers = _middles_and_inner_corners(lattice)
+    centers = _candidate_centers(lattice)
     axial = half_length - np.abs(centers[:, 2])
     depth = np.minimum(radius - np.hypot(centers[:, 0], centers[:, 1]), axial)
-    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, given)
+    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, existing)
 
 
-def _cover_hull(points: Array, overshoot: float, given: Balls) -> Balls:
+def _cover_hull(points: Array, overshoot: float, existing: Balls) -> Balls:
     """Covers the hull's bounding box, which is exact for a hull that is a box."""
     polytope = Polytope.from_points(points)
     X = np.eye(4)
@@ -184,35 +181,35 @@ def _cover_hull(points: Array, overshoot: float, given: Balls) -> Balls:
         X, half = box
     else:
         X[:3, 3], half = polytope.bounds
-    balls = _cover_box(half, overshoot, given.moved(inverse(X))).moved(X)
+    balls = _cover_box(half, overshoot, existing.moved(inverse(X))).moved(X)
     depth = (polytope.offsets - balls.center @ polytope.normals.T).min(axis=1)
     return Balls(balls.center, balls.outer, np.minimum(balls.inner, depth))
 
 
-def _middles_and_inner_corners(lattice: Array) -> Array:
+def _candidate_centers(lattice: Array) -> Array:
     """(C, 3) cell middles and inner cell corners of a lattice (2a+1, 2b+1, 2c+1, 3)."""
     middles, corners = lattice[1::2, 1::2, 1::2], lattice[2:-1:2, 2:-1:2, 2:-1:2]
     return np.concatenate([middles.reshape(-1, 3), corners.reshape(-1, 3)])
 
 
 def _choose_balls(
-    centers: Array, depth: Array, nodes: Array, overshoot: float, given: Balls
+    centers: Array, depth: Array, nodes: Array, overshoot: float, existing: Balls
 ) -> Balls:
-    """A greedy set cover of cells by balls.
+    """Covers cells by balls: a greedy set cover.
 
     Args:
-        centers: (C, 3) of the balls to choose from [m]; the cells' middles first.
-        depth: (C,) of the centres in the shape [m].
+        centers: (C, 3) centres of the balls to choose from [m]; the cells' middles first.
+        depth: (C,) depths of the centres in the shape [m].
         nodes: (a, b, c, 3) corners of the cells [m].
-        overshoot: the balls' radii are their depths plus this [m].
-        given: balls that exist already.
+        overshoot: difference between the radius of a ball and the depth of its centre [m].
+        existing: balls that may cover some of the cells already.
     """
     cells = _cell_corners(nodes)
     depth = np.minimum(depth, Cover.max_inner_radius)
     outer = depth + overshoot
     reach = np.linalg.norm(cells - centers[: cells.shape[1]], axis=-1).max(axis=0)
     outer[: len(reach)] = np.maximum(outer[: len(reach)], reach + Cover.rounding)
-    left = ~_are_cells_covered(nodes, given.center, given.outer).any(axis=0)
+    left = ~_are_cells_covered(nodes, existing.center, existing.outer).any(axis=0)
     covers = _are_cells_covered(nodes, centers, outer)[:, left]
     picked = []
     count = covers.sum(axis=1)
@@ -244,18 +241,19 @@ def _are_cells_covered(nodes: Array, centers: Array, radii: Array) -> NDArray[np
 
 
 MISSING_BALL_RADIUS = -1e3
-"""Metres. Radius in places of a node that hold no ball."""
+"""Metres. Radius of the entries of a node that hold no ball."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyBalls:
-    """A body of the robot.
+    """A body of the robot, covered by balls.
 
     Attributes:
-        body, frame: the body and the arm's frame in which it is fixed.
-        center, radius: (3,), [m] of a ball around it.
+        body: index of the body.
+        frame: index of the arm's frame in which the body is fixed.
+        center, radius: (3,) centre and radius of its bounding ball [m].
         balls: balls that cover it, in the frame.
-        root: the first node of its tree.
+        root: index of the first node of its tree.
     """
 
     body: BodyIndex
@@ -268,15 +266,15 @@ class BodyBalls:
 
 @dataclass(frozen=True, eq=False)
 class BallTrees:
-    """T nodes of up to W balls each, the balls' arrays with one row for each place in a node.
+    """T nodes of up to W balls each.
 
     Attributes:
         bodies: bodies of the robot with collision geometry, ordered by frames.
-        frame: (T,) the arm's frame in which a node is fixed.
-        centers: (3, W, T) [m].
+        frame: (T,) index of the arm's frame in which a node is fixed.
+        centers: (3, W, T) centres of the balls [m].
         outer: (W, T) radii of balls that together contain the node's part of the body [m].
-        inner: (W, T) radii of balls about the same centres inside the body, in leaves [m].
-        child: (W, T) the node within the ball; -1 in leaves and where there is no ball.
+        inner: (W, T) radii of balls with the same centres inside the body, in leaves [m].
+        child: (W, T) index of the child node; -1 in leaves and where there is no ball.
     """
 
     bodies: tuple[BodyBalls, ...]
@@ -287,15 +285,15 @@ class BallTrees:
     child: Indices
 
     @cached_property
-    def _frames(self) -> Indices:
+    def _body_frames(self) -> Indices:
         return np.array([body.frame for body in self.bodies], dtype=np.intp)
 
     @cached_property
-    def _centers(self) -> Single:
+    def _body_centers(self) -> Single:
         return np.array([body.center for body in self.bodies], dtype=np.float32)
 
     @classmethod
-    def of(cls, station_diagram: StationDiagram, links: ArmLinks) -> BallTrees:
+    def from_diagram(cls, station_diagram: StationDiagram, links: ArmLinks) -> BallTrees:
         """Covers the robot of a diagram."""
         overshoot = 8e-3  # Metres that balls stick out of moving links and the hand.
         base_overshoot = 25e-3  # Metres, for links that do not move. Only the arm can hit them.
@@ -322,14 +320,14 @@ class BallTrees:
         frames = np.array([node.frame for node in nodes], dtype=np.intp)
         return cls(tuple(bodies), frames, centers, outer, inner, child)
 
-    def roots_placed(self, poses: LinkPoses) -> Single:
-        """(3, B, K) centres of the balls around the bodies."""
-        return poses.place_own(self._frames, self._centers)
+    def body_ball_centers(self, poses: LinkPoses) -> Single:
+        """(3, B, K) centres of the bounding balls of the bodies."""
+        return poses.transform_per_frame(self._body_frames, self._body_centers)
 
-    def placed(self, node: Indices, poses: LinkPoses, which: Indices) -> Single:
+    def node_ball_centers(self, node: Indices, poses: LinkPoses, which: Indices) -> Single:
         """(3, W, F) centres of the balls of nodes (F,) in configurations `which` (F,)."""
         centers = self.centers.take(node, axis=2)
-        return poses.place_each(self.frame[node], centers, which)
+        return poses.transform_per_node(self.frame[node], centers, which)
 
 
 def bodies_with_shape(station_diagram: StationDiagram, links: ArmLinks) -> list[BodyIndex]:
@@ -351,7 +349,7 @@ class _Node:
 
 def _append_tree(nodes: list[_Node], balls: Balls, frame: int, depth: int) -> int:
     """Appends a tree to the nodes; returns the index of its root."""
-    place = len(nodes)
+    root = len(nodes)
     node = _Node(frame, balls, [])
     nodes.append(node)
     if depth > 1:
@@ -361,12 +359,15 @@ def _append_tree(nodes: list[_Node], balls: Balls, frame: int, depth: int) -> in
         centers, radii = np.array([c for c, _ in around]), np.array([r for _, r in around])
         node.balls = Balls(centers, radii, np.full(len(parts), MISSING_BALL_RADIUS))
         node.children = [_append_tree(nodes, part, frame, depth - 1) for part in parts]
-    return place
+    return root
 
 
 def _enclosing_ball(balls: Balls) -> tuple[Array, float]:
-    """A nearly smallest ball around balls: its centre steps towards the farthest ball (Badoiu and
-    Clarkson, "Smaller core-sets for balls", SODA 2003)."""
+    """Centre (3,) and radius of a nearly smallest ball around balls.
+
+    The centre steps towards the farthest ball (Badoiu and Clarkson, "Smaller core-sets for balls",
+    SODA 2003).
+    """
     center = (balls.center.min(axis=0) + balls.center.max(axis=0)) / 2
     best = (center, np.inf)
     for step in range(20):

@@ -58,7 +58,7 @@ class DisplacementBound:
     Args:
         links: the arm.
         trees: balls that cover it and its hand.
-        limits: (n, 2) of the joints' positions [rad or m].
+        limits: (n, 2) limits of the joints' positions [rad or m].
     """
 
     def __init__(self, links: ArmLinks, trees: BallTrees, limits: Array) -> None:
@@ -85,7 +85,7 @@ class DisplacementBound:
     def _from_axes(self, q: Array) -> Array:
         """(n, K) largest distance from each joint's axis to a point of the bodies beyond it."""
         poses = self._links.poses(q)
-        centers = self._trees.roots_placed(poses)
+        centers = self._trees.body_ball_centers(poses)
         largest = np.zeros((len(self._links.turns), len(q)))
         for i, turns in enumerate(self._links.turns):
             if turns:
@@ -165,7 +165,7 @@ class ArmProximity:
         solids = _fixed_solids(station_diagram)
         self.field = DistanceField.of(solids)
         self.content = content_hash(shape.content, solids_hash(solids))
-        self._trees, self._itself = shape.trees, shape.itself
+        self._trees, self._self_clearance = shape.trees, shape.self_clearance
         self._bodies = self._trees.bodies
         hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
         moving = [i for i, body in enumerate(self._bodies) if body.frame]
@@ -175,7 +175,7 @@ class ArmProximity:
         self._radius = np.array([b.radius for b in self._bodies], dtype=np.float32)[:, None]
         self._roots = np.array([body.root for body in self._bodies])
         bodies = [body.body for body in self._bodies]
-        self.apart = [(bodies[i], bodies[j]) for i, j in self._itself.apart]
+        self.apart = [(bodies[i], bodies[j]) for i, j in self._self_clearance.apart]
         self._displacement = DisplacementBound(self.links, self._trees, shape.limits)
 
     def bounds(self, q: Array, *, hand: bool = True) -> ClearanceBounds:
@@ -216,7 +216,7 @@ class ArmProximity:
 
     def _bounds(self, q: Array, hand: bool) -> tuple[Single, Single]:
         poses = self.links.poses(q)
-        centers = self._trees.roots_placed(poses)
+        centers = self._trees.body_ball_centers(poses)
         counted = self._moving if hand else self._arm
         bound = self.field.lower_at(centers[:, counted]) - self._radius[counted]
         row, which = np.nonzero(bound < Bounding.refine_below)
@@ -224,7 +224,7 @@ class ArmProximity:
         lower = bound.min(axis=0, initial=np.inf)
         upper = np.full_like(lower, np.inf)
         self._descend(poses, which, self._roots[counted[row]], lower, upper)
-        low, up = self._itself.bounds(q, poses, centers, upper >= -Bounding.rounding)
+        low, up = self._self_clearance.bounds(q, poses, centers, upper >= -Bounding.rounding)
         lower, upper = np.minimum(lower, low), np.minimum(upper, up)
         return lower, np.where(upper < -Bounding.rounding, upper, np.float32(np.inf))
 
@@ -237,7 +237,7 @@ class ArmProximity:
         for start in range(0, len(which), Bounding.chunk_size):
             part = slice(start, start + Bounding.chunk_size)
             k, at = which[part], node[part]
-            places = trees.placed(at, poses, k)
+            places = trees.node_ball_centers(at, poses, k)
             bound = self.field.lower_at(places) - trees.outer.take(at, axis=1)
             if trees.child[0, at[0]] >= 0:
                 i, f = np.nonzero(bound < Bounding.refine_below)

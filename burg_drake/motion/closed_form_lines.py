@@ -45,7 +45,7 @@ def explain_failure(
     Args:
         search: the search for postures.
         X_AG: (2, 4, 4) the grasp with both finger assignments.
-        places: its grids, the coarsest first.
+        places: grids of the grasp and its number in each, the coarsest first.
         farthest: the farthest layer that a refused chain reached.
     """
     grid, i = places[-1]
@@ -59,13 +59,13 @@ def explain_failure(
     if not 0 < last < grid.poses:
         # If chains are left, the search has given them up.
         last = int(np.ceil(farthest))
-    outcome = search.lines.outcome(last)
+    outcome = search.hand_path.outcome(last)
     return _blocking_postures(search, X_AG, places, outcome, last)
 
 
 def _is_any_free(search: PostureGridBuilder, places: Sequence[GridPlace], layer: int) -> bool:
-    """Whether any posture at a layer is not known to collide. If no measured posture is, measures
-    all postures of the first grid that has any."""
+    """Whether a measured posture at a layer is not known to collide. If there is none yet, measures
+    all postures of the first grid that has any at this layer."""
     if any(grid.measured_free(layer, i) for grid, i in places):
         return True
     grid, i = next((g, i) for g, i in places if g.exists[layer, i].any())
@@ -80,8 +80,8 @@ def _blocking_postures(
     outcome: Outcome,
     layer: int,
 ) -> Failure:
-    """Failure with the blocked postures at a layer, the nearest to free first; if none collides,
-    with the smallest excess over the joint limits."""
+    """Failure with the blocked postures at a layer, the nearest to being free first; if none is
+    blocked, with the smallest excess over the joint limits."""
     for grid, i in places:
         search.measure(grid, np.array([layer]), np.array([i]), grid.exists)
         blocked = grid.exists[layer, i] & ~grid.usable(layer, i)
@@ -96,7 +96,7 @@ def _blocking_postures(
     ]
     chosen = tuple(where[order].T)
     q = grid.q[(slice(None), layer, i, *chosen)].T
-    moved_W = search.lines.target_displacement(X_AG[chosen[0]], search.layers[[layer]])
+    moved_W = search.hand_path.target_displacement(X_AG[chosen[0]], search.layers[[layer]])
     return Failure(outcome, q=q, moved_W=moved_W)
 
 
@@ -114,10 +114,10 @@ def _limit_excess(search: PostureGridBuilder, X_AG: Array, layer: int) -> float:
     ik = search.ik
     half = np.full(len(ik.lower), np.pi)
     centre = np.where(np.arange(len(half)) == 5, 0.5 * (ik.lower + ik.upper), 0.0)
-    free = replace(ik, lower=centre - half, upper=centre + half)
+    unlimited = replace(ik, lower=centre - half, upper=centre + half)
     count = search.settings.redundant[-1]
     values = np.linspace(-np.pi, np.pi, count, endpoint=False)
-    q = free.solve(search.lines.X_AH(X_AG, search.layers[layer]), values).q
+    q = unlimited.solve(search.hand_path.X_AH(X_AG, search.layers[layer]), values).q
     beyond = np.maximum(ik.lower - q, q - ik.upper).max(axis=1)
     return max(0.0, float(beyond.min(initial=np.inf)))
 
@@ -127,39 +127,39 @@ class ClosedFormLineSearch(PostureGridBuilder):
 
     def lifted(self, height: float) -> ClosedFormLineSearch:
         """See `LineSearch`."""
-        lines = replace(self.lines, lift=height)
+        hand_path = replace(self.hand_path, lift=height)
         return ClosedFormLineSearch(
-            *(self.arm, self.ik, lines, self.proximity, self.home, self.settings)
+            *(self.arm, self.ik, hand_path, self.proximity, self.home, self.settings)
         )
 
     def begin(self, X_AG: Array, clearance: Array) -> _ClosedFormBatch:
         """See `LineSearch`."""
         return _ClosedFormBatch(self, X_AG, clearance)
 
-    def straight(self, X_AG: Array, corners: Array, at: Array, tolerance: Array) -> DenseRows:
+    def fill_rows(self, X_AG: Array, corners: Array, at: Array, tolerance: Array) -> DenseRows:
         """Fills in rows between the postures of chains at the layers; see `straighten_rows`.
 
         The redundant joint is linear from layer to layer. Where the postures are not continuous
         then, at a fold or past the upright upper arm, the numeric filler solves for all joints.
         """
-        every = ClosedFormFiller(self.lines, X_AG, corners, self.layers, self.ik)
-        rows = straighten_rows(every, at, tolerance)
+        filler = ClosedFormFiller(self.hand_path, X_AG, corners, self.layers, self.ik)
+        rows = straighten_rows(filler, at, tolerance)
         broken = np.unique(rows.chain[rows.broken])
         if not len(broken):
             return rows
-        bent = NumericFiller(
-            *(self.lines, X_AG[broken], corners[broken], self.layers, self.arm, self.settings)
+        numeric = NumericFiller(
+            *(self.hand_path, X_AG[broken], corners[broken], self.layers, self.arm, self.settings)
         )
-        return rows.replaced(broken, straighten_rows(bent, at, tolerance[broken]))
+        return rows.replaced(broken, straighten_rows(numeric, at, tolerance[broken]))
 
 
 @dataclass(frozen=True, eq=False)
 class _FoundChain:
-    """A chain's place: the grid that it was found in, the grasp's index there, and its postures."""
+    """A chain in a grid: the grid, the number of the grasp in it, and the chain's postures."""
 
     grid: PostureGrid
     index: int
-    place: GridChain
+    postures: GridChain
     layer: Array
     """(M,) layer of each row; a fraction between two."""
 
@@ -169,12 +169,12 @@ class _ClosedFormBatch:
 
     def __init__(self, search: ClosedFormLineSearch, X_AG: Array, clearance: Array) -> None:
         self._search, self._X_AG = search, X_AG
-        self._tolerance = clearance
+        self._clearance = clearance
         n = len(X_AG)
         self._grids: list[list[GridPlace]] = [[] for _ in range(n)]
         self._level = np.full(n, -1)
-        self._failed = np.zeros(n, dtype=int)
-        self._farthest = np.zeros(n)
+        self._failed_chains = np.zeros(n, dtype=int)
+        self._farthest_layer = np.zeros(n)
         self._closed = np.zeros((n, 2), dtype=bool)
         self._advance(np.arange(n))
 
@@ -183,7 +183,7 @@ class _ClosedFormBatch:
         found: dict[int, Chain | None] = {}
         left = list(grasps)
         while left:
-            rows = self._best(left, found)
+            rows = self._choose_chains(left, found)
             left = [g for g in left if g not in found]
             if not rows:
                 continue
@@ -199,14 +199,14 @@ class _ClosedFormBatch:
         excluded_values = 2  # Neighbouring values of the redundant joint that are excluded, too.
         found: _FoundChain = chain.place
         if row is None:
-            place = found.place
-            k = place.parameter[0]
+            postures = found.postures
+            k = postures.parameter[0]
             around = slice(max(0, k - excluded_values), k + excluded_values + 1)
-            found.grid.refused[0, found.index, place.flip, place.branch[0], around] = True
+            found.grid.refused[0, found.index, postures.flip, postures.branch[0], around] = True
         else:
             self._exclude(grasp, found, float(found.layer[row]))
-            self._farthest[grasp] = max(self._farthest[grasp], found.layer[row])
-        self._failed[grasp] += 1
+            self._farthest_layer[grasp] = max(self._farthest_layer[grasp], found.layer[row])
+        self._failed_chains[grasp] += 1
 
     def close(self, grasp: int, flip: int) -> None:
         """See `LineSearch`."""
@@ -216,10 +216,10 @@ class _ClosedFormBatch:
 
     def failure(self, grasp: int) -> Failure:
         """See `LineSearch`."""
-        places, farthest = self._grids[grasp], float(self._farthest[grasp])
+        places, farthest = self._grids[grasp], float(self._farthest_layer[grasp])
         return explain_failure(self._search, self._X_AG[grasp], places, farthest)
 
-    def _best(
+    def _choose_chains(
         self, grasps: Sequence[int], found: dict[int, Chain | None]
     ) -> list[tuple[int, PostureGrid, int, GridChain]]:
         """The cheapest chains; grasps without one get a finer grid, or None in `found`."""
@@ -230,12 +230,12 @@ class _ClosedFormBatch:
         rows, exhausted = [], []
         for grid, members in by_grid.values():
             index = np.array([self._grids[g][-1][1] for g in members])
-            places = grid.best(index, ChainSearchSettings.doubt_cost)
-            for g, i, place in zip(members, index, places, strict=True):
-                if place is None or self._failed[g] >= ChainSearchSettings.max_failures:
+            cheapest = grid.best(index, ChainSearchSettings.doubt_cost)
+            for g, i, postures in zip(members, index, cheapest, strict=True):
+                if postures is None or self._failed_chains[g] >= ChainSearchSettings.max_failures:
                     exhausted.append(g)
                 else:
-                    rows.append((g, grid, int(i), place))
+                    rows.append((g, grid, int(i), postures))
         last = len(self._search.settings.redundant) - 1
         for g in exhausted:
             if self._level[g] == last:
@@ -266,8 +266,8 @@ class _ClosedFormBatch:
             for i, g in enumerate(members.tolist()):
                 for coarse, index in self._grids[g][-1:]:
                     grid.copy_deep_collisions(i, coarse, index, ends)
-            flip = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None]).max(axis=0)
-            grid.start[:] = START_COST * np.nan_to_num(flip)
+            from_home = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None])
+            grid.start[:] = START_COST * np.nan_to_num(from_home.max(axis=0))
             alive = alive[grid.joined[0, alive].any(axis=(1, 2, 3))]
             for layer in ends:
                 self._search.measure(grid, np.array([layer]), alive, grid.joined)
@@ -277,13 +277,13 @@ class _ClosedFormBatch:
                 self._grids[g].append((grid, i))
                 grid.refused[:, i, self._closed[g]] = True
             self._level[members] = level
-            self._failed[members] = 0
+            self._failed_chains[members] = 0
 
     def _measure_failing(self, grasps: Sequence[int]) -> None:
         """Measures all postures of grasps whose chains have failed repeatedly."""
         by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
         for g in grasps:
-            if self._failed[g] == ChainSearchSettings.failures_before_measuring:
+            if self._failed_chains[g] == ChainSearchSettings.failures_before_measuring:
                 grid, i = self._grids[g][-1]
                 by_grid.setdefault(id(grid), (grid, []))[1].append(i)
         for grid, members in by_grid.values():
@@ -298,50 +298,51 @@ class _ClosedFormBatch:
         count = len(search.layers)
         at = np.linspace(0.0, count - 1.0, (count - 1) * ChainSearchSettings.rows_per_layer + 1)
         grasp = np.array([g for g, *_ in rows])
-        flip = np.array([place.flip for *_, place in rows])
+        flip = np.array([postures.flip for *_, postures in rows])
         X_AG = self._X_AG[grasp, flip]
         layers = np.arange(count)
         corners = np.array(
             [grid.q[:, layers, i, p.flip, p.branch, p.parameter].T for _, grid, i, p in rows]
         )
-        tolerance = np.clip(0.5 * self._tolerance[grasp, flip], *search.settings.deviation)
-        straight = search.straight(X_AG, corners, at, tolerance)
+        tolerance = np.clip(0.5 * self._clearance[grasp, flip], *search.settings.deviation)
+        straight = search.fill_rows(X_AG, corners, at, tolerance)
         bounds = search.proximity.bounds(straight.q, hand=False)
         upper = decisive_clearance(bounds, search.settings.exact)
         return {
             g: self._chain(
-                g, _FoundChain(grid, i, place, np.empty(0)), k, straight, bounds.lower, upper
+                g, _FoundChain(grid, i, postures, np.empty(0)), k, straight, bounds.lower, upper
             )
-            for k, (g, grid, i, place) in enumerate(rows)
+            for k, (g, grid, i, postures) in enumerate(rows)
         }
 
     def _chain(
         self, grasp: int, found: _FoundChain, k: int, rows: DenseRows, lower: Array, upper: Array
     ) -> Chain | None:
-        own = rows.of(k)
+        own = rows.slice_of(k)
         layer = rows.layer[own]
         found = replace(found, layer=layer)
         broken = rows.broken[own] | ~(upper[own] > 0.0)
         if broken.any():
             for row in np.flatnonzero(broken):
                 self._exclude(grasp, found, float(layer[row]))
-            self._farthest[grasp] = max(self._farthest[grasp], layer[broken][0])
-            self._failed[grasp] += 1
+            self._farthest_layer[grasp] = max(self._farthest_layer[grasp], layer[broken][0])
+            self._failed_chains[grasp] += 1
             return None
-        flip = found.place.flip
-        return self._search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, found)
+        flip = found.postures.flip
+        return self._search.hand_path.chain(self._X_AG[grasp, flip], flip, rows, own, lower, found)
 
     def _exclude(self, grasp: int, found: _FoundChain, layer: float) -> None:
         """Excludes the posture at a layer, or the step between two layers, from the search.
 
         After repeated failures its neighbours are excluded, too, so that the next chain differs.
         """
-        grid, place = found.grid, found.place
-        widely = self._failed[grasp] >= ChainSearchSettings.failures_before_measuring
+        grid, postures = found.grid, found.postures
+        widely = self._failed_chains[grasp] >= ChainSearchSettings.failures_before_measuring
         nearest = round(layer)
         if layer == nearest or widely:
-            k = place.parameter[nearest]
+            k = postures.parameter[nearest]
             around = slice(max(0, k - widely), k + widely + 1)
-            grid.refused[nearest, found.index, place.flip, place.branch[nearest], around] = True
+            branch = postures.branch[nearest]
+            grid.refused[nearest, found.index, postures.flip, branch, around] = True
         else:
-            grid.cut(found.index, int(layer), place)
+            grid.cut(found.index, int(layer), postures)

@@ -33,12 +33,12 @@ class BoxSolid:
 
     @property
     def low(self) -> Array:
-        """(3,) lower corner of the box along the world's axes around it."""
+        """(3,) lower corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.X_WB[:3, 3] - np.abs(self.X_WB[:3, :3]) @ self.half)
 
     @property
     def high(self) -> Array:
-        """(3,) its upper corner."""
+        """(3,) upper corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.X_WB[:3, 3] + np.abs(self.X_WB[:3, :3]) @ self.half)
 
     def _face_distances(self, p: Points) -> list[Single]:
@@ -86,12 +86,12 @@ class BallSolid:
 
     @property
     def low(self) -> Array:
-        """(3,) lower corner of the box along the world's axes around it."""
+        """(3,) lower corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.center - self.radius)
 
     @property
     def high(self) -> Array:
-        """(3,) its upper corner."""
+        """(3,) upper corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.center + self.radius)
 
     def distance(self, p: Points) -> Single:
@@ -106,7 +106,7 @@ class HullSolid:
 
     Attributes:
         normals: (F, 3) outward unit normals.
-        offsets: (F,) of its faces' planes [m].
+        offsets: (F,) offsets of its faces' planes [m].
         vertices: (V, 3) [m].
         bulge: how far the true shape may stick out of the faces [m].
     """
@@ -118,12 +118,12 @@ class HullSolid:
 
     @property
     def low(self) -> Array:
-        """(3,) lower corner of the box along the world's axes around it."""
+        """(3,) lower corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.vertices.min(axis=0) - self.bulge)
 
     @property
     def high(self) -> Array:
-        """(3,) its upper corner."""
+        """(3,) upper corner of its bounding box along the world's axes [m]."""
         return np.asarray(self.vertices.max(axis=0) + self.bulge)
 
     def grid_lower_bound(self, ticks: list[Array]) -> Single:
@@ -156,7 +156,7 @@ ProximitySolid = BoxSolid | BallSolid | HullSolid
 
 
 def solids_hash(solids: list[ProximitySolid]) -> str:
-    """Hash of solids."""
+    """Hash of the shapes and poses of solids."""
     return content_hash([[type(solid).__name__, vars(solid)] for solid in solids])
 
 
@@ -258,8 +258,8 @@ def _grid_arrays(small: list[ProximitySolid]) -> Arrays:
     margin, smallest = DistanceFieldSettings.margin, DistanceFieldSettings.cell_size
     low -= margin, margin, np.clip(low[2] + smallest, 0.0, margin)
     high += margin
-    affordable = float(np.cbrt(np.prod(high - low) / DistanceFieldSettings.max_cells))
-    cell = max(smallest, affordable)
+    coarse = float(np.cbrt(np.prod(high - low) / DistanceFieldSettings.max_cells))
+    cell = max(smallest, coarse)
     shape = np.ceil((high - low) / cell).astype(int) + 1
     ticks = [a + cell * np.arange(n) for a, n in zip(low, shape, strict=True)]
     lower, upper = _grid_bounds(ticks, cell, small)
@@ -292,9 +292,9 @@ def _grid_bounds(
         below = solid.grid_lower_bound(local)
         np.minimum(near[window], below, out=near[window])
         occupied = below <= reach
-        at = np.stack(np.meshgrid(*local, indexing="ij"))[:, occupied]
+        centers = np.stack(np.meshgrid(*local, indexing="ij"))[:, occupied]
         view = seed[window]
-        view[occupied] = np.minimum(view[occupied], solid.upper_bound(at.T))
+        view[occupied] = np.minimum(view[occupied], solid.upper_bound(centers.T))
     if not hulls:
         return exact, exact.copy()
     from scipy.ndimage import distance_transform_edt  # not needed if the field is cached

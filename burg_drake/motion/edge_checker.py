@@ -46,9 +46,9 @@ class EdgeBounds:
         length: (E,) displacement of each segment [m].
         blocked_at: (E,) smallest checked share of each segment at which a collision is proven;
             infinite if there is none.
-        doubted_at: (E,) the same for collisions that are the best guess.
+        doubted_at: (E,) smallest checked share at which a collision is proven or the best guess.
         open_edge, open_from, open_to: (G,) undecided stretches of segments that are not blocked:
-            index of the segment, ordered, and share of it at which the stretch begins and ends.
+            index of the segment, rising, and shares of it at which the stretch begins and ends.
     """
 
     length: Array
@@ -102,7 +102,7 @@ def screen_edges(
         fine: longest stretch that may be left undecided [m of displacement].
 
     Returns:
-        What is proven, what is blocked, and which stretches are neither.
+        The verdicts, with the stretches that remain undecided.
     """
     if not len(q_a):
         none = np.empty(0)
@@ -111,7 +111,7 @@ def screen_edges(
     blocked_at, doubted_at = np.full((2, len(q_a)), np.inf)
     refutes = np.broadcast_to(np.asarray(refutes), len(q_a))
     path = np.arange(len(q_a)) if path is None else path
-    over = np.zeros(path.max() + 1, dtype=bool)
+    is_decided = np.zeros(path.max() + 1, dtype=bool)
 
     def lower(edge: NDArray[np.intp], share: Array) -> Array:
         """Lower bounds of the clearance at (R,) places; records blocked and doubted ones."""
@@ -119,7 +119,7 @@ def screen_edges(
         bounds = proximity.bounds(q, hand=hand)
         hit = (bounds.upper < 0.0) & refutes[edge]
         np.minimum.at(blocked_at, edge[hit], share[hit])
-        over[path[edge[hit]]] = True
+        is_decided[path[edge[hit]]] = True
         hit |= ~bounds.likely_free
         np.minimum.at(doubted_at, edge[hit], share[hit])
         return bounds.lower
@@ -128,17 +128,17 @@ def screen_edges(
     edge = np.repeat(np.arange(len(q_a)), pieces + 1)
     share = _concatenate_ranges(pieces + 1) / pieces[edge]
     clearance = np.empty(len(edge))
-    ask = np.ones(len(edge), dtype=bool)
+    unknown = np.ones(len(edge), dtype=bool)
     if known is not None:
-        ask = (share > 0.0) & (share < 1.0)
-        clearance[~ask] = known.T.ravel()
-    clearance[ask] = lower(edge[ask], share[ask])
+        unknown = (share > 0.0) & (share < 1.0)
+        clearance[~unknown] = known.T.ravel()
+    clearance[unknown] = lower(edge[unknown], share[unknown])
     inner = np.flatnonzero(edge[1:] == edge[:-1])
     edge, start, end = edge[inner], share[inner], share[inner + 1]
     c_start, c_end = clearance[inner], clearance[inner + 1]
     while True:
         displacement = (end - start) * length[edge]
-        keep = (c_start + c_end <= displacement) & ~over[path[edge]]
+        keep = (c_start + c_end <= displacement) & ~is_decided[path[edge]]
         edge, start, end, displacement = edge[keep], start[keep], end[keep], displacement[keep]
         if not len(edge) or displacement.max() <= fine:
             return EdgeBounds(length, blocked_at, doubted_at, edge, start, end)
@@ -266,8 +266,8 @@ class EdgeChecker:
         not depend on each other.
 
         Args:
-            paths, carried, moved_W, width: one entry for each.
-            hand: for all.
+            paths, carried, moved_W, width: one entry for each polyline.
+            hand: see `first_blocked`; the same for all.
             lower: lower bounds of the clearance at the corners [m], if they have been computed
                 before and no corner was blocked or doubted.
         """

@@ -1,4 +1,4 @@
-"""Timing of the motions of a grasp: as fast as the joints allow, with the hand along its lines."""
+"""Timing of the motions of a grasp: as fast as the joints allow, the hand on straight segments."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class PathChecks:
     through straight from row to row.
 
     Attributes:
-        transfer: with the hand open and empty.
-        approach: with the hand open and empty, near the target.
-        lift, retreat: with the target in the hand.
+        transfer: check with the hand open and empty.
+        approach: check with the hand open and empty, near the target.
+        lift, retreat: checks with the target in the hand.
     """
 
     transfer: IsFree | None = None
@@ -51,11 +51,12 @@ def time_motion(
 
     Args:
         path: the segments.
-        limits: of the joints; none is exceeded.
+        limits: limits of the joints; none is exceeded.
         kinematics: the arm, to measure the path length of the hand.
         settings: speeds and tolerances.
-        checks: of rounded corners and smoothed lines. Without a check of the transfer, the arm
-            stops at each corner; without one of a line, it keeps to a spline through the waypoints.
+        checks: collision checks of rounded corners and smoothed segments. Without a check of the
+            transfer, the arm stops at each corner; without one of a straight segment, it keeps to a
+            spline through the waypoints.
 
     Returns:
         The plan, sampled at `settings.rate`.
@@ -68,7 +69,7 @@ def time_motion(
     unmeasured_clearance = 2e-4  # Metres. Clearance of a path without a measured one.
     settings, checks = settings or TimingSettings(), checks or PathChecks()
     near = unmeasured_clearance if np.isnan(path.clearance) else max(0.0, path.clearance)
-    lines = replace(
+    line_settings = replace(
         settings, straightness=max(min_straightness, min(settings.straightness, near / 2.0))
     )
     gentle = limits.scaled_down(settings.velocity_share, settings.ramp)
@@ -84,7 +85,9 @@ def time_motion(
     ) -> PathMotion | Cubics:
         rows = _require_within_limits(rows, limits, name)
         return time_line(
-            rows, kinematics, gentle, hand, lines, is_free=is_free, limit_margin=limit_margin
+            *(rows, kinematics, gentle, hand, line_settings),
+            is_free=is_free,
+            limit_margin=limit_margin,
         )
 
     slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
@@ -131,7 +134,7 @@ def _retreat_speed(settings: TimingSettings) -> HandSpeed:
 
 
 def _hand_path_length(rows: Array, kinematics: ArmKinematics) -> float:
-    """Distance between the ends of a line [m]."""
+    """Distance between the ends of a straight segment [m]."""
     p = kinematics.forward(rows[[0, -1]])[0][:, :3, 3]
     return float(np.linalg.norm(p[1] - p[0]))
 

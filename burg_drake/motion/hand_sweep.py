@@ -42,7 +42,7 @@ class HandPart:
     """Shapes of a hand that are rigid to each other.
 
     Attributes:
-        shapes: in the grasp frame of the open hand.
+        shapes: the shapes, in the grasp frame of the open hand.
         closing_G: (3,) displacement when the open hand closes as far as it can [m]; 0 for the
             hand's body.
         opening: smallest and largest distance between the pads [m].
@@ -53,7 +53,7 @@ class HandPart:
     opening: tuple[float, float]
 
     def placed(self, X_WG: Array, width: Array) -> Array:
-        """Grasp frames at which an open hand has this part where it is at the given widths.
+        """Grasp frames of open hands whose part is where this part is at the given widths.
 
         Args:
             X_WG: (N, 4, 4) grasps.
@@ -157,14 +157,14 @@ def deepest_overlap_along_path(
     """The deepest overlap of each hand with the body that blocks its path.
 
     Along the path the depth in a convex piece rises to one maximum and falls. A body of several
-    pieces may have several maxima; the one around the deepest place of the grid is found.
+    pieces may have several maxima; the one next to the deepest grid point is found.
 
     Args:
         screen: the hand, not swept.
         X_WG: (N, 4, 4) grasps in the world, at which the paths start.
-        names: (N,) of the bodies.
+        names: (N,) names of the blocking bodies.
         u_W: (N, 3) unit vectors along the paths.
-        length: of the paths [m].
+        length: length of the paths [m].
 
     Returns:
         Depths (N,) and their distances from the start (N,) [m]; depth 0 and NaN where the overlap
@@ -218,8 +218,8 @@ class SweepResult:
         clearance: (N,) smallest signed distance on the path [m]. Where it is free, the distance of
             the hand from other bodies: a lower bound, exact where no cylinder is swept across its
             axis (see `geometry.swept_shape`). Else minus the overlap depth with the blocker.
-        at: (N,) distance from the grasp at which that depth is met [m]; NaN where the path is free,
-            or the overlap too short to be found.
+        at: (N,) distance from the grasp at which the hand overlaps by this depth [m]; NaN where the
+            path is free, or the overlap too short to be found.
     """
 
     free: NDArray[np.bool_]
@@ -231,7 +231,7 @@ class SweepResult:
         return len(self.free)
 
     def add_blockers(self, rows: NDArray[np.intp], target: PathBlockers) -> None:
-        """Enters the blockers of the target on the paths `rows` (S,), where there are any."""
+        """Enters what blocks the target on the paths `rows` (S,)."""
         hit = np.flatnonzero(target.by != "")
         rows = rows[hit]
         self.free[rows], self.blocker[rows] = False, target.by[hit]
@@ -330,7 +330,7 @@ class HandSweep:
 
         Args:
             instance, X_WG, width: see `retreat`.
-            height: of the lift [m]; the whole lift if None.
+            height: height of the lift [m]; the whole lift if None.
 
         Raises:
             UnknownNameError: there is no such instance.
@@ -367,7 +367,7 @@ class HandSweep:
             X_WG: (N, 4, 4) poses at which the segments begin.
             width: (N,) distance between the pads [m].
             u_W: (N, 3) unit vectors along the segments.
-            length: of the segments [m].
+            length: length of the segments [m].
         """
         others = self._others(instance)
         placed = [part.placed(X_WG, np.asarray(width, float)) for part in self._parts]
@@ -424,13 +424,13 @@ class HandSweep:
 
     def _lift_blockers(self, instance: str, start_W: Array, height: float) -> PathBlockers:
         """Obstacles of the target on the lift; without a retreat the same for all grasps."""
-        shift_W, u_W = self._target(instance), self._motion.direction_W
+        target, u_W = self._target(instance), self._motion.direction_W
         swept = self._swept_bodies(height)
         if self._motion.retreat > 0.0:
-            return shift_W.lift(start_W, u_W, height, swept)
+            return target.lift(start_W, u_W, height, swept)
         key = instance, height
         if key not in self._shared_lift_blockers:
-            self._shared_lift_blockers[key] = shift_W.lift(np.zeros((1, 3)), u_W, height, swept)
+            self._shared_lift_blockers[key] = target.lift(np.zeros((1, 3)), u_W, height, swept)
         return self._shared_lift_blockers[key].repeated(len(start_W))
 
 
@@ -442,5 +442,5 @@ def _swept_shapes(shapes: Sequence[Shape], length: float) -> list[Shape]:
 
 def _ranks(names: NDArray[np.object_], order: Sequence[str]) -> NDArray[np.intp]:
     """Ranks (N,) of names in an order; its length for names that are not in it."""
-    place = {name: i for i, name in enumerate(order)}
-    return np.array([place.get(name, len(order)) for name in names], dtype=np.intp)
+    rank = {name: i for i, name in enumerate(order)}
+    return np.array([rank.get(name, len(order)) for name in names], dtype=np.intp)

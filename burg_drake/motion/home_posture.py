@@ -19,7 +19,7 @@ class HomeClearance:
     """Clearance of the arm at home from the scene and from itself.
 
     Attributes:
-        distance: of the nearest pair of bodies, at most 1 [m].
+        distance: distance of the nearest pair of bodies, at most 1 [m].
         link, other: their names; empty if no pair is within 1 m.
     """
 
@@ -81,12 +81,12 @@ def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
     model = plant.GetModelInstanceByName("arm")
     base = plant.GetFrameByName(arm.base, model).body()
     parts = [b for b in plant.GetBodiesWeldedTo(base) if b.model_instance() == model]
-    around = {**station_diagram.fixed, "table": station_diagram.table}
+    bodies = {**station_diagram.fixed, "table": station_diagram.table}
     query = _default_query(station_diagram)
     shapes = [(part.name(), g) for part in parts for g in plant.GetCollisionGeometriesForBody(part)]
     found = []
-    for name in around.keys() - set(arm.stands_in):
-        others = plant.GetCollisionGeometriesForBody(plant.get_body(around[name]))
+    for name in bodies.keys() - set(arm.stands_in):
+        others = plant.GetCollisionGeometriesForBody(plant.get_body(bodies[name]))
         for (link, shape), other in product(shapes, others):
             pair = query.ComputeSignedDistancePairClosestPoints(shape, other)
             if -pair.distance > 5e-3:  # the feet of an arm are modelled roughly
@@ -106,21 +106,21 @@ def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
     depth = 1e3 * shapes[0].depth
     listed = ", ".join(f"{s.link} {s.shape!r} {1e3 * s.depth:.0f} mm" for s in shapes[:max_shapes])
     more = f" and {len(shapes) - max_shapes} more" if len(shapes) > max_shapes else ""
-    moves = "move the base or the obstacle"
+    move_hint = "move the base or the obstacle"
     arm = station.document.arm
     if all(shape.upwards for shape in shapes) and arm is not None:
         x, y, z = arm.X_WA.translation
         rise = np.ceil(depth) / 1e3
-        moves = f"raise the base by {1e3 * rise:.0f} mm (arm.X_WA.translation: "
-        moves += f"[{x:g}, {y:g}, {z + rise:g}])"
-    allowed, let_in = [*arm.stands_in, name] if arm is not None else [name], ""
+        move_hint = f"raise the base by {1e3 * rise:.0f} mm (arm.X_WA.translation: "
+        move_hint += f"[{x:g}, {y:g}, {z + rise:g}])"
+    allowed, mount_hint = [*arm.stands_in, name] if arm is not None else [name], ""
     if name == "table" or name in station.document.background:
-        let_in = (
+        mount_hint = (
             f", or write arm.stands_in: [{', '.join(allowed)}] if the base is mounted inside it"
         )
     return (
         f"arm.X_WA puts the arm's base {depth:.0f} mm deep into {name!r} by its collision shapes"
-        f" ({listed}{more}); {moves}{let_in}"
+        f" ({listed}{more}); {move_hint}{mount_hint}"
     )
 
 

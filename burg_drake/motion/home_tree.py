@@ -89,9 +89,9 @@ def _shortest_through(
     while True:
         _, before = dijkstra(np.where(allowed, length, 0.0), indices=0, return_predecessors=True)
         chain = chain_to_root(before, len(q) - 1)[::-1]
-        asked = [pair for pair in pairwise(chain) if not free[pair]]
-        blocked = edges.first_blocked_each([q[list(pair)] for pair in asked])
-        for pair, at in zip(asked, blocked, strict=True):
+        unproven = [pair for pair in pairwise(chain) if not free[pair]]
+        blocked = edges.first_blocked_each([q[list(pair)] for pair in unproven])
+        for pair, at in zip(unproven, blocked, strict=True):
             free[pair] = allowed[pair] = known[q[list(pair)].tobytes()] = at is None
         if all(at is None for at in blocked):
             return np.asarray(q[chain])
@@ -123,7 +123,7 @@ def search_from_goal(
 def _draw_samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
     """Samples (32, n): half uniform, half around nodes of the tree."""
     batch_size = 32  # Samples in a batch.
-    spread = 0.15  # Standard deviation of half of the samples, over a joint's range.
+    spread = 0.15  # Standard deviation of half of the samples, as a share of a joint's range.
     drawn = rng.uniform(lower, upper, (batch_size, len(lower)))
     around = q[rng.integers(len(q), size=batch_size // 2)]
     around = around + spread * (upper - lower) * rng.standard_normal(around.shape)
@@ -156,10 +156,10 @@ class _GoalTree:
     def __init__(self, goal: Array, guess: bool) -> None:
         self.q = goal[None]
         self._guess = guess
-        self._towards = np.array([-1])
+        self._parent = np.array([-1])
 
     def grow(self, roadmap: Roadmap, edges: EdgeChecker, samples: Array) -> NDArray[np.intp]:
-        """Steps from the nearest nodes towards samples (S, n); indices of the new nodes."""
+        """Steps from the nearest nodes towards samples (S, n); returns indices of the new nodes."""
         offset = samples[:, None] - self.q
         distance = (np.abs(offset) * roadmap.scale).sum(axis=-1)
         nearest = distance.argmin(axis=1)
@@ -169,13 +169,13 @@ class _GoalTree:
         q_a = self.q[nearest]
         q_b = q_a + share[:, None] * offset[rows, nearest]
         free = edges.seem_free(edges.screen(q_a, q_b), guess=self._guess)
-        self._towards = np.concatenate([self._towards, nearest[free]])
+        self._parent = np.concatenate([self._parent, nearest[free]])
         self.q = np.concatenate([self.q, q_b[free]])
         return np.arange(len(self.q) - int(free.sum()), len(self.q))
 
     def chain(self, node: int) -> list[int]:
         """The nodes from `node` to the goal."""
-        return chain_to_root(self._towards, node)
+        return chain_to_root(self._parent, node)
 
 
 class HomeTree:
@@ -226,7 +226,7 @@ class HomeTree:
         further_count = 8  # Further nodes that are tried, beside home.
         near = [self.roadmap.near(goal, first_count + further_count) for goal in goals]
         paths = self._connect_over(goals, [nodes[:first_count] for nodes in near])
-        left = [k for k, way in enumerate(paths) if way is None]
+        left = [k for k, path in enumerate(paths) if path is None]
         rest = [np.append(nodes[first_count:][nodes[first_count:] != 0], 0) for nodes in near]
         for k, path in zip(
             left, self._connect_over(goals[left], [rest[k] for k in left]), strict=True
@@ -254,7 +254,7 @@ class HomeTree:
                 for edge in order[owner == k]
                 if self.edges.confirm(q_a, q_b, screened, edge)
             )
-            path = next((way for way in confirmed if way is not None), None)
+            path = next((path for path in confirmed if path is not None), None)
             paths.append(None if path is None else np.concatenate([path, goal[None]]))
         return paths
 

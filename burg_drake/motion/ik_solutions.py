@@ -8,7 +8,6 @@ The numeric search starts from the postures of a fixed table whose hand poses ar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -70,7 +69,7 @@ class ClosedFormSolutions:
     """All branches at evenly spaced values of the Panda's last joint; see `ArmSolutions`."""
 
     def __init__(self, ik: PandaIk, redundant: tuple[int, ...], limit_margin: float) -> None:
-        self._ik = replace(ik, lower=ik.lower + limit_margin, upper=ik.upper - limit_margin)
+        self._ik = ik.within(limit_margin)
         self._values: list[Array] = []
         for count in redundant:
             share = (np.arange(count) + 0.5) / count
@@ -114,8 +113,8 @@ class NumericSolutions:
             q = rng.uniform(lower, upper, (table_size, len(lower)))
             return {"q": q, "features": _pose_features(arm.forward(q)[0])}
 
-        follows = (arm.turns, arm.axis, arm.p_AJ, arm.X_AH0, lower, upper)
-        table = cached("hand-poses", content_hash(*follows), make)
+        inputs = (arm.turns, arm.axis, arm.p_AJ, arm.X_AH0, lower, upper)
+        table = cached("hand-poses", content_hash(*inputs), make)
         self._q, self._tree = table["q"], cKDTree(table["features"])
         self._arm = arm if limited else arm.unlimited()
         self._margin = limit_margin
@@ -194,7 +193,7 @@ class RoutineSolutions:
                 bring the hand to the poses.
         """
         n = len(self._lower)
-        found = [np.asarray(q, dtype=float).reshape(-1, n) for q in self._ask(X_AH)]
+        found = [np.asarray(q, dtype=float).reshape(-1, n) for q in self._call_routine(X_AH)]
         pose = np.repeat(np.arange(len(X_AH)), [len(q) for q in found])
         q = np.concatenate([np.empty((0, n)), *found])
         self._check(X_AH[pose], q)
@@ -206,7 +205,7 @@ class RoutineSolutions:
             met &= ((self._lower <= q) & (q <= self._upper)).all(axis=1)
         return pose[met], q[met]
 
-    def _ask(self, X_AH: Array) -> Sequence[Array]:
+    def _call_routine(self, X_AH: Array) -> Sequence[Array]:
         found = self._routine(X_AH.copy())
         n = len(self._lower)
         shapes = [np.shape(q) for q in found]
@@ -224,13 +223,13 @@ class RoutineSolutions:
         if not np.isfinite(q).all():
             raise InvalidInputError("the IK routine returned joint positions that are not finite")
         X = self._arm.forward(q)[0]
-        off = np.linalg.norm(X[:, :3, 3] - X_AH[:, :3, 3], axis=1)
+        distance = np.linalg.norm(X[:, :3, 3] - X_AH[:, :3, 3], axis=1)
         turned = rotation_angle(X[:, :3, :3].swapaxes(-1, -2) @ X_AH[:, :3, :3])
         # Metres and radians. A calibrated arm deviates less from its data sheet.
-        if len(q) and max(off.max(), turned.max()) > 5e-3:
-            k = int(np.argmax(np.maximum(off, turned)))
+        if len(q) and max(distance.max(), turned.max()) > 5e-3:
+            k = int(np.argmax(np.maximum(distance, turned)))
             raise InvalidInputError(
                 f"the joint positions {q[k].round(4).tolist()} of the IK routine place the hand"
-                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees from the requested pose;"
-                " poses are those of the hand body in the frame of the arm's base"
+                f" {distance[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees from the requested"
+                " pose; poses are those of the hand body in the frame of the arm's base"
             )

@@ -60,7 +60,7 @@ class ArmLimits:
 
         Args:
             diagram: a diagram with the arm.
-            kinematics: that arm.
+            kinematics: the kinematics of the arm.
 
         Raises:
             InvalidInputError: a joint has no velocity limit, or a limit is invalid.

@@ -19,7 +19,7 @@ from burg_drake.station import GraspMotion
 
 
 @dataclass(frozen=True, eq=False)
-class LinePoses:
+class HandPath:
     """The hand's path, by its length from the grasp: negative before the grasp, positive after it.
 
     Attributes:
@@ -37,7 +37,7 @@ class LinePoses:
     lift: float
 
     @classmethod
-    def of(cls, X_HG: Array, R_WA: Array, motion: GraspMotion) -> LinePoses:
+    def of(cls, X_HG: Array, R_WA: Array, motion: GraspMotion) -> HandPath:
         """The path with the whole lift.
 
         Args:
@@ -76,7 +76,7 @@ class LinePoses:
 
         Args:
             X_AG: (..., 4, 4) grasps in the arm's base frame.
-            distance: (...,) lengths [m].
+            distance: (...,) path lengths from the grasp [m].
 
         Returns:
             (..., 4, 4), with the leading shapes broadcast against each other.
@@ -99,7 +99,7 @@ class LinePoses:
         Args:
             X_AG: (4, 4) grasp in the arm's base frame.
             flip: finger assignment, 0 or 1.
-            rows: of several chains.
+            rows: rows of several chains.
             own: the rows of this chain.
             lower: lower bounds of the clearance at all rows [m].
             place: see `Chain`.
@@ -121,7 +121,7 @@ class LinePoses:
 
         Args:
             X_AG: (..., 4, 4) grasps in the arm's base frame.
-            distance: (...,) lengths [m].
+            distance: (...,) path lengths from the grasp [m].
 
         Returns:
             (..., 3) [m]; 0 up to the grasp.
@@ -158,8 +158,8 @@ class DenseRows:
     q: Array
     broken: NDArray[np.bool_]
 
-    def of(self, chain: int) -> slice:
-        """Rows of one chain."""
+    def slice_of(self, chain: int) -> slice:
+        """The rows of one chain."""
         return slice(*np.searchsorted(self.chain, [chain, chain + 1]))
 
     def replaced(self, chains: Indices, other: DenseRows) -> DenseRows:
@@ -175,11 +175,11 @@ class DenseRows:
         )
 
 
-def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
+def straighten_rows(filler: RowFiller, at: Array, tolerance: Array) -> DenseRows:
     """Fills in rows between the layers of chains until the hand moves straight.
 
     Args:
-        every: the chains.
+        filler: the chains.
         at: (R,) positions of the first rows, as layers and fractions between them.
         tolerance: (m,) largest deviation of the hand from the straight segment half-way between
             two rows [m].
@@ -187,9 +187,9 @@ def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
     Returns:
         The rows.
     """
-    m = len(every.X_AG)
+    m = len(filler.X_AG)
     chain, layer = np.repeat(np.arange(m), len(at)), np.tile(at, m)
-    q, broken = every.solve(chain, layer)
+    q, broken = filler.solve(chain, layer)
     for _ in range(6):  # from 1 cm down to 0.2 mm
         first = np.flatnonzero((chain[1:] == chain[:-1]) & ~broken[1:] & ~broken[:-1])
         if len(at) < 2 or not len(first):
@@ -197,11 +197,11 @@ def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
         middle = 0.5 * (layer[first] + layer[first + 1])
         half_way = 0.5 * (q[first] + q[first + 1])
         # Where the hand strays, a row is inserted half-way; earlier rows do not change.
-        astray = every.deviation(chain[first], middle, half_way) > tolerance[chain[first]]
+        astray = filler.deviation(chain[first], middle, half_way) > tolerance[chain[first]]
         if not astray.any():
             break
         new_chain, new_layer = chain[first][astray], middle[astray]
-        new_q, new_broken = every.solve(new_chain, new_layer)
+        new_q, new_broken = filler.solve(new_chain, new_layer)
         order = np.lexsort((np.append(layer, new_layer), np.append(chain, new_chain)))
         chain = np.append(chain, new_chain)[order]
         layer = np.append(layer, new_layer)[order]
@@ -223,7 +223,7 @@ class RowFiller(ABC):
         layers: (L,) path lengths of the layers from the grasp [m].
     """
 
-    lines: LinePoses
+    hand_path: HandPath
     X_AG: Array
     corners: Array
     layers: Array
@@ -258,7 +258,7 @@ class RowFiller(ABC):
     def X_AH(self, chain: Indices, layer: Array) -> Array:
         """Wanted poses of the hand body (K, 4, 4) in the arm's base frame."""
         length = np.interp(layer, np.arange(len(self.layers)), self.layers)
-        return self.lines.X_AH(self.X_AG[chain], length)
+        return self.hand_path.X_AH(self.X_AG[chain], length)
 
 
 @dataclass(frozen=True, eq=False)

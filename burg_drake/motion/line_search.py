@@ -107,8 +107,8 @@ class LineSearch(Protocol):
         Args:
             X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with both finger assignments. Their
                 order does not depend on how a grasp was given.
-            clearance: (N, 2) of the hand on its path [m]; it may deviate from the straight segment
-                by a fraction of the clearance.
+            clearance: (N, 2) clearance of the hand on its path [m]; the hand may deviate from the
+                straight segment by a fraction of it.
         """
         ...
 
@@ -122,16 +122,16 @@ class SuccessiveLineSearch:
 
     Args:
         first: the search for every grasp.
-        second: makes the second search once it is needed.
+        second: makes the second search when it is first needed.
     """
 
     def __init__(self, first: LineSearch, second: Callable[[], LineSearch]) -> None:
-        self._first, self._make = first, second
+        self._first, self._make_second = first, second
 
     @cached_property
     def second(self) -> LineSearch:
         """The second search."""
-        return self._make()
+        return self._make_second()
 
     def lifted(self, height: float) -> SuccessiveLineSearch:
         """See `LineSearch`."""
@@ -151,58 +151,58 @@ class _SuccessiveBatch:
         self._search, self._first = search, first
         self._X_AG, self._clearance = X_AG, clearance
         self._closed = np.zeros((len(X_AG), 2), dtype=bool)
-        self._failed: dict[int, Failure] = {}
-        self._again: dict[int, tuple[LineSearchBatch, int]] = {}
+        self._first_failures: dict[int, Failure] = {}
+        self._second_batches: dict[int, tuple[LineSearchBatch, int]] = {}
 
     def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
         """See `LineSearchBatch`."""
         found: dict[int, Chain | None] = dict.fromkeys(grasps)
-        fresh = [g for g in grasps if g not in self._failed]
+        fresh = [g for g in grasps if g not in self._first_failures]
         found.update(zip(fresh, self._first.propose(fresh), strict=True))
         self._switch_search([g for g in fresh if found[g] is None])
         by_search: dict[int, tuple[LineSearchBatch, list[int]]] = {}
         for g in grasps:
-            if g in self._again:
-                lines, _ = self._again[g]
-                by_search.setdefault(id(lines), (lines, []))[1].append(g)
-        for lines, members in by_search.values():
-            chains = lines.propose([self._again[g][1] for g in members])
+            if g in self._second_batches:
+                batch, _ = self._second_batches[g]
+                by_search.setdefault(id(batch), (batch, []))[1].append(g)
+        for batch, members in by_search.values():
+            chains = batch.propose([self._second_batches[g][1] for g in members])
             found.update(zip(members, chains, strict=True))
         return [found[g] for g in grasps]
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
         """See `LineSearchBatch`."""
-        lines, number = self._again.get(grasp, (self._first, grasp))
-        lines.refuse(number, chain, row)
+        batch, index = self._second_batches.get(grasp, (self._first, grasp))
+        batch.refuse(index, chain, row)
 
     def close(self, grasp: int, flip: int) -> None:
         """See `LineSearchBatch`."""
         self._closed[grasp, flip] = True
-        lines, number = self._again.get(grasp, (self._first, grasp))
-        lines.close(number, flip)
+        batch, index = self._second_batches.get(grasp, (self._first, grasp))
+        batch.close(index, flip)
 
     def failure(self, grasp: int) -> Failure:
         """See `LineSearchBatch`; the failure of the search that got farther or explains more."""
-        first = self._failed[grasp] if grasp in self._failed else self._first.failure(grasp)
-        if grasp not in self._again:
+        first = self._first_failures.get(grasp) or self._first.failure(grasp)
+        if grasp not in self._second_batches:
             return first
-        lines, number = self._again[grasp]
-        second = lines.failure(number)
+        batch, index = self._second_batches[grasp]
+        second = batch.failure(index)
         return max(first, second, key=_failure_rank)
 
     def _switch_search(self, grasps: Sequence[int]) -> None:
-        """Hands grasps over to the second search where it may succeed."""
+        """Hands grasps over to the second search if it may succeed."""
         if not grasps:
             return
-        self._failed |= {g: self._first.failure(g) for g in grasps}
-        left = [g for g in grasps if self._failed[g].outcome in RETRIED_OUTCOMES]
+        self._first_failures |= {g: self._first.failure(g) for g in grasps}
+        left = [g for g in grasps if self._first_failures[g].outcome in RETRIED_OUTCOMES]
         if not left:
             return
-        lines = self._search.second.begin(self._X_AG[left], self._clearance[left])
-        for number, g in enumerate(left):
-            self._again[g] = lines, number
+        batch = self._search.second.begin(self._X_AG[left], self._clearance[left])
+        for index, g in enumerate(left):
+            self._second_batches[g] = batch, index
             for flip in np.flatnonzero(self._closed[g]):
-                lines.close(number, int(flip))
+                batch.close(index, int(flip))
 
 
 def _failure_rank(failure: Failure) -> tuple[int, bool]:

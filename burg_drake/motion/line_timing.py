@@ -228,7 +228,7 @@ def time_line(
     Args:
         rows: (K, n) joint positions at waypoints of the line.
         kinematics: the arm.
-        limits: of its joints.
+        limits: limits of its joints.
         hand: limits of the hand.
         settings: tolerances.
         is_free: the collision check of everything but the polyline of the rows.
@@ -247,9 +247,9 @@ def time_line(
         for motion in sorted(slow, key=lambda motion: motion.duration):
             if line.is_good(motion.path, settings.straightness, settings.line_deviation, is_free):
                 return motion
-    least = np.diff(line.travel) / max(hand.speed, np.finfo(float).tiny)
+    min_times = np.diff(line.travel) / max(hand.speed, np.finfo(float).tiny)
     # Without a good smooth path, corners are cut by 0.002 rad.
-    return time_polyline(rows, limits, deviation=0.002, is_free=is_free, least=least)
+    return time_polyline(rows, limits, deviation=0.002, is_free=is_free, min_times=min_times)
 
 
 def _fastest_line_motion(

@@ -36,7 +36,7 @@ class GraspBatch:
         instance: N names of the targets; "" without one.
         X_WG: (N, 2, 4, 4) grasps in the world with both finger assignments.
         width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
-        clearance: (N, 2) of the hand on its path [m]; negative where it is not free.
+        clearance: (N, 2) clearance of the hand on its path [m]; negative where it is not free.
     """
 
     instance: Sequence[str]
@@ -68,57 +68,57 @@ class MotionSearch:
     """Searches arm motions for a batch of grasps.
 
     Args:
-        task: the grasps.
-        lines: the search for chains of these grasps.
+        grasps: the grasps.
+        search: the search for chains of these grasps.
         tree: paths from home.
         settings: limits of the search.
     """
 
     def __init__(
-        self, task: GraspBatch, lines: LineSearchBatch, tree: HomeTree, settings: ReachSettings
+        self, grasps: GraspBatch, search: LineSearchBatch, tree: HomeTree, settings: ReachSettings
     ) -> None:
-        self._task, self._lines, self._tree, self._settings = task, lines, tree, settings
+        self._grasps, self._search, self._tree, self._settings = grasps, search, tree, settings
         self._edges: EdgeChecker = tree.edges
         self._collision: ArmCollision = tree.edges.collision
-        self._refused = np.zeros(len(task.instance), dtype=int)
-        self._unconnected = np.zeros(len(task.instance), dtype=int)
+        self._refused = np.zeros(len(grasps.instance), dtype=int)
+        self._unconnected = np.zeros(len(grasps.instance), dtype=int)
         self._nearest: dict[int, Refusal] = {}
-        for grasp, flip in np.argwhere(task.clearance < 0.0):
-            lines.close(int(grasp), int(flip))
+        for grasp, flip in np.argwhere(grasps.clearance < 0.0):
+            search.close(int(grasp), int(flip))
 
     def run(self) -> list[Reach]:
         """Returns the N verdicts."""
         found: dict[int, Reach] = {}
-        left = list(range(len(self._task.instance)))
+        left = list(range(len(self._grasps.instance)))
         while left:
-            proposed = dict(zip(left, self._lines.propose(left), strict=True))
+            proposed = dict(zip(left, self._search.propose(left), strict=True))
             chains = {grasp: chain for grasp, chain in proposed.items() if chain is not None}
-            found |= self._reached(self._unblocked(chains))
+            found |= self._join_to_home(self._select_free(chains))
             for grasp in left:
                 if grasp not in found and (grasp not in chains or self._is_exhausted(grasp)):
-                    found[grasp] = self._refused_reach(grasp)
+                    found[grasp] = self._explain_failure(grasp)
             left = [grasp for grasp in left if grasp not in found]
-        return [found[grasp] for grasp in range(len(self._task.instance))]
+        return [found[grasp] for grasp in range(len(self._grasps.instance))]
 
     def _is_exhausted(self, grasp: int) -> bool:
         """Whether a grasp has used up its attempts."""
         refused = self._refused[grasp] >= self._settings.chains
         return bool(refused or self._unconnected[grasp] >= self._settings.starts_tried)
 
-    def _unblocked(self, chains: dict[int, Chain]) -> dict[int, Chain]:
-        """Returns the free chains and refuses the others."""
-        blocked = {grasp: self._doubtful_blocked(grasp, chain) for grasp, chain in chains.items()}
+    def _select_free(self, chains: dict[int, Chain]) -> dict[int, Chain]:
+        """Selects the free chains, and refuses the others."""
+        blocked = {g: self._find_doubtful_blocked(g, chain) for g, chain in chains.items()}
         for lift in (False, True):
             left = {grasp: chains[grasp] for grasp in chains if blocked[grasp] is None}
-            blocked |= self._first_blocked(left, lift=lift)
+            blocked |= self._find_first_blocked(left, lift=lift)
         for grasp, row in blocked.items():
             if row is not None:
                 self._refuse(grasp, chains[grasp], row)
         return {grasp: chain for grasp, chain in chains.items() if blocked[grasp] is None}
 
-    def _doubtful_blocked(self, grasp: int, chain: Chain) -> int | None:
-        """Row at which the arm collides, among those with no positive lower bound of the clearance:
-        they are the most likely to fail."""
+    def _find_doubtful_blocked(self, grasp: int, chain: Chain) -> int | None:
+        """Row of a chain at which the arm collides, of the rows without a positive lower bound of
+        the clearance, which are the most likely to collide."""
         if not self._settings.exact:
             return None
         doubtful = np.flatnonzero(chain.lower <= 0.0)
@@ -134,11 +134,11 @@ class MotionSearch:
         """Carried instance, its displacement (3,) [m] and width [m] for a target displacement of
         `moved_W`; nothing is carried at 0."""
         held = bool(moved_W.any())
-        name = self._task.instance[grasp] if held else ""
-        width = float(self._task.width[grasp]) if held else np.nan
+        name = self._grasps.instance[grasp] if held else ""
+        width = float(self._grasps.width[grasp]) if held else np.nan
         return (name, moved_W, width) if name else (None, NO_DISPLACEMENT, width)
 
-    def _first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
+    def _find_first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
         """First row of each chain at, or just before, which the arm collides: on the approach, or
         after the grasp if `lift`."""
         rows = {
@@ -148,9 +148,9 @@ class MotionSearch:
         found = self._edges.first_blocked_each(
             [chain.q[rows[grasp]] for grasp, chain in chains.items()],
             hand=False,
-            carried=[(self._task.instance[grasp] or None) if lift else None for grasp in chains],
+            carried=[(self._grasps.instance[grasp] or None) if lift else None for grasp in chains],
             moved_W=[chain.moved_W[rows[grasp]] for grasp, chain in chains.items()],
-            width=[float(self._task.width[grasp]) if lift else np.nan for grasp in chains],
+            width=[float(self._grasps.width[grasp]) if lift else np.nan for grasp in chains],
             lower=[chain.lower[rows[grasp]] for grasp, chain in chains.items()],
         )
         return {
@@ -168,9 +168,9 @@ class MotionSearch:
         )
         with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
         if with_hand is not None:
-            self._lines.close(grasp, chain.flip)
+            self._search.close(grasp, chain.flip)
         else:
-            self._lines.refuse(grasp, chain, row)
+            self._search.refuse(grasp, chain, row)
         if row in (0, chain.at_grasp) or with_hand is not None:
             outcome = Outcome.ARM_COLLISION
         else:
@@ -179,53 +179,53 @@ class MotionSearch:
         if grasp not in self._nearest or refusal.rank > self._nearest[grasp].rank:
             self._nearest[grasp] = refusal
 
-    def _reached(self, chains: dict[int, Chain]) -> dict[int, Reach]:
-        """Verdicts for the free chains that a path from home leads to; refuses the others."""
+    def _join_to_home(self, chains: dict[int, Chain]) -> dict[int, Reach]:
+        """Verdicts on the free chains that a path joins to home; refuses the others."""
         if not chains:
             return {}
         transfers = self._tree.connect(np.array([c.q[0] for c in chains.values()]))
         found = {}
         for (grasp, chain), transfer in zip(chains.items(), transfers, strict=True):
             if transfer is None:
-                self._lines.refuse(grasp, chain, None)
+                self._search.refuse(grasp, chain, None)
                 self._unconnected[grasp] += 1
                 continue
-            at, corner = chain.at_grasp, chain.at_retreated
-            hand = float(self._task.clearance[grasp, chain.flip])
+            grasp_row, lift_row = chain.at_grasp, chain.at_retreated
+            hand = float(self._grasps.clearance[grasp, chain.flip])
             path = ArmPath(
-                X_WG=self._task.X_WG[grasp, chain.flip],
+                X_WG=self._grasps.X_WG[grasp, chain.flip],
                 transfer=transfer,
-                approach=chain.q[: at + 1],
-                retreat=chain.q[at : corner + 1] if corner > at else None,
-                lift=chain.q[corner:],
+                approach=chain.q[: grasp_row + 1],
+                retreat=chain.q[grasp_row : lift_row + 1] if lift_row > grasp_row else None,
+                lift=chain.q[lift_row:],
                 clearance=hand,
             )
             clearance = max(0.0, min(hand, float(chain.lower.min())))
             found[grasp] = Reach(None, clearance=clearance, path=path)
         return found
 
-    def _refused_reach(self, grasp: int) -> Reach:
+    def _explain_failure(self, grasp: int) -> Reach:
         """Verdict on a grasp without a motion: the failure of the best attempt."""
         if self._unconnected[grasp]:
             return Reach(Outcome.NO_PATH)
-        failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
+        failure, refusal = self._search.failure(grasp), self._nearest.get(grasp)
         if refusal is not None and refusal.rank[0] >= _progress_rank(failure.outcome):
             return _reach_blocked_by(refusal.outcome, refusal.overlap)
-        least = self._least_overlapping(grasp, failure)
-        if least is None:
+        smallest = self._smallest_overlap(grasp, failure)
+        if smallest is None:
             return Reach(failure.outcome, excess=failure.excess)
-        return _reach_blocked_by(failure.outcome, least)
+        return _reach_blocked_by(failure.outcome, smallest)
 
-    def _least_overlapping(self, grasp: int, failure: Failure) -> Overlap | None:
+    def _smallest_overlap(self, grasp: int, failure: Failure) -> Overlap | None:
         """Deepest overlap at the failure's configuration where it is smallest; None if all are
         free."""
-        least: Overlap | None = None
-        for q, place in zip(failure.q, failure.moved_W, strict=True):
-            carried, moved_W, width = self._load(grasp, place)
+        smallest: Overlap | None = None
+        for q, displacement in zip(failure.q, failure.moved_W, strict=True):
+            carried, moved_W, width = self._load(grasp, displacement)
             overlaps = self._collision.overlaps(q, carried=carried, moved_W=moved_W, width=width)
-            if overlaps and (least is None or overlaps[0].depth < least.depth):
-                least = overlaps[0]
-        return least
+            if overlaps and (smallest is None or overlaps[0].depth < smallest.depth):
+                smallest = overlaps[0]
+        return smallest
 
 
 def _progress_rank(outcome: Outcome) -> int:

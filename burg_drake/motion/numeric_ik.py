@@ -191,7 +191,7 @@ def solve_ik(
     Returns:
         (N, n) joint positions, and (N,) whether they meet the goal.
     """
-    damping_factor = 1e-2  # Damping of the normal equations over the squared error.
+    damping_factor = 1e-2  # Ratio of the damping of the normal equations to the squared error.
     min_damping = 1e-12  # Damping that singular postures need.
     lower, upper = arm.lower + margin, arm.upper - margin
     found = np.clip(start, lower, upper)

@@ -21,7 +21,7 @@ from burg_drake.motion.closed_form_lines import ChainSearchSettings
 from burg_drake.motion.ik_solutions import ArmSolutions, NumericSolutions
 from burg_drake.motion.line_poses import (
     DenseRows,
-    LinePoses,
+    HandPath,
     NumericFiller,
     solve_ik_near,
     straighten_rows,
@@ -78,11 +78,11 @@ class ChainCandidates:
         first = len(self)
         if not len(q):
             return np.empty(0, np.intp)
-        every_flip, every = np.append(self.flip, flip), np.concatenate([self.q[:, pose], q])
+        all_flips, all_q = np.append(self.flip, flip), np.concatenate([self.q[:, pose], q])
         # Postures whose joints are no more than 0.05 rad or m apart count as the same.
-        same = np.abs(every[first:, None] - every).max(axis=-1) <= 0.05
-        same &= every_flip[first:, None] == every_flip
-        kept = np.flatnonzero(same.argmax(axis=1) == np.arange(first, len(every)))
+        same = np.abs(all_q[first:, None] - all_q).max(axis=-1) <= 0.05
+        same &= all_flips[first:, None] == all_flips
+        kept = np.flatnonzero(same.argmax(axis=1) == np.arange(first, len(all_q)))
         count = len(kept)
         new = np.full((count, *self.q.shape[1:]), np.nan)
         new[:, pose] = q[kept]
@@ -128,14 +128,14 @@ class ChainCandidates:
     def blocking(self, stage: int, count: int) -> tuple[Array, Array]:
         """Arm positions (K, n) in collision at a stage, the nearest to being free first, and the
         displacements of the target there (K, 3) [m]; K is at most `count`."""
-        of = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]
-        q = np.array([b[2] for b in of]).reshape(len(of), self.q.shape[-1])
-        return q, np.array([b[3] for b in of]).reshape(len(of), 3)
+        blocked = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]
+        q = np.array([b[2] for b in blocked]).reshape(len(blocked), self.q.shape[-1])
+        return q, np.array([b[3] for b in blocked]).reshape(len(blocked), 3)
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedPostures:
-    """S postures at grasps, followed along L poses of the path.
+    """S postures at grasps, followed along the L poses of the path.
 
     Attributes:
         q: (S, L, n) arm positions; NaN beyond the end of a chain.
@@ -178,7 +178,7 @@ class NumericLineSearch:
     def __init__(
         self,
         arm: ArmKinematics,
-        lines: LinePoses,
+        hand_path: HandPath,
         proximity: ArmProximity,
         home: Array,
         settings: ReachSettings,
@@ -186,20 +186,20 @@ class NumericLineSearch:
         solutions: ArmSolutions | None = None,
         unlimited_solutions: ArmSolutions | None = None,
     ) -> None:
-        self.arm, self.lines, self.proximity = arm, lines, proximity
+        self.arm, self.hand_path, self.proximity = arm, hand_path, proximity
         self.home, self.settings = home, settings
         margin, starts = settings.limit_margin, settings.starts
         self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
         self.unlimited_solutions = unlimited_solutions or NumericSolutions(
             arm, margin, starts=starts[:1], limited=False
         )
-        self.layers, self.at_grasp = lines.layers, lines.at_grasp
+        self.layers, self.at_grasp = hand_path.layers, hand_path.at_grasp
 
     def lifted(self, height: float) -> NumericLineSearch:
         """See `LineSearch`."""
         return NumericLineSearch(
             self.arm,
-            replace(self.lines, lift=height),
+            replace(self.hand_path, lift=height),
             self.proximity,
             self.home,
             self.settings,
@@ -226,11 +226,11 @@ class NumericLineSearch:
             q: (S, n) postures there.
         """
         count, at_grasp = len(self.layers), self.at_grasp
-        at_retreated = self.lines.at_retreated
+        at_retreated = self.hand_path.at_retreated
         lower, upper = np.full((2, len(q), count), np.inf)
-        every = np.full((len(q), count, q.shape[1]), np.nan)
-        every[:, at_grasp] = q
-        found = FollowedPostures(every, lower, upper, np.full(len(q), COMPLETE_CHAIN))
+        followed = np.full((len(q), count, q.shape[1]), np.nan)
+        followed[:, at_grasp] = q
+        found = FollowedPostures(followed, lower, upper, np.full(len(q), COMPLETE_CHAIN))
         self._measure_followed(found, [at_grasp], GRASP)
         for stage, begin, end in (
             (APPROACH, at_grasp, 0),
@@ -254,7 +254,7 @@ class NumericLineSearch:
         start = before
         if not bent:
             start = 2.0 * before - found.q[alive, pose - 2 * step]
-        X_AH = self.lines.X_AH(X_AG[alive], self.layers[pose])
+        X_AH = self.hand_path.X_AH(X_AG[alive], self.layers[pose])
         q, met = solve_ik_near(self.arm, X_AH, start, self.settings)
         met &= np.abs(q - before).max(axis=1, initial=0.0) <= self.settings.joint_travel
         found.q[alive[met], pose] = q[met]
@@ -319,7 +319,7 @@ class _NumericBatch:
         """See `LineSearch`."""
         search, candidates = self._search, self._candidates[grasp]
         if not len(candidates):
-            return self._beyond_limits(grasp, search.at_grasp)
+            return self._limit_failure(grasp, search.at_grasp)
         stage = int(candidates.stage[~candidates.open].max(initial=GRASP))
         if stage == GRASP:
             return self._explain(Outcome.ARM_COLLISION, candidates, GRASP)
@@ -346,7 +346,7 @@ class _NumericBatch:
 
     def _postures(self, X_AG: Array, layer: int, round_index: int) -> tuple[Indices, Array]:
         search = self._search
-        X_AH = search.lines.X_AH(X_AG, search.layers[layer])
+        X_AH = search.hand_path.X_AH(X_AG, search.layers[layer])
         pose, q = search.solutions.solve(X_AH, round_index)
         return pose, search.arm.wrapped_near(q, search.home)
 
@@ -365,7 +365,7 @@ class _NumericBatch:
             elif blocked is None:
                 self._candidates[g].stop(j, stage)
             else:
-                moved_W = search.lines.target_displacement(
+                moved_W = search.hand_path.target_displacement(
                     self._X_AG[g, flip[s]], search.layers[blocked]
                 )
                 upper = float(found.upper[s, blocked])
@@ -379,8 +379,8 @@ class _NumericBatch:
         return float(change + start + ChainSearchSettings.doubt_cost * (lower <= 0.0).sum())
 
     def _refine(self, chosen: list[tuple[int, int]]) -> dict[int, Chain]:
-        """Chains with a straight hand motion and no known collision, by grasp; excludes the
-        others."""
+        """Chains with a straight hand motion and no known collision, by grasp; excludes the other
+        candidates."""
         if not chosen:
             return {}
         search = self._search
@@ -390,14 +390,14 @@ class _NumericBatch:
         corners = np.array([self._candidates[g].q[k] for g, k in chosen])
         X_AG = self._X_AG[grasp, flip]
         filler = NumericFiller(
-            *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
+            *(search.hand_path, X_AG, corners, search.layers, search.arm, search.settings)
         )
         at = np.linspace(0.0, count - 1.0, (count - 1) * ChainSearchSettings.rows_per_layer + 1)
         rows = straighten_rows(filler, at, self._deviation[grasp, flip])
         lower, upper = search.measure(rows.q)
         chains = {}
         for i, (g, k) in enumerate(chosen):
-            chain = self._chain(g, k, rows, rows.of(i), lower, upper)
+            chain = self._chain(g, k, rows, rows.slice_of(i), lower, upper)
             if chain is not None:
                 chains[g] = chain
         return chains
@@ -405,20 +405,20 @@ class _NumericBatch:
     def _chain(
         self, grasp: int, k: int, rows: DenseRows, own: slice, lower: Array, upper: Array
     ) -> Chain | None:
-        search, of = self._search, self._candidates[grasp]
-        layer, flip = rows.layer[own], int(of.flip[k])
-        chain = search.lines.chain(self._X_AG[grasp, flip], flip, rows, own, lower, k)
+        search, candidates = self._search, self._candidates[grasp]
+        layer, flip = rows.layer[own], int(candidates.flip[k])
+        chain = search.hand_path.chain(self._X_AG[grasp, flip], flip, rows, own, lower, k)
         blocked = ~(upper[own] > 0.0)
         bad = np.flatnonzero(rows.broken[own] | blocked)
         if len(bad):
-            ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
+            ends = search.at_grasp, search.hand_path.at_retreated, len(search.layers)
             on = np.searchsorted(ends, layer[bad])  # index of the segment
             stage, bad = SEGMENT_STAGES[int(on.min())][0], bad[on == on.min()]
             row = bad[upper[own][bad].argmin()]
             if blocked[row]:
-                of.block(k, stage, chain.q[row], chain.moved_W[row], float(upper[own][row]))
+                candidates.block(k, stage, chain.q[row], chain.moved_W[row], float(upper[own][row]))
             else:
-                of.stop(k, stage)
+                candidates.stop(k, stage)
             return None
         return chain
 
@@ -429,7 +429,7 @@ class _NumericBatch:
             X_AG, rounds = self._X_AG[grasp], range(search.solutions.rounds)
             q = np.concatenate([self._postures(X_AG, 0, round_index)[1] for round_index in rounds])
             if not len(q):
-                return self._beyond_limits(grasp, 0)
+                return self._limit_failure(grasp, 0)
             _, upper = search.measure(q)
             if not (upper > 0.0).any():
                 order = np.argsort(-upper, kind="stable")[: ChainSearchSettings.max_explained]
@@ -441,11 +441,11 @@ class _NumericBatch:
         q, moved_W = candidates.blocking(stage, ChainSearchSettings.max_explained)
         return Failure(outcome, q=q, moved_W=moved_W)
 
-    def _beyond_limits(self, grasp: int, layer: int) -> Failure:
+    def _limit_failure(self, grasp: int, layer: int) -> Failure:
         """`JOINT_LIMIT` with the smallest excess, or `NO_IK` if no posture exists without
         limits."""
         search = self._search
-        X_AH = search.lines.X_AH(self._X_AG[grasp], search.layers[layer])
+        X_AH = search.hand_path.X_AH(self._X_AG[grasp], search.layers[layer])
         q = np.concatenate(
             [
                 search.unlimited_solutions.solve(X_AH, round_index)[1]

@@ -163,7 +163,7 @@ class _Wrist(_PoseParameterPairs):
     """Position of the shoulder relative to the wrist.
 
     Attributes:
-        v: (3, K) from the wrist to the shoulder [m].
+        v: (3, K) vectors from the wrist to the shoulder [m].
         x6, y6: (3, K) axes of frame 6.
         along: (3, K) components of v in frame 6 [m].
     """

@@ -33,7 +33,7 @@ class Planner:
 
     Attributes:
         reach: finds the paths.
-        limits: of the arm.
+        limits: limits of the arm's joints.
         settings: speeds and tolerances.
     """
 
@@ -71,12 +71,12 @@ class Planner:
     def time(self, instance: str, path: ArmPath, width: float = np.nan) -> Plan:
         """Times a path of `reach`, after shortening the transfer.
 
-        Deviations from the path (rounded corners, smoothed lines) are checked for collisions in the
-        same way as the path.
+        Deviations from the path (rounded corners, smoothed segments) are checked for collisions in
+        the same way as the path.
 
         Args:
             instance: the target.
-            path: of the arm.
+            path: path of the arm.
             width: distance between the pads that hold the target [m]; NaN if it is not known.
         """
         is_free, hand = self.reach.path_is_free, self.reach.diagram.station.hand

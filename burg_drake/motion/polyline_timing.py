@@ -127,7 +127,7 @@ class DoubleS:
 
     @classmethod
     def of(cls, velocity: float, acceleration: float, jerk: float) -> DoubleS:
-        """From the limits [1/s, 1/s^2, 1/s^3], all above 0 and finite."""
+        """The motion with limits [1/s, 1/s^2, 1/s^3], all above 0 and finite."""
         ramp = acceleration / jerk
         rise = velocity / acceleration
         if rise < ramp:  # the largest acceleration is not reached
@@ -160,7 +160,7 @@ def smooth_polyline(
     Args:
         q: (M, n) waypoints.
         travel: (M - 1,) time on each segment [s].
-        windows: `rise` and `ramp`.
+        windows: the windows `rise` and `ramp`.
         dwell: (M - 2,) time to stop at each inner waypoint [s]; no stops if None.
     """
     rate = np.diff(q, axis=0) / travel[:, None]
@@ -184,46 +184,46 @@ def time_polyline(
     *,
     deviation: float,
     is_free: IsFree | None = None,
-    least: Array | None = None,
+    min_times: Array | None = None,
 ) -> Cubics:
     """Times a motion along a polyline, at rest at both ends.
 
     Args:
         q: (M, n) waypoints.
-        limits: not to be exceeded.
+        limits: limits of the joints; none is exceeded.
         deviation: largest Euclidean distance of joint positions from the polyline [rad].
         is_free: collision check of rounded corners. A corner where it fails is cut less, or the arm
             stops there. Without a check the arm stops at all corners.
-        least: (M - 1,) shortest time on each segment [s].
+        min_times: (M - 1,) shortest time on each segment [s].
 
     Returns:
         The motion; straight between two waypoints.
     """
     moves = np.abs(np.diff(q, axis=0)).max(axis=1) > 0.0
-    least = np.zeros(len(q) - 1) if least is None else least
-    q, least = np.concatenate([q[:1], q[1:][moves]]), least[moves]
+    min_times = np.zeros(len(q) - 1) if min_times is None else min_times
+    q, min_times = np.concatenate([q[:1], q[1:][moves]]), min_times[moves]
     if len(q) == 1:
         # A motion that goes nowhere takes 1 ms.
         return Cubics.from_jerk_steps(q[0], np.array([0.0, 0.001]), np.zeros((2, q.shape[1])))
     stops = Cubics.joined(
-        [_time_straight(q[k : k + 2], limits, least[k]) for k in range(len(least))]
+        [_time_straight(q[k : k + 2], limits, min_times[k]) for k in range(len(min_times))]
     )
     if is_free is None or len(q) == 2:
         return stops
-    rounded = _time_rounded(q, limits, least, deviation, is_free)
+    rounded = _time_rounded(q, limits, min_times, deviation, is_free)
     return min(stops, rounded, key=lambda motion: motion.duration)
 
 
 def _time_rounded(
-    q: Array, limits: ArmLimits, least: Array, deviation: float, is_free: IsFree
+    q: Array, limits: ArmLimits, min_times: Array, deviation: float, is_free: IsFree
 ) -> Cubics:
     """Times a motion that stops only at corners that cannot be rounded."""
-    pause_shares = (0.0, 0.5)  # Pauses at a corner over the one that meets it exactly.
+    pause_shares = (0.0, 0.5)  # Shares of the pause with which the motion meets a corner exactly.
     if len(q) == 2:
-        return _time_straight(q, limits, least[0])
+        return _time_straight(q, limits, min_times[0])
     level = np.zeros(len(q) - 2, int)
     while level.max() < len(pause_shares):
-        path = _fastest_polyline(q, limits, least, np.take(pause_shares, level))
+        path = _fastest_polyline(q, limits, min_times, np.take(pause_shares, level))
         corners = range(len(level))
         cut = [k for k in corners if not path.is_good(k, deviation, is_free)]
         if not cut:
@@ -232,16 +232,16 @@ def _time_rounded(
     ends = [0, *(np.flatnonzero(level == len(pause_shares)) + 1).tolist(), len(q) - 1]
     return Cubics.joined(
         [
-            _time_rounded(q[i : k + 1], limits, least[i:k], deviation, is_free)
+            _time_rounded(q[i : k + 1], limits, min_times[i:k], deviation, is_free)
             for i, k in pairwise(ends)
         ]
     )
 
 
-def _time_straight(q: Array, limits: ArmLimits, least: float) -> Cubics:
+def _time_straight(q: Array, limits: ArmLimits, min_time: float) -> Cubics:
     length = np.abs(q[1] - q[0])
     profile = DoubleS.of(
-        1.0 / max(least, (length / limits.velocity).max()),
+        1.0 / max(min_time, (length / limits.velocity).max()),
         1.0 / (length / limits.acceleration).max(),
         1.0 / (length / limits.jerk).max(),
     )
@@ -255,7 +255,7 @@ class _TimedPolyline:
 
     Attributes:
         q: (M, n) waypoints.
-        motion: along the waypoints.
+        motion: the motion along the waypoints.
         arrival, departure: (M - 2,) times at which corners begin and end to affect the motion [s].
     """
 
@@ -276,29 +276,32 @@ class _TimedPolyline:
         return farthest <= 0.999 * deviation and is_free(rows[::finer_rows])
 
 
-def _fastest_polyline(q: Array, limits: ArmLimits, least: Array, share: Array) -> _TimedPolyline:
+def _fastest_polyline(
+    q: Array, limits: ArmLimits, min_times: Array, share: Array
+) -> _TimedPolyline:
     """The fastest motion over several windows. Pauses at the corners are `share` (M - 2,) of the
     windows' lengths."""
-    # First window over the time to full speed. Above 1 helps where a joint turns back.
+    # Ratios of the first window to the time to full speed. Above 1 helps where a joint turns back.
     rise_factors = np.geomspace(0.2, 2.0, 12)
-    # Second window over the time to full acceleration. Jerk can add up where corners are close.
+    # Ratios of the second window to the time to full acceleration. Jerk can add up where corners
+    # are close.
     ramp_factors = (1.0, 2.0)
     length = np.abs(np.diff(q, axis=0))
     V, A, J = (
         (length / m).max(axis=1) for m in (limits.velocity, limits.acceleration, limits.jerk)
     )
-    V = np.maximum(V, least)
-    full = float((limits.velocity / limits.acceleration).max())
-    build = float((limits.acceleration / limits.jerk).max())
+    V = np.maximum(V, min_times)
+    full_speed_time = float((limits.velocity / limits.acceleration).max())
+    full_acceleration_time = float((limits.acceleration / limits.jerk).max())
     best, shortest = None, np.inf
-    for ramp in build * np.array(ramp_factors):
-        for rise in full * rise_factors:
+    for ramp in full_acceleration_time * np.array(ramp_factors):
+        for rise in full_speed_time * rise_factors:
             travel = np.maximum.reduce([V, A / rise, J / (rise * ramp)])
             windows = DoubleS(float(travel.sum()), float(rise), float(ramp))
             dwell = share * (rise + ramp)
             motion = smooth_polyline(q, travel, windows, dwell)
             factor = limits.time_scale(motion.peaks())
-            if least.any():
+            if min_times.any():
                 factor = max(factor, 1.0)
             if motion.duration * factor < shortest:
                 shortest = motion.duration * factor

@@ -14,7 +14,7 @@ import numpy as np
 
 from burg_drake.core import Array, Booleans, Indices, Single
 from burg_drake.motion.clearance_bounds import ArmProximity, Bounding, ClearanceBounds
-from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_poses import HandPath
 from burg_drake.motion.motion_settings import ReachSettings
 from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.panda_ik import IK_BRANCHES, PandaIk
@@ -153,18 +153,18 @@ class PostureSteps:
 
     def reached(self, usable: Booleans) -> Booleans:
         """(L, R, Q) whether usable postures can be reached from the first pose over usable ones."""
-        led = np.zeros_like(usable)
-        led[0] = usable[0]
+        reached = np.zeros_like(usable)
+        reached[0] = usable[0]
         count, margin = usable.shape[-1], self._margin
         for pose, length in enumerate(self.length):
-            begun = np.isfinite(length) & led[pose]
+            begun = np.isfinite(length) & reached[pose]
             there = np.zeros((*usable.shape[1:-1], count + 2 * margin), dtype=bool)
             for kind, (offset, crossing) in enumerate(self._kinds()):
                 shift = margin + offset
-                come = begun[kind] if crossing is None else begun[kind][self.other[crossing]]
-                there[:, shift : shift + count] |= come
-            led[pose + 1] = there[:, margin : margin + count] & usable[pose + 1]
-        return led
+                arriving = begun[kind] if crossing is None else begun[kind][self.other[crossing]]
+                there[:, shift : shift + count] |= arriving
+            reached[pose + 1] = there[:, margin : margin + count] & usable[pose + 1]
+        return reached
 
     @property
     def _margin(self) -> int:
@@ -204,8 +204,8 @@ class GridChain:
 
     Attributes:
         flip: finger assignment, 0 or 1.
-        branch: (L,) of the inverse kinematics.
-        parameter: (L,) indices of values of the redundant joint.
+        branch: (L,) branches of the inverse kinematics.
+        parameter: (L,) indices of the values of the redundant joint.
     """
 
     flip: int
@@ -310,13 +310,14 @@ class PostureGrid:
         """Whether any measured posture is usable."""
         return bool((np.isfinite(self.lower[pose, grasp]) & self.usable(pose, grasp)).any())
 
-    def cut(self, grasp: int, pose: int, place: GridChain) -> None:
+    def cut(self, grasp: int, pose: int, chain: GridChain) -> None:
         """Removes the step of a chain from `pose` to the next one."""
-        (branch, there), k = place.branch[pose : pose + 2].tolist(), int(place.parameter[pose])
-        step = int(place.parameter[pose + 1]) - k
-        row = self._rows.number(grasp, place.flip, branch)
-        crossing = None if there == branch else BRANCH_CROSSINGS[:, branch].tolist().index(there)
-        self._steps.cut(pose, row, k, step, crossing)
+        branch, next_branch = chain.branch[pose : pose + 2].tolist()
+        k, next_k = chain.parameter[pose : pose + 2].tolist()
+        row = self._rows.number(grasp, chain.flip, branch)
+        crossings = BRANCH_CROSSINGS[:, branch].tolist()
+        crossing = None if next_branch == branch else crossings.index(next_branch)
+        self._steps.cut(pose, row, k, next_k - k, crossing)
 
     def best(self, grasps: Indices, doubt: float) -> list[GridChain | None]:
         """The cheapest chain of each grasp.
@@ -361,11 +362,11 @@ class PostureGrid:
         """The last pose that chains of usable postures of a grasp reach; -1 if the first pose has
         none."""
         usable = self.usable(slice(None), grasp)
-        only = np.zeros(self.q.shape[2:-1], dtype=bool)
-        only[grasp] = usable.any(axis=(0, -1))
-        rows = PostureRows.where(only)
-        led = self._steps_of(rows).reached(usable[:, rows.flip, rows.branch]).any(axis=(1, 2))
-        return int(np.flatnonzero(led).max(initial=-1))
+        wanted = np.zeros(self.q.shape[2:-1], dtype=bool)
+        wanted[grasp] = usable.any(axis=(0, -1))
+        rows = PostureRows.where(wanted)
+        reached = self._steps_of(rows).reached(usable[:, rows.flip, rows.branch])
+        return int(np.flatnonzero(reached.any(axis=(1, 2))).max(initial=-1))
 
     def _steps_of(self, rows: PostureRows) -> PostureSteps:
         q = self.q[(slice(None), *rows.index)]
@@ -394,14 +395,14 @@ class PostureGridBuilder:
         self,
         arm: ArmKinematics,
         ik: PandaIk,
-        lines: LinePoses,
+        hand_path: HandPath,
         proximity: ArmProximity,
         home: Array,
         settings: ReachSettings,
     ) -> None:
-        self.arm, self.ik, self.lines, self.proximity = arm, ik, lines, proximity
+        self.arm, self.ik, self.hand_path, self.proximity = arm, ik, hand_path, proximity
         self.home, self.settings = home, settings
-        self.layers, self.at_grasp = lines.layers, lines.at_grasp
+        self.layers, self.at_grasp = hand_path.layers, hand_path.at_grasp
 
     def parameters(self, count: int) -> Array:
         """(count,) values of the redundant joint within its limits [rad]."""
@@ -410,7 +411,7 @@ class PostureGridBuilder:
 
     def grid(self, X_AG: Array, count: int) -> PostureGrid:
         """An empty grid for the postures of grasps (n, 2, 4, 4), with `count` redundant values."""
-        X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
+        X_AH = self.hand_path.X_AH(X_AG[None], self.layers[:, None, None])
         values = self.parameters(count)
         spacing = values[1] - values[0] if count > 1 else np.inf
         # The redundant joint changes by at most 0.75 rad from layer to layer, or 0.38 rad where
@@ -437,11 +438,11 @@ class PostureGridBuilder:
         grid.lower[where], grid.upper[where] = lower, upper
 
 
-def _grid_offsets(most: float) -> tuple[int, ...]:
-    """Rising offsets from -`most` to `most` that include 0."""
+def _grid_offsets(max_offset: float) -> tuple[int, ...]:
+    """Rising offsets from -`max_offset` to `max_offset` that include 0."""
     # Steps of the redundant joint's index. Large changes need no fine choice.
     steps = (1, 2, 4, 8, 16, 24)
-    up = [k for k in steps if k <= most]
+    up = [k for k in steps if k <= max_offset]
     return (*(-k for k in reversed(up)), 0, *up)
 
 

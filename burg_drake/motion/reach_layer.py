@@ -33,7 +33,7 @@ class ReachLayer:
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
             that cover the board.
-        height: of the middle between the pads above the board [m].
+        height: height of the middle between the pads above the board [m].
         yaw: (K,) rotations of the hand about the vertical [rad], over half a turn: the other half
             are the same grasps with the fingers swapped.
         reached: (Y, X, K) whether the arm can execute the grasp.
@@ -82,8 +82,8 @@ def reach_from_above(
 
     Args:
         station: arm, hand, obstacles, and the hand's approach, retreat and lift.
-        board: A2 if None.
-        height: of the grasps above the board [m].
+        board: the board; A2 if None.
+        height: height of the grasps above the board [m].
         spacing: largest distance between neighbouring points [m].
         yaws: number of yaw angles, evenly over half a turn.
 
@@ -109,14 +109,14 @@ def reach_from_above(
     def make() -> Arrays:
         reach = reach_without_objects(station)
 
-        def ask(j: NDArray[np.intp], i: NDArray[np.intp]) -> NDArray[np.bool_]:
+        def check(j: NDArray[np.intp], i: NDArray[np.intp]) -> NDArray[np.bool_]:
             found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
             return np.array([verdict.outcome is None for verdict in found]).reshape(-1, yaws)
 
-        return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
+        return {"reached": answers_by_refinement(len(y), len(x), yaws, check)}
 
-    asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
-    return ReachLayer(x, y, height, yaw, cached("reach-layer", asked, make)["reached"], cell)
+    key = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
+    return ReachLayer(x, y, height, yaw, cached("reach-layer", key, make)["reached"], cell)
 
 
 @lru_cache(maxsize=2)
@@ -132,17 +132,17 @@ def reach_without_objects(station: Station) -> ArmReach:
 
 
 def answers_by_refinement(
-    rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
+    rows: int, columns: int, yaws: int, check: Callable[[Indices, Indices], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
-    """(Y, X, K) answers of `ask` on a grid. Points whose coarse neighbours agree are not asked.
+    """(Y, X, K) results of `check` on a grid. Points whose coarse neighbours agree are not checked.
 
     Args:
         rows, columns: number of points along y and x.
-        yaws: number of answers per point.
-        ask: returns the answers (N, K) for points by their rows (N,) and columns (N,).
+        yaws: number of results per point.
+        check: returns the results (N, K) for points by their rows (N,) and columns (N,).
     """
-    coarsest_stride = 4  # Grid points between the points asked first.
-    unknown = -1  # Not asked yet.
+    coarsest_stride = 4  # Grid points between the points checked first.
+    unknown = -1  # Not checked yet.
     found = np.full((rows, columns, yaws), unknown, dtype=np.int8)
     stride = coarsest_stride
     while stride:
@@ -158,7 +158,7 @@ def answers_by_refinement(
             found[j[agreed], i[agreed]] = corners[0][agreed]
             j, i = j[~agreed], i[~agreed]
         if len(j):
-            found[j, i] = ask(j, i)
+            found[j, i] = check(j, i)
         stride //= 2
     return found.astype(bool)
 

@@ -19,11 +19,11 @@ class ArmPath:
     Attributes:
         X_WG: (4, 4) the grasp in the world with the chosen finger assignment: as given, or with
             the fingers swapped.
-        transfer: (M, n) from the home posture to the pregrasp; M is at least 2.
-        approach: (K, n) from pregrasp to grasp; the hand moves straight.
-        lift: (L, n) along the lift; a single row if it has no height.
-        retreat: (J, n) from the grasp straight back along the approach, with the target; None if
-            the lift begins at the grasp.
+        transfer: (M, n) rows from the home posture to the pregrasp; M is at least 2.
+        approach: (K, n) rows from pregrasp to grasp; the hand moves straight.
+        lift: (L, n) rows along the lift; a single one if the lift has no height.
+        retreat: (J, n) rows from the grasp straight back along the approach, with the target;
+            None if the lift begins at the grasp.
         clearance: lower bound of the clearance of the hand and the held target on approach,
             retreat and lift [m]; NaN if it is not known.
     """

@@ -97,7 +97,7 @@ class ReachabilityMap:
     Attributes:
         x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
             that cover the board.
-        heights: (Z,) of the points above the board [m].
+        heights: (Z,) heights of the points above the board [m].
         tilt: (K,) angle of each orientation's approach direction from straight down [rad].
         R_WG: (K, 3, 3) orientations of the grasp frame in the world.
         reached: (Z, Y, X, K) whether the arm reaches an orientation.
@@ -179,8 +179,8 @@ def map_reachability(
         reached[clear] = _reached_grasps(scene, station, X_WG[clear], settings)
         return {"reached": reached}
 
-    asked = content_hash(world_content(scene, station), vars(settings))
-    reached = cached("reachability", asked, make)["reached"]
+    key = content_hash(world_content(scene, station), vars(settings))
+    reached = cached("reachability", key, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)
 

@@ -21,14 +21,14 @@ class ObjectViewLimits:
 
     min_distance = 0.03  # Metres from the grasp frame to the origin of an object.
     max_distance = 0.30  # Metres from the grasp frame to the origin of an object.
-    min_cosine = 0.6  # Of the angle between the approach and the direction to the object.
+    min_cosine = 0.6  # Cosine of the angle between approach and direction to the object.
 
 
 def random_postures(
     home: Array, lower: Array, upper: Array, count: int, rng: np.random.Generator
 ) -> Array:
     """(count, n) random postures within joint limits, alternately around home and uniform."""
-    spread = 0.25  # Standard deviation around home, over a joint's range.
+    spread = 0.25  # Standard deviation around home, as a share of a joint's range.
     q = rng.uniform(lower, upper, (count, len(home)))
     around = home + spread * (upper - lower) * rng.standard_normal(q[::2].shape)
     q[::2] = np.clip(around, lower, upper)
@@ -59,23 +59,23 @@ def postures_over_objects(
         q = random_postures(
             home, lower, upper, 40_000, rng_from("burg_drake postures over objects")
         )
-        return {"q": q[_looks_at_object(links, frame, X_FG, objects, q)]}
+        return {"q": q[_points_at_object(links, frame, X_FG, objects, q)]}
 
-    asked = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
-    return np.asarray(cached("postures", content_hash(*asked), make)["q"])
+    inputs = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
+    return np.asarray(cached("postures", content_hash(*inputs), make)["q"])
 
 
-def _looks_at_object(
+def _points_at_object(
     links: ArmLinks, frame: int, X_FG: Array, objects: list[Array], q: Array
 ) -> NDArray[np.bool_]:
     """(N,) whether the hand points at one of the objects in postures (N, n)."""
     block_size = 4096  # Postures whose links are placed at once.
-    looks = np.zeros(len(q), dtype=bool)
+    points_at = np.zeros(len(q), dtype=bool)
     for start in range(0, len(q), block_size):
         block = slice(start, start + block_size)
         poses = links.poses(q[block])
         points = np.stack([X_FG[:3, 3], X_FG[:3, 3] + X_FG[:3, 2]]).astype(np.float32)
-        p_WG, ahead = poses.place(frame, points).swapaxes(0, 1)
+        p_WG, ahead = poses.transform_points(frame, points).swapaxes(0, 1)
         approach = ahead - p_WG
         for p_WO in objects:
             offset = p_WO.astype(np.float32)[:, None] - p_WG
@@ -84,8 +84,8 @@ def _looks_at_object(
             near = (distance > ObjectViewLimits.min_distance) & (
                 distance < ObjectViewLimits.max_distance
             )
-            looks[block] |= near & (along > ObjectViewLimits.min_cosine * distance)
-    return looks
+            points_at[block] |= near & (along > ObjectViewLimits.min_cosine * distance)
+    return points_at
 
 
 class Roadmap:
@@ -117,10 +117,10 @@ class Roadmap:
         """
         self._edges = edges
         near = np.empty((0, len(home))) if focus is None else focus
-        asked = (edges.content, home, lower, upper, near, nodes)
+        inputs = (edges.content, home, lower, upper, near, nodes)
         arrays = cached(
             "roadmap",
-            content_hash(*asked),
+            content_hash(*inputs),
             lambda: _build_roadmap(edges, home, lower, upper, near, nodes),
         )
         self.q, self.scale = arrays["q"], arrays["scale"]
@@ -130,7 +130,7 @@ class Roadmap:
         self._search()
 
     def _search(self) -> None:
-        self.distance, self._before = _shortest_paths(self._ends, self._length, len(self.q))
+        self.distance, self._parent = _shortest_paths(self._ends, self._length, len(self.q))
 
     def near(self, q: Array, count: int) -> NDArray[np.intp]:
         """The nodes with the least displacement to `q` (n,), nearest first."""
@@ -142,8 +142,8 @@ class Roadmap:
         tier; the verdicts do not change."""
         reached = nodes[np.isfinite(self.distance[nodes])]
         paths = (pairwise(self._chain(node)) for node in dict.fromkeys(reached.tolist()))
-        asked = {(min(edge), max(edge)) for path in paths for edge in path}
-        new = np.array(sorted(asked - self._free - self._blocked), dtype=np.intp).reshape(-1, 2)
+        needed = {(min(edge), max(edge)) for path in paths for edge in path}
+        new = np.array(sorted(needed - self._free - self._blocked), dtype=np.intp).reshape(-1, 2)
         q_a, q_b = self.q[new[:, 0]], self.q[new[:, 1]]
         screened = self._edges.screen(q_a, q_b)
         for k, (first, second) in enumerate(new.tolist()):
@@ -164,7 +164,7 @@ class Roadmap:
 
     def _chain(self, node: int) -> list[int]:
         """The nodes from home to `node` on the shortest path that is not refuted."""
-        return chain_to_root(self._before, node)[::-1]
+        return chain_to_root(self._parent, node)[::-1]
 
     def _is_free(self, edge: tuple[int, int]) -> bool:
         first, second = sorted(edge)  # so that the verdict does not depend on the direction
@@ -174,11 +174,11 @@ class Roadmap:
         return (first, second) in self._free
 
 
-def chain_to_root(before: NDArray[np.integer], node: int) -> list[int]:
-    """The nodes from `node` to the root of its tree, given each node's parent (negative: root)."""
+def chain_to_root(parent: NDArray[np.integer], node: int) -> list[int]:
+    """The nodes from `node` to the root of its tree, by each node's parent (negative: root)."""
     chain = [node]
-    while before[chain[-1]] >= 0:
-        chain.append(int(before[chain[-1]]))
+    while parent[chain[-1]] >= 0:
+        chain.append(int(parent[chain[-1]]))
     return chain
 
 
@@ -242,5 +242,5 @@ def _shortest_paths(
 ) -> tuple[Array, NDArray[np.int32]]:
     """(N,) distances from node 0, infinite for unreachable nodes, and the nodes before."""
     graph = csr_matrix((length, (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
-    distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
-    return distance, before
+    distance, parent = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    return distance, parent

@@ -1,4 +1,4 @@
-"""Bounds on the distance of the arm and its hand to the arm's own links.
+"""Bounds on the distances of the arm and its hand from the arm's own links.
 
 Distances between links with one or two joints between them are tables over these joints. All
 other pairs are compared by their trees of balls.
@@ -39,10 +39,9 @@ from burg_drake.motion.arm_links import ArmLinks, LinkPoses
 from burg_drake.motion.ball_tree import (
     BallTrees,
     BodyBalls,
-    hull_vertices,
     unsupported_shape_error,
 )
-from burg_drake.station import StationDiagram
+from burg_drake.station import StationDiagram, hull_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +86,7 @@ class LinkDistance:
         """Distances [m].
 
         Args:
-            positions: (C, m) of the joints between the bodies [rad or m].
+            positions: (C, m) positions of the joints between the bodies [rad or m].
             ceiling: larger distances may be returned as infinite [m].
 
         Returns:
@@ -108,7 +107,7 @@ class LinkDistance:
         X = Poses.of(self._links.relative_poses(self._joints, positions))
         pair = np.tile(np.arange(self.pairs), len(positions))
         which = np.repeat(np.arange(len(positions)), self.pairs)
-        of_cores = shape_distances(
+        core_distances = shape_distances(
             replace(self._one, ball=np.zeros_like(self._one.ball)),
             self._shape[pair],
             replace(self._other, ball=np.zeros_like(self._other.ball)),
@@ -116,7 +115,7 @@ class LinkDistance:
             X[which],
             ceiling + self._balls[pair],
         )
-        found = of_cores - self._balls[pair]
+        found = core_distances - self._balls[pair]
         return np.asarray(found.reshape(len(positions), self.pairs).min(axis=1))
 
 
@@ -132,15 +131,10 @@ def _cores(
             cores.append(_core(inspector, geometry))
             poses.append(links.X_FB[body] @ inspector.GetPoseInFrame(geometry).GetAsMatrix4())
     vertices = [transform_points(X, core.vertices) for X, core in zip(poses, cores, strict=True)]
-    count = np.array([len(v) for v in vertices])
-    corners = np.arange(count.max())
-    filled = np.array([v[np.where(corners < len(v), corners, 0)] for v in vertices])
-    x, y, z = np.ascontiguousarray(np.moveaxis(filled, -1, 0))
-    X = np.array(poses)
-    return ShapeBatch(
-        *(x, y, z, count),
+    return ShapeBatch.from_vertices(
+        vertices,
+        np.array(poses),
         center=np.array([v.mean(axis=0) for v in vertices]),
-        disc_axes=(X[:, :3, 0].T.copy(), X[:, :3, 1].T.copy()),
         disc=np.array([core.disc for core in cores]),
         ball=np.array([core.ball for core in cores]),
     )
@@ -159,7 +153,7 @@ def _core(inspector: SceneGraphInspector, geometry: GeometryId) -> _Core:
             signs = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
             return _Core(signs * shape.size())
         case Convex() | Mesh():
-            return _Core(hull_vertices(inspector, geometry))
+            return _Core(hull_vertices(shape))
     raise unsupported_shape_error(inspector, geometry)
 
 
@@ -171,14 +165,14 @@ class Tables:
     """Size and accuracy of the tables of distances between links."""
 
     max_joints = 2  # Joints between the links of a table.
-    cell_angle = np.deg2rad(3.0)  # Radians. Size of the smallest cells at most.
-    cell_length = 6e-3  # Metres. Size of the smallest cells of prismatic joints at most.
-    levels = 4  # Halvings of the largest cells at most.
+    cell_angle = np.deg2rad(3.0)  # Radians. Largest size of the smallest cells.
+    cell_length = 6e-3  # Metres. Largest size of the smallest cells of prismatic joints.
+    levels = 4  # Largest number of halvings of the largest cells.
     extra_levels = 2  # Further halvings, to decide whether links can meet.
-    max_cells = 200_000  # Cells above which there is no table.
-    max_distances = 500_000  # Distances of shapes above which there is no table; some seconds.
-    known_distance = 0.03  # Metres. Lower bounds of larger distances are about this.
-    relative_error = 0.5  # Uncertainty over distance below which a cell is not halved any more.
+    max_cells = 200_000  # Cells of a table. With more there is none.
+    max_distances = 500_000  # Distances of shapes for a table; some seconds. With more: none.
+    known_distance = 0.03  # Metres. Lower bounds of larger distances are about this value.
+    relative_error = 0.5  # Ratio of uncertainty to distance below which cells are not halved.
     depth_margin = 0.02  # Metres that an overlap may be deeper than computed.
     accuracy = 5e-5  # Metres. Above the errors of distances, Drake's included (3e-5 m).
 
@@ -205,17 +199,17 @@ class JointGrid:
 
     @classmethod
     def over(
-        cls, links: ArmLinks, a: BodyBalls, several: Sequence[BodyBalls], limits: Array
+        cls, links: ArmLinks, a: BodyBalls, others: Sequence[BodyBalls], limits: Array
     ) -> JointGrid | None:
         """The grid for a body and others, all fixed in one frame beyond it; None if there are too
         many joints between them, or their range is too large.
 
         Args:
             links: the arm.
-            a, several: the bodies.
-            limits: (n, 2) of the joints' positions [rad or m].
+            a, others: the bodies.
+            limits: (n, 2) limits of the joints' positions [rad or m].
         """
-        joints = tuple(range(a.frame, several[0].frame))
+        joints = tuple(range(a.frame, others[0].frame))
         if len(joints) > Tables.max_joints:
             return None
         turns = np.array([links.turns[i] for i in joints], dtype=bool)
@@ -231,7 +225,7 @@ class JointGrid:
         )
         if np.prod(count) > Tables.max_cells:
             return None
-        lever = np.max([_levers(links, a, b, joints, limits) for b in several], axis=0)
+        lever = np.max([_levers(links, a, b, joints, limits) for b in others], axis=0)
         return cls(joints, low, (high - low) / count, count, tuple(whole.tolist()), lever)
 
     def centers(self, cells: Indices, level: int) -> Array:
@@ -394,7 +388,7 @@ class SelfClearance:
     Args:
         trees: balls that cover the robot.
         pairs: pairs of body indices that are compared by their trees, the earlier body first.
-        tables: tables of other pairs, with these pairs.
+        tables: tables of the other pairs, each with the pairs that it holds for.
         apart: pairs that are proven not to meet within the joint limits.
     """
 
@@ -409,7 +403,7 @@ class SelfClearance:
         self.pairs, self.tables, self.apart = tuple(pairs), tuple(tables), tuple(apart)
         self._one, self._two = np.array(self.pairs, dtype=np.intp).reshape(-1, 2).T
         radius = np.array([body.radius for body in trees.bodies])
-        self._both = (radius[self._one] + radius[self._two]).astype(np.float32)[:, None]
+        self._radius_sum = (radius[self._one] + radius[self._two]).astype(np.float32)[:, None]
         self._root = np.array([body.root for body in trees.bodies], dtype=np.intp)
 
     @classmethod
@@ -428,7 +422,7 @@ class SelfClearance:
             if frozenset((bodies[i], bodies[j])) in counted
         ]
         tables, left = _tables(station_diagram, links, trees, limits, pairs)
-        meeting = {*left, *(pair for _, several in tables for pair in several)}
+        meeting = {*left, *(pair for _, covered in tables for pair in covered)}
         apart = [pair for pair in pairs if pair not in meeting]
         return cls(trees, left, tables, apart)
 
@@ -440,7 +434,7 @@ class SelfClearance:
         Args:
             q: (K, n) configurations.
             poses: link poses of the configurations.
-            centers: (3, B, K) centres of the balls around the bodies.
+            centers: (3, B, K) centres of the bounding balls of the bodies.
             wanted: (K,) whether to descend into the trees for a configuration.
         """
         block_size = 2**9  # Configurations evaluated together. They fit a processor's caches.
@@ -458,7 +452,7 @@ class SelfClearance:
         for start in range(0, len(q), block_size):
             part = slice(start, start + block_size)
             bound = _norm(centers[:, self._one, part] - centers[:, self._two, part])
-            bound -= self._both
+            bound -= self._radius_sum
             pair, which = np.nonzero((bound < SELF_REFINE_BELOW) & wanted[part])
             bound[pair, which] = np.inf
             np.minimum(lower[part], bound.min(axis=0, initial=np.inf), out=lower[part])
@@ -482,7 +476,9 @@ class SelfClearance:
         for start in range(0, len(which), chunk_size):
             part = slice(start, start + chunk_size)
             k, a, b = which[part], one[part], two[part]
-            gap = trees.placed(a, poses, k)[:, :, None] - trees.placed(b, poses, k)[:, None]
+            centers_a = trees.node_ball_centers(a, poses, k)
+            centers_b = trees.node_ball_centers(b, poses, k)
+            gap = centers_a[:, :, None] - centers_b[:, None]
             distance = _norm(gap)
             bound = distance - (trees.outer[:, a][:, None] + trees.outer[:, b][None])
             below = trees.child[0, a[0]] >= 0
@@ -507,7 +503,7 @@ def _tables(
 ) -> tuple[list[ClearanceTable], list[Pair]]:
     """Tables of pairs with few joints between them, and the pairs without a table.
 
-    Pairs of links that cannot meet at any joint positions are in neither.
+    Pairs with few joints between them that cannot meet are in neither.
     """
     close: dict[tuple[int, int], list[int]] = {}
     left = []
@@ -519,15 +515,15 @@ def _tables(
         elif may_collide(grid, LinkDistance(station_diagram, links, a.body, [b.body])):
             close.setdefault((i, b.frame), []).append(j)
     tables = []
-    for (i, _), several in close.items():
-        a, others = trees.bodies[i], [trees.bodies[j] for j in several]
+    for (i, _), indices in close.items():
+        a, others = trees.bodies[i], [trees.bodies[j] for j in indices]
         grid = JointGrid.over(links, a, others, limits)
         assert grid is not None
         distance = LinkDistance(station_diagram, links, a.body, [b.body for b in others])
         if np.prod(grid.count) * distance.pairs <= Tables.max_distances:
-            tables.append((PairTable.of(grid, distance), tuple((i, j) for j in several)))
+            tables.append((PairTable.of(grid, distance), tuple((i, j) for j in indices)))
         else:
-            left += [(i, j) for j in several]
+            left += [(i, j) for j in indices]
     return tables, left
 
 

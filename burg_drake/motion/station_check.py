@@ -88,7 +88,7 @@ def inspect_station(
     Args:
         station: the station.
         scene: the scene on it; an empty board if None.
-        settings: of the reachability map.
+        settings: settings of the reachability map.
 
     Raises:
         InvalidInputError: the station cannot be used; one line says why.

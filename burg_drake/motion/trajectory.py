@@ -49,7 +49,7 @@ class Trajectory:
         """Samples a motion, rounded to 12 decimals, so that it is written fast.
 
         Args:
-            motion: from rest to rest; it is stretched to a whole number of samples.
+            motion: a motion from rest to rest; it is stretched to a whole number of samples.
             start, end: (n,) exact first and last positions.
             rate: samples per second.
         """
@@ -137,7 +137,7 @@ class PlanOrigin:
 
     Attributes:
         joints: names of the n joints, in the order of the trajectories' columns.
-        limits: of these joints.
+        limits: limits of these joints.
         station, scene: names.
         station_content, scene_content: content hashes of station and scene.
         instance: the target in the scene; empty if there is none.

@@ -15,7 +15,7 @@ def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
 
     Args:
         scene: the scene on the station.
-        station: with or without an arm.
+        station: the station, with or without an arm.
 
     Returns:
         A line for each object of the scene that is certainly out of the arm's reach.

@@ -1,8 +1,8 @@
 """The arm's trial: servos follow a plan to the grasp, the hand closes, the arm lifts and holds.
 
 The arm starts at rest at the pregrasp, or at home if it also executes the transfer. Outcomes and
-margins are those of the hand's trial, and how well the arm followed its command, and what it
-pushed before the hand closed.
+margins are those of the hand's trial, with two more: how well the arm followed its commands, and
+what it pushed before the hand closed.
 """
 
 from __future__ import annotations
@@ -98,12 +98,12 @@ class ArmCarrier:
     desired at its end.
 
     Args:
-        world: of a trial with an arm, prepared for its start.
+        world: world of a trial with an arm, prepared for its start.
         target: the grasped body.
-        approach: from the pregrasp, or from further back, to the grasp.
-        segments: from the grasp on, at least one; the hand moves straight on each.
-        closed: how far the fingers can close at a grasp (4, 4) in the world before contact.
-        lift_clearance: gives the check of the path ahead with the target in the hand.
+        approach: commands from the pregrasp, or from further back, to the grasp.
+        segments: commands of each straight segment from the grasp on, at least one.
+        closed: returns how far the fingers can close at a grasp (4, 4) in the world before contact.
+        lift_clearance: makes the check of the path ahead with the target in the hand.
     """
 
     def __init__(
@@ -118,8 +118,8 @@ class ArmCarrier:
         assert isinstance(world.hand, MountedHand)
         diagram = world.diagram
         self._world = world
-        self._closed = closed
-        self._mounted = world.hand
+        self._closed_before_contact = closed
+        self._hand = world.hand
         self._lift_clearance = lift_clearance
         self._step = diagram.engine.time_step
         self._plant_context = world.plant_context
@@ -129,10 +129,10 @@ class ArmCarrier:
         interval = segments[-1].steps_per_check * self._step
         self._loads = _specific_loads(segments[-1].p_WG, interval, self._gravity)
         speed = np.linalg.norm(np.diff(segments[-1].p_WG, axis=0), axis=1)
-        self._fastest = int(speed.argmax())
+        self._fastest_check = int(speed.argmax())
         self._touches = RobotContactWatch(diagram, world.hand.links, target)
         self._current: CommandSequence | None = None
-        self._number = 0
+        self._segment_index = 0
         self._start = 0
         self._arrived = False
         self.approach_checks = approach.checks
@@ -156,17 +156,17 @@ class ArmCarrier:
         self._arrived = True
         self._follow(None)
         world = self._world
-        world.command("hand", self._mounted.closing_command())
+        world.command("hand", self._hand.closing_command())
         if not self.touched:
-            X_WG = self._mounted.X_WG(self._plant_context)
-            self._mounted.set_fingers(self._plant_context, self._closed(X_WG))
+            X_WG = self._hand.X_WG(self._plant_context)
+            self._hand.set_fingers(self._plant_context, self._closed_before_contact(X_WG))
             world.simulator.Initialize()
 
-    def lift(self, number: int, check: int) -> None:
+    def lift(self, segment_index: int, check: int) -> None:
         """Follows one segment of the plan."""
         if check == 0:
-            self._number = number
-            self._follow(self._commands[number])
+            self._segment_index = segment_index
+            self._follow(self._commands[segment_index])
 
     def stop(self) -> None:
         """Holds the arm at the end of the last segment."""
@@ -191,9 +191,9 @@ class ArmCarrier:
 
     def travelled(self) -> float:
         """Commanded distance of the grasp frame from the start of its segment [m]."""
-        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
-        p_GG_W = p_WG - self._commands[self._number].p_WG[0]
-        return float(p_GG_W @ self.segments[self._number].direction_W)
+        p_WG = self._hand.X_WG(self._plant_context)[:3, 3]
+        p_GG_W = p_WG - self._commands[self._segment_index].p_WG[0]
+        return float(p_GG_W @ self.segments[self._segment_index].direction_W)
 
     def carries_full_load(self, check: int) -> bool:
         """Compares past and future loads from gravity and the planned acceleration.
@@ -204,7 +204,7 @@ class ArmCarrier:
         polls = self._world.settings.steady_polls
         window = self._loads[max(0, check + 1 - polls) : check + 1]
         ahead = np.append(self._loads[check + 1 :], self._gravity).max()
-        brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
+        brakes = self.segments[-1].is_straight_up or check >= self._fastest_check + polls
         return bool(brakes and ahead <= 1.01 * window.max())
 
     def is_free_ahead(self) -> bool:
@@ -234,8 +234,8 @@ class ArmCarrier:
 
     def _track(self, commands: CommandSequence) -> None:
         check = self._checks_done(commands)
-        q = self._mounted.q(self._plant_context)
-        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
+        q = self._hand.q(self._plant_context)
+        p_WG = self._hand.X_WG(self._plant_context)[:3, 3]
         error = float(np.abs(q - commands.q_at_check(check)).max())
         distance = float(np.linalg.norm(p_WG - commands.p_WG[check]))
         self.tracking_error = float(np.fmax(self.tracking_error, error))
@@ -311,7 +311,7 @@ class ArmTrial(DrakeTrial):
         meshcat: Meshcat | None = None,
     ) -> None:
         scene, station = as_scene(scene), as_station(station)
-        self._plain = build_station_diagram(scene, station, robot="arm")
+        self._plain_diagram = build_station_diagram(scene, station, robot="arm")
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
         super().__init__(
@@ -321,9 +321,11 @@ class ArmTrial(DrakeTrial):
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
-        self._kinematics = ArmKinematics.of(self._plain)
+        self._kinematics = ArmKinematics.of(self._plain_diagram)
         self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
-        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(partial(ArmLiftClearance, self._plain))
+        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(
+            partial(ArmLiftClearance, self._plain_diagram)
+        )
 
     @property
     def hand(self) -> MountedHand:
@@ -422,7 +424,7 @@ class ArmTrial(DrakeTrial):
         """
         if plan.origin is not None:
             plan.require_for(self.scene, self.station)
-        joints = len(self._plain.arm_joints)
+        joints = len(self._plain_diagram.arm_joints)
         parts = {name: part for name, part in plan.phases.items() if name != "close"}
         if not self._transfer:
             del parts["transfer"]

@@ -30,7 +30,7 @@ class BodyContact:
     Attributes:
         body_A, body_B: the bodies.
         f_B_W: (3,) force on body B in the world [N].
-        area: of the contact patch [m^2]; 0 for contact at a point.
+        area: area of the contact patch [m^2]; 0 for contact at a point.
     """
 
     body_A: BodyIndex
@@ -162,8 +162,8 @@ class RobotContactWatch:
     """Finds contacts that stop a robot, and its first unplanned contact.
 
     Args:
-        world: with a robot.
-        links: the arm's bodies, without the hand's; empty for the hand alone.
+        world: a world with a robot.
+        links: bodies of the arm without the hand; empty for the hand alone.
         target: the body to be grasped.
 
     Attributes:
@@ -253,7 +253,7 @@ def contact_islands(built: StationDiagram) -> list[list[BodyIndex]]:
 def assign_friction(
     built: StationDiagram, root: Context, bodies: Iterable[BodyIndex], friction: float
 ) -> None:
-    """Sets the friction coefficient of bodies in a Context.
+    """Sets the friction coefficient of all collision geometries of bodies in a Context.
 
     Args:
         built: the diagram.

@@ -7,21 +7,22 @@ simulated for up to 2 s, while all else is frozen; that predicts 0.9 to 1.05 tim
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from burg_drake.core import Array, InvalidInputError, SimulationError
-from burg_drake.scene import SceneLike, as_scene
+from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.simulation.contacts import contact_islands, freeze_bodies
 from burg_drake.simulation.falling import free_poses, is_below
 from burg_drake.simulation.relaxation import resist_rolling
 from burg_drake.simulation.rest_criterion import (
     BodySpeed,
     Displacement,
-    body_place,
+    center_pose,
     depth_in_table,
     displacement_from_document,
     mean_speed,
@@ -82,12 +83,8 @@ def stillness(
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     simulator = Simulator(built.diagram)
     resist_rolling(built, simulator)
-    try:
+    with report_simulation_errors(scene):
         simulator.AdvanceTo(duration)
-    except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-        raise SimulationError(
-            f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
-        ) from error
     context = built.plant.GetMyContextFromRoot(simulator.get_context())
     beside = touching_bodies(built, [*built.free.values(), *built.fixed.values()])
     return {
@@ -96,6 +93,17 @@ def stillness(
         )
         for name, X_WO in free_poses(built, context).items()
     }
+
+
+@contextmanager
+def report_simulation_errors(scene: Scene) -> Iterator[None]:
+    """Reports errors of the simulator as a `SimulationError` that names the scene's file."""
+    try:
+        yield
+    except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+        raise SimulationError(
+            f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
+        ) from error
 
 
 def _without_sinking(built: StationDiagram, name: str, X_WO: Array) -> Array:
@@ -161,22 +169,22 @@ def predict_drift(
         once: stop at the first check at which an object drifts.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
-    watch = _DriftSimulation(built)
-    watch.freeze_all_but(built.free if among is None else among)
+    drift = _DriftSimulation(built)
+    drift.freeze_all_but(built.free if among is None else among)
     for start, end, share in DRIFT_CHECK_TIMES:
-        shifts = watch.check_between(start, end)
-        watch.freeze_all_but([n for n, shift in shifts.items() if not _has_stayed(shift, share)])
-        if not watch.moving_objects or (once and not all(map(_has_stayed, shifts.values()))):
+        shifts = drift.check_between(start, end)
+        drift.freeze_all_but([n for n, shift in shifts.items() if not _has_stayed(shift, share)])
+        if not drift.moving_objects or (once and not all(map(_has_stayed, shifts.values()))):
             break
-    doubtful = frozenset(watch.moving_objects)
+    doubtful = frozenset(drift.moving_objects)
     kept = {name: built.X_WO(name) for name in built.free if name not in doubtful}
     last = DRIFT_CHECK_TIMES[-1][-1]
     moving = {
-        n: _mean_speed(shifts[n]) for n in watch.moving_objects if not _has_stayed(shifts[n], last)
+        n: _mean_speed(shifts[n]) for n in drift.moving_objects if not _has_stayed(shifts[n], last)
     }
-    return DriftPrediction(moving, kept | watch.on_table(), doubtful)
+    return DriftPrediction(moving, kept | drift.on_table(), doubtful)
 
 
 class _DriftSimulation:
@@ -211,11 +219,11 @@ class _DriftSimulation:
         built, context = self._built, self._context
         bodies = {name: self._plant.get_body(built.free[name]) for name in self.moving_objects}
         self._simulator.AdvanceTo(start)
-        before = {name: body_place(body, context) for name, body in bodies.items()}
+        before = {name: center_pose(body, context) for name, body in bodies.items()}
         self._simulator.AdvanceTo(end)
         X_WO, left, shifts = free_poses(built, context), StillnessLimits.duration - end, {}
         for name, body in bodies.items():
-            speed = mean_speed(before[name], body_place(body, context), end - start)
+            speed = mean_speed(before[name], center_pose(body, context), end - start)
             now = displacement_from_document(built, name, X_WO[name])
             shifts[name] = Displacement(
                 now.distance + left * speed.speed, now.angle + left * speed.turning

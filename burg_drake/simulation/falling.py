@@ -103,7 +103,7 @@ def fall(
             the falling bodies.
 
     Raises:
-        RuntimeError, SystemExit: from Drake, or a pose is not finite.
+        RuntimeError, SystemExit: Drake failed, or a pose is not finite.
     """
     make_compliant(built, compliant_while_falling(built))
     simulator = Simulator(built.diagram)

@@ -100,7 +100,7 @@ class GraspTrial(ABC, Generic[W]):
         self.settings, self.clearance = settings, clearance
         self.motion = motion or settings.motion or station.document.motion
         self._lock = lock
-        self._alone: dict[str, W | None] = {}
+        self._kept_worlds: dict[str, W | None] = {}
         self._complete: W | None = None
         self._world: W | None = None
 
@@ -146,7 +146,7 @@ class GraspTrial(ABC, Generic[W]):
             instance: the target.
             X_WG: (4, 4) grasp in the world.
             begin: prepares a world for the start of the trial.
-            friction, mass: of the target; the library's if None.
+            friction, mass: the target's; the library's if None.
             without_hull: avoid worlds in which parts of the robot meet the target's hull.
 
         Returns:
@@ -155,7 +155,7 @@ class GraspTrial(ABC, Generic[W]):
         screen = self.clearance.check(instance, X_WG)
         if screen.outcome is not None:
             return collision_result(screen)
-        start = self._screen_of_start(instance, X_WG)
+        start = self._screen_start(instance, X_WG)
         if start is not None and start.outcome is not None:
             return collision_result(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
         world = self._world_of(instance)
@@ -169,14 +169,14 @@ class GraspTrial(ABC, Generic[W]):
                 found = begin(world).run()
             margins = replace(found.margins, clearance=screen.clearance)
             load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
-            held_for = replace(margins, end_time=margins.end_time - found.grip_start)
-            sure = confidence(self.engine, found.outcome, held_for, load)
-            return replace(found, margins=margins, confidence=sure)
+            since_grip = replace(margins, end_time=margins.end_time - found.grip_start)
+            trust = confidence(self.engine, found.outcome, since_grip, load)
+            return replace(found, margins=margins, confidence=trust)
         except self.failures as error:
             world.invalidate()
             return simulation_failure_result(error, screen, world.time)
 
-    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+    def _screen_start(self, instance: str, X_WG: Array) -> Clearance | None:
         """The screen of the open hand at the start of the approach; None if the trial begins at the
         grasp, or an arm follows a plan."""
         return None
@@ -194,7 +194,7 @@ class GraspTrial(ABC, Generic[W]):
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world.
-            friction, mass: of the target; the library's if None.
+            friction, mass: the target's; the library's if None.
         """
         entry = self.scene.entry(instance)
         X_WO = instance_pose(self.scene, self.station, instance)
@@ -228,12 +228,12 @@ class GraspTrial(ABC, Generic[W]):
         """The cheapest usable world for trials of an instance."""
         if not self._lock:
             return self.complete_world
-        if instance not in self._alone:
+        if instance not in self._kept_worlds:
             world = self._build(instance)
-            self._alone[instance] = world if world.is_usable() else None
-        self._alone[instance] = found = self._alone.pop(instance)  # most recent last
-        if len(self._alone) > MAX_KEPT_WORLDS:
-            del self._alone[next(iter(self._alone))]
+            self._kept_worlds[instance] = world if world.is_usable() else None
+        self._kept_worlds[instance] = found = self._kept_worlds.pop(instance)  # most recent last
+        if len(self._kept_worlds) > MAX_KEPT_WORLDS:
+            del self._kept_worlds[next(iter(self._kept_worlds))]
         return found or self.complete_world
 
     @abstractmethod
@@ -297,12 +297,14 @@ class HandAloneTrial(GraspTrial[W]):
         motion: GraspMotion | None,
         lock: bool,
     ) -> None:
-        self._plain = build_station_diagram(scene, station, robot="hand")
-        clearance = HandClearance(self._plain)
+        self._plain_diagram = build_station_diagram(scene, station, robot="hand")
+        clearance = HandClearance(self._plain_diagram)
         super().__init__(
             scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
         )
-        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(partial(HandLiftClearance, self._plain))
+        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(
+            partial(HandLiftClearance, self._plain_diagram)
+        )
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
         """Straight paths of the hand with the target: the retreat, if any, and the lift.
@@ -330,7 +332,7 @@ class HandAloneTrial(GraspTrial[W]):
         """Start pose (4, 4) of the hand for a grasp in the world: the grasp or its pregrasp."""
         return X_WG if self._approach(X_WG) is None else self._pregrasp(X_WG)
 
-    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+    def _screen_start(self, instance: str, X_WG: Array) -> Clearance | None:
         if self._approach(X_WG) is None:
             return None
         return self.clearance.check(instance, self._pregrasp(X_WG))

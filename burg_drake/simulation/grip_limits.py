@@ -46,25 +46,25 @@ def largest_passing(
         The load; 0 if `low` fails, infinity if `high` passes.
     """
     stride = 1.5  # Factor between tried loads until two of them bracket the limit.
-    borne, lost = 0.0, math.inf
+    passed, failed = 0.0, math.inf
     load = min(max(guess, low), high)
     while True:
         if passes(load):
             if load == high:
                 return math.inf
-            borne = load
+            passed = load
         else:
             if load == low:
                 return 0.0
-            lost = load
-        if lost == math.inf:
-            load = min(borne * stride, high)
-        elif borne == 0.0:
-            load = max(lost / stride, low)
-        elif lost <= borne * (1.0 + tolerance):
-            return borne
+            failed = load
+        if failed == math.inf:
+            load = min(passed * stride, high)
+        elif passed == 0.0:
+            load = max(failed / stride, low)
+        elif failed <= passed * (1.0 + tolerance):
+            return passed
         else:
-            load = math.sqrt(borne * lost)
+            load = math.sqrt(passed * failed)
 
 
 class Grip:
@@ -79,7 +79,7 @@ class Grip:
         friction: the target's coefficient in that run, if not the library's.
 
     Attributes:
-        weight: of the target [N].
+        weight: weight of the target [N].
         friction_force: total friction limit of both pads, 2 mu N [N].
     """
 
@@ -121,7 +121,7 @@ class Grip:
             True if both fingers touch the target, and it has not slid further, at every check.
 
         Raises:
-            RuntimeError, SystemExit: from Drake.
+            RuntimeError, SystemExit: Drake failed.
         """
         self._world.restore_state(self._time, self._state)
         self._world.simulator.Initialize()
@@ -135,7 +135,7 @@ class Grip:
                     self._apply(self.weight * (R_WG @ load((k + 0.5) * self._step)))
                     self._advance_by(1)
                 before, X_GO = X_GO, self._current_X_GO()
-                if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
+                if not (self._is_held() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
                 at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
                 # A target that slides under 1 % of excess load is faster by the third check.
@@ -153,7 +153,7 @@ class Grip:
         force.F_Bq_W = SpatialForce(np.zeros(3), f_W)
         self._forces_port.FixValue(self._world.context, [force])
 
-    def _is_touched(self) -> bool:
+    def _is_held(self) -> bool:
         contacts = self._world.read_contacts()
         return finger_contact(contacts, self._world.fingers, self._target.index()).both
 
@@ -218,7 +218,7 @@ def take_grip(
 
     Raises:
         InvalidInputError: as `HandTrial.run`.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift, without_hull=True)
     return Grip(trial, instance, friction) if result.outcome.held else result
@@ -242,7 +242,7 @@ class HoldForces:
         accelerations: largest load that the grip withstands in addition to gravity [g], by
             direction or axis of G; a load larger by the tolerance fails. 0 if the smallest tried
             load fails, infinity if the largest is withstood.
-        weight: of the target [N].
+        weight: weight of the target [N].
     """
 
     accelerations: Mapping[str, float]
@@ -274,7 +274,7 @@ def tug(
 
     Raises:
         UnknownNameError: no such direction.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
 
     def bears_load(direction: Array, amplitude: float) -> bool:
@@ -306,7 +306,7 @@ def shake(
 
     Raises:
         UnknownNameError: no such axis.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     omega = 2.0 * np.pi * settings.frequency
 
@@ -367,7 +367,7 @@ def friction_limit(
         trial: executes the trials.
         instance: the target.
         X_OG: (4, 4) grasp in the target's frame.
-        mass: of the target in place of the library's [kg].
+        mass: the target's mass in place of the library's [kg].
         lift: length of the lift in place of the motion's [m].
         settings: range of coefficients, and tolerance.
 
@@ -382,8 +382,8 @@ def friction_limit(
     # Relative to the friction that carries the weight at the centre; few grasps are there.
     guess_factor = 1.25
 
-    def lifts(inverse: float) -> bool:
-        result = trial.run(instance, X_OG, friction=1.0 / inverse, mass=mass, lift=lift)
+    def lifts(inverse_friction: float) -> bool:
+        result = trial.run(instance, X_OG, friction=1.0 / inverse_friction, mass=mass, lift=lift)
         return result.outcome is Outcome.LIFTED
 
     largest_inverse = largest_passing(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set as AbstractSet
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -50,7 +50,47 @@ class PlacedRobot(Protocol):
         ...
 
 
-class HandLiftClearance:
+GeometryBox = tuple[GeometryId, tuple[Array, Array]]
+"""A collision geometry, and pose (4, 4) and half size (3,) of its bounding box."""
+
+
+class _LiftClearance:
+    """A Context in which a robot with one target in its hand is checked for collisions.
+
+    Convex pieces replace the meshes of objects. Bodies that move with the hand meet all other
+    bodies, but not each other.
+
+    Args:
+        station_diagram: a diagram without contact parts.
+        instance: name of the target.
+        links: bodies of the arm without the hand.
+    """
+
+    def __init__(
+        self, station_diagram: StationDiagram, instance: str, links: AbstractSet[BodyIndex]
+    ) -> None:
+        target = station_diagram.free[instance]
+        self._diagram, self._plant = station_diagram, station_diagram.plant
+        self._context = station_diagram.diagram.CreateDefaultContext()
+        self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
+        replace_meshes_by_pieces(station_diagram, self._context)
+        carried = {target, *station_diagram.robot_bodies} - links
+        others = {station_diagram.table, *station_diagram.free.values()}
+        others |= set(station_diagram.fixed.values())
+        self._carried = collision_geometries(self._plant, carried)
+        self._others = collision_geometries(self._plant, others - {target})
+        manager = station_diagram.scene_graph.collision_filter_manager(
+            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
+        for side in (self._carried, self._others):
+            manager.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(side)))
+
+    def _query(self) -> QueryObject:
+        graph = self._diagram.scene_graph
+        return graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._context))
+
+
+class HandLiftClearance(_LiftClearance):
     """Checks the straight path ahead of the hand and one target in it for collisions.
 
     Args:
@@ -59,32 +99,19 @@ class HandLiftClearance:
     """
 
     def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
-        target = station_diagram.free[instance]
-        self._diagram = station_diagram
-        self._plant = plant = station_diagram.plant
-        self._context = station_diagram.diagram.CreateDefaultContext()
-        self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
-        replace_meshes_by_pieces(station_diagram, self._context)
+        super().__init__(station_diagram, instance, frozenset())
         self._hand = FloatingHand(station_diagram)
-        carried = {target, *station_diagram.robot_bodies}
-        everything = {station_diagram.table, *station_diagram.free.values()}
-        everything |= set(station_diagram.fixed.values())
-        self._carried = self._boxes(carried)
-        self._others = self._boxes(everything - carried)
-        manager = station_diagram.scene_graph.collision_filter_manager(
-            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
-        )
-        for side in (self._carried, self._others):
-            declaration = CollisionFilterDeclaration()
-            manager.Apply(declaration.ExcludeWithin(GeometrySet([g for g, _ in side])))
-        start = plant.get_body(target).floating_positions_start() + 4
-        self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
+        self._carried_boxes = self._boxes(self._carried)
+        self._other_boxes = self._boxes(self._others)
+        target = self._plant.get_body(station_diagram.free[instance])
+        start = target.floating_positions_start() + 4
+        self._translations = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
     def is_free(self, world: PlacedRobot, X_WG: Array, length: float, direction_W: Array) -> bool:
         """Whether the path is free of collisions.
 
         Args:
-            world: in its present state.
+            world: the world in its present state.
             X_WG: (4, 4) grasp at which the path began; it sets the frames of the lift.
             length: remaining length of the path [m].
             direction_W: (3,) unit vector of the lift.
@@ -92,13 +119,13 @@ class HandLiftClearance:
         # Metres between checks. A hand and what it meets are thicker, taken together.
         spacing = 0.01
         self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
-        _take_positions(self._diagram, self._plant_context, world)
+        _copy_state(self._diagram, self._plant_context, world)
         positions = self._plant.GetPositions(self._plant_context)
         if not self._boxes_meet(length * direction_W):
             return True
         for travelled in np.append(np.arange(spacing, length, spacing), length):
             moved = positions.copy()
-            moved[self._places] += travelled * np.append(direction_W, 1.0)
+            moved[self._translations] += travelled * np.append(direction_W, 1.0)
             self._plant.SetPositions(self._plant_context, moved)
             if self._query().HasCollisions():
                 return False
@@ -109,30 +136,25 @@ class HandLiftClearance:
         displacement (3,), overlaps the box of another geometry."""
         min_gap = 0.002  # Smallest distance between separate boxes in metres.
         query = self._query()
-        low, high = _box_bounds(query, self._carried)
+        low, high = _box_bounds(query, self._carried_boxes)
         low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
-        other_low, other_high = _box_bounds(query, self._others)
+        other_low, other_high = _box_bounds(query, self._other_boxes)
         apart = (low[:, None] > other_high[None] + min_gap) | (
             other_low[None] > high[:, None] + min_gap
         )
         return not apart.any(axis=2).all()
 
-    def _query(self) -> QueryObject:
-        port = self._diagram.scene_graph.get_query_output_port()
-        return port.Eval(self._diagram.scene_graph.GetMyContextFromRoot(self._context))
-
-    def _boxes(self, bodies: set[BodyIndex]) -> list[tuple[GeometryId, tuple[Array, Array]]]:
-        """Collision geometries, each with pose (4, 4) and half size (3,) of its bounding box."""
+    def _boxes(self, geometries: list[GeometryId]) -> list[GeometryBox]:
         inspector = self._query().inspector()
         found = []
-        for geometry in collision_geometries(self._plant, bodies):
+        for geometry in geometries:
             box = inspector.GetObbInGeometryFrame(geometry)
             assert box is not None  # only half spaces have no box
             found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
         return found
 
 
-class ArmLiftClearance:
+class ArmLiftClearance(_LiftClearance):
     """Checks the lift of one target in the hand of an arm for collisions.
 
     Args:
@@ -141,65 +163,53 @@ class ArmLiftClearance:
     """
 
     def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
-        target = station_diagram.free[instance]
-        self._diagram = station_diagram
-        self._plant = plant = station_diagram.plant
-        self._target = plant.get_body(target)
-        self._context = station_diagram.diagram.CreateDefaultContext()
-        self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
-        replace_meshes_by_pieces(station_diagram, self._context)
         self._hand = MountedHand(station_diagram)
-        carried = {target, *station_diagram.robot_bodies} - self._hand.links
-        others = {station_diagram.table, *station_diagram.free.values()}
-        others |= set(station_diagram.fixed.values())
-        manager = station_diagram.scene_graph.collision_filter_manager(
-            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
-        )
-        for side in (carried, others - {target}):
-            geometries = GeometrySet(collision_geometries(plant, side))
-            manager.Apply(CollisionFilterDeclaration().ExcludeWithin(geometries))
+        super().__init__(station_diagram, instance, self._hand.links)
+        self._target = self._plant.get_body(station_diagram.free[instance])
 
     def is_free(self, world: PlacedRobot, q: Array) -> bool:
         """Whether the path is free of collisions.
 
         Args:
-            world: in its present state.
+            world: the world in its present state.
             q: (K, n) arm positions along the path.
         """
         context = self._plant_context
-        _take_positions(self._diagram, context, world)
+        _copy_state(self._diagram, context, world)
         X_WO = self._plant.EvalBodyPoseInWorld(context, self._target).GetAsMatrix4()
         X_HO = inverse(self._hand.X_WH(context)) @ X_WO
-        graph = self._diagram.scene_graph
-        graph_context = graph.GetMyContextFromRoot(self._context)
         for row in q:
             self._hand.set_arm(context, row)
             X_WO = self._hand.X_WH(context) @ X_HO
             self._plant.SetFloatingBaseBodyPoseInWorldFrame(
                 context, self._target, RigidTransform(X_WO)
             )
-            if graph.get_query_output_port().Eval(graph_context).HasCollisions():
+            if self._query().HasCollisions():
                 return False
         return True
 
 
-def _take_positions(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
+def _copy_state(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
     """Copies the state of the robot and the movable objects from a world."""
     plant = diagram.plant
     for model in ROBOT_MODELS:
         q = world.robot_positions(model)
         if q is not None:
             plant.SetPositions(plant_context, plant.GetModelInstanceByName(model), q)
+    copy_object_poses(diagram, plant_context, world)
+
+
+def copy_object_poses(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
+    """Copies the poses of the movable objects from a world; objects that cannot move there stand
+    where the document places them."""
     for name, index in diagram.free.items():
         moved = world.free.get(name)
         X_WO = diagram.X_WO(name) if moved is None else world.X_WB(moved)
-        body = plant.get_body(index)
-        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, RigidTransform(X_WO))
+        body = diagram.plant.get_body(index)
+        diagram.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, RigidTransform(X_WO))
 
 
-def _box_bounds(
-    query: QueryObject, boxes: list[tuple[GeometryId, tuple[Array, Array]]]
-) -> tuple[Array, Array]:
+def _box_bounds(query: QueryObject, boxes: list[GeometryBox]) -> tuple[Array, Array]:
     """Lower and upper corners (N, 3) of world-aligned bounding boxes of geometries."""
     X_WB = np.array([query.GetPoseInWorld(g).GetAsMatrix4() @ X_GB for g, (X_GB, _) in boxes])
     half = np.array([half for _, (_, half) in boxes])
@@ -227,10 +237,10 @@ class FloatingCarrier(ABC, Generic[W]):
     `Carrier`.
 
     Args:
-        world: of a trial, prepared for its start: the floating hand is at the grasp, or at the
-            start of its approach, with the lift joint along the first path.
+        world: world of a trial, prepared for its start: the floating hand is at the grasp, or at
+            the start of its approach, with the lift joint along the first path.
         paths: straight paths of the hand from the grasp on, at least one.
-        lift_clearance: gives the check of the path ahead with the target in the hand.
+        lift_clearance: makes the check of the path ahead with the target in the hand.
         approach: the path to the grasp; None if the hand starts there.
         target: the body to be grasped, which the hand may touch once it is at the grasp.
     """
@@ -250,8 +260,8 @@ class FloatingCarrier(ABC, Generic[W]):
         self._lift_clearance = lift_clearance
         self._hand = set(world.robot)
         self.segments = tuple(
-            HandSegment(*path, check_count(path.length, settings) + (number + 1 < len(paths)))
-            for number, path in enumerate(paths)
+            HandSegment(*path, check_count(path.length, settings) + (k < len(paths)))
+            for k, path in enumerate(paths, start=1)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._approach = approach
@@ -262,7 +272,7 @@ class FloatingCarrier(ABC, Generic[W]):
             # In one more interval, before it closes, the hand comes to rest.
             self.approach_checks = check_count(approach.length, settings) + 1
             self._touches = RobotContactWatch(world, (), target)
-        self._number = 0 if approach is None else -1
+        self._segment_index = 0 if approach is None else -1
         self._is_approaching = self._is_lifting = False
         self._X_WG_start = world.X_WG()
 
@@ -279,7 +289,7 @@ class FloatingCarrier(ABC, Generic[W]):
             if self._is_approaching:
                 return stop
         fixed = set(self._world.fixed.values()) - {self._world.table}
-        if self._is_lifting and self.segments[self._number].direction_W[2] < -1e-6:
+        if self._is_lifting and self.segments[self._segment_index].direction_W[2] < -1e-6:
             fixed.add(self._world.table)
         hit = touched_bodies(contacts, self._hand, fixed)
         return self._world.body_names[min(hit)] if hit else ""
@@ -289,8 +299,17 @@ class FloatingCarrier(ABC, Generic[W]):
         """Position of the joint [m]."""
 
     def carries_full_load(self, check: int) -> bool:
-        """See `bears_full_load`."""
-        return bears_full_load(self.segments[-1], check, self._world.settings)
+        """Whether the grip has already carried the largest load of the last segment by interval
+        `check`.
+
+        The hand accelerates in the first half of a segment and brakes in the second. Straight up,
+        accelerating adds to the weight and braking reduces the load. Otherwise both load the grip.
+        """
+        settings, last = self._world.settings, self.segments[-1]
+        half = check_count(last.length, settings) // 2
+        if last.is_straight_up:
+            return check < half
+        return check >= half + settings.steady_polls
 
     def is_free_ahead(self) -> bool:
         """Checks the rest of the path along the lift joint's axis."""
@@ -299,12 +318,12 @@ class FloatingCarrier(ABC, Generic[W]):
             self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
 
-    def _begin_segment(self, number: int) -> bool:
+    def _begin_segment(self, segment_index: int) -> bool:
         """Makes a segment the current one. Returns whether it changed."""
         self._is_lifting = True
-        if number == self._number:
+        if segment_index == self._segment_index:
             return False
-        self._number, self._X_WG_start = number, self._world.X_WG()
+        self._segment_index, self._X_WG_start = segment_index, self._world.X_WG()
         return True
 
 
@@ -335,11 +354,11 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
             self._world.command("lift", np.zeros(2))
             self._world.command("hand", self._floating.closing_command())
 
-    def lift(self, number: int, check: int) -> None:
+    def lift(self, segment_index: int, check: int) -> None:
         """Commands the mean speed of the interval. Before another segment, the hand comes to rest
         in one more interval."""
-        segment = self.segments[number]
-        if self._begin_segment(number):
+        segment = self.segments[segment_index]
+        if self._begin_segment(segment_index):
             self._floating.set_lift_direction(self._world.plant_context, segment.direction_W)
             self._world.simulator.Initialize()
         self._command_speed(segment.length, check, self._world.settings.poll)
@@ -366,19 +385,6 @@ class LiftCarrier(FloatingCarrier[TrialWorld]):
         top_speed = 2 * length / (checks * interval)
         speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
         self._world.command("lift", np.array([0.0, speed]))
-
-
-def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> bool:
-    """Whether the grip has already carried the largest load of the last segment by interval
-    `check`.
-
-    The hand accelerates in the first half of a segment and brakes in the second. Straight up,
-    accelerating adds to the weight and braking reduces the load. Otherwise both load the grip.
-    """
-    half = check_count(last.length, settings) // 2
-    if last.is_straight_up:
-        return check < half
-    return check >= half + settings.steady_polls
 
 
 def check_count(length: float, settings: TrialSettings) -> int:

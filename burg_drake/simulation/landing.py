@@ -81,10 +81,10 @@ def reduce_friction_of(built: StationDiagram, shares: Mapping[BodyIndex, float])
         for geometry in built.plant.GetCollisionGeometriesForBody(built.plant.get_body(index)):
             properties = ProximityProperties(inspector.GetProximityProperties(geometry))
             friction = properties.GetProperty("material", "coulomb_friction")
-            slack = CoulombFriction(
+            reduced = CoulombFriction(
                 share * friction.static_friction(), share * friction.dynamic_friction()
             )
-            properties.UpdateProperty("material", "coulomb_friction", slack)
+            properties.UpdateProperty("material", "coulomb_friction", reduced)
             graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
 
 
@@ -101,7 +101,7 @@ class BoardEdgeGuard:
             margin: distance of objects from the edge [m].
             share: factor on the friction coefficients.
         """
-        braking_friction = 0.3  # A little below 0.32, that of `household` on `panda_tabletop`.
+        braking_friction = 0.3  # A little below the 0.32 of `household` on `panda_tabletop`.
         scene = built.scene
         self._plant = built.plant
         self._corners = {
@@ -110,38 +110,38 @@ class BoardEdgeGuard:
         }
         self._X_WS = built.station.document.X_WS.matrix()
         self._X_SW = inverse(self._X_WS)
-        self._least, self._most = np.full(2, margin), np.array(scene.board.size) - margin
+        self._low, self._high = np.full(2, margin), np.array(scene.board.size) - margin
         self._braking = share * braking_friction * 9.81
 
     def push_back(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
         """Gives bodies beyond the margin the speed at which they slide back.
 
         Args:
-            context: the plant's; its velocities change.
+            context: the plant's Context; its velocities change.
             bodies: free bodies; locked ones are skipped.
         """
         for index in bodies:
             body = self._plant.get_body(index)
             X_WO = self._plant.EvalBodyPoseInWorld(context, body)
             p_S = transform_points(self._X_SW @ X_WO.GetAsMatrix4(), self._corners[index])[:, :2]
-            inwards = np.maximum(0.0, self._least - p_S.min(axis=0))
-            outwards = np.maximum(0.0, p_S.max(axis=0) - self._most)
+            inwards = np.maximum(0.0, self._low - p_S.min(axis=0))
+            outwards = np.maximum(0.0, p_S.max(axis=0) - self._high)
             shift = np.append(inwards - outwards, 0.0)
             distance = np.linalg.norm(shift)
             if distance > 0.001 and not body.is_locked(context):
                 direction = self._X_WS[:3, :3] @ shift / distance
                 V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, body)
                 V_WOcm = V_WO.Shift(X_WO.rotation() @ body.default_com())
-                wanted = np.sqrt(2.0 * self._braking * distance)
-                lacking = max(0.0, wanted - direction @ V_WOcm.translational())
-                faster = SpatialVelocity(np.zeros(3), lacking * direction)
-                self._plant.SetFreeBodySpatialVelocity(context, body, V_WO + faster)
+                return_speed = np.sqrt(2.0 * self._braking * distance)
+                missing_speed = max(0.0, return_speed - direction @ V_WOcm.translational())
+                added_velocity = SpatialVelocity(np.zeros(3), missing_speed * direction)
+                self._plant.SetFreeBodySpatialVelocity(context, body, V_WO + added_velocity)
 
 
 TUMBLING_ENGINE = Engine(name="tumbling", time_step=0.005, contact_model="point")
-"""For heaps in the air: point contact takes a third of the time of patches."""
+"""Engine for heaps in the air: point contact takes a third of the time of patches."""
 LANDING_ENGINE = Engine(name="landing", time_step=0.01)
-"""For the end of a fall, and where few objects fall."""
+"""Engine for the end of a fall, and for few falling objects."""
 
 
 def drop_onto_scene(
@@ -157,11 +157,11 @@ def drop_onto_scene(
         scene: the scene, with the falling objects above the board.
         station: table, pose of the board and obstacles.
         falling: names of the falling objects; all others stay in place.
-        shapes: of the library's objects.
+        shapes: shapes of the library's objects.
         margin: distance by which falling objects are kept within the board's edge [m].
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     if len(falling) == len(scene.instances):
         scene = _let_fall(scene, station, falling, shapes, margin, TUMBLING_ENGINE, 1.2)
@@ -177,7 +177,7 @@ def _let_fall(
     engine: Engine,
     time_limit: float,
 ) -> Scene:
-    """The scene after a stage of falling."""
+    """The scene after one stage of the fall."""
     friction_share = 0.25  # Factor on friction while objects fall.
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     reduce_friction(built, friction_share)

@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 import trimesh
 from pydrake.geometry import Meshcat
-from pydrake.math import RigidTransform
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.export import lay_out
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.simulation.grasp_trial import HandAloneTrial, HandTrial
-from burg_drake.simulation.hand_carrier import FloatingCarrier, check_count
+from burg_drake.simulation.hand_carrier import FloatingCarrier, check_count, copy_object_poses
 from burg_drake.simulation.mujoco_world import MujocoWorld, load_mujoco
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.simulation.trial_execution import Execution
@@ -82,7 +81,7 @@ class WorldPicture:
     """Shows worlds of one scene in Meshcat.
 
     Args:
-        scene, station: of the worlds.
+        scene, station: scene and station of the worlds.
         meshcat: the viewer.
 
     Attributes:
@@ -101,12 +100,7 @@ class WorldPicture:
         self._hand.place(plant_context, world.X_WG())
         fingers = world.robot_positions("hand")
         plant.SetPositions(plant_context, plant.GetModelInstanceByName("hand"), fingers)
-        for name, index in self.diagram.free.items():
-            moved = world.free.get(name)
-            X_WO = self.diagram.X_WO(name) if moved is None else world.X_WB(moved)
-            plant.SetFloatingBaseBodyPoseInWorldFrame(
-                plant_context, plant.get_body(index), RigidTransform(X_WO)
-            )
+        copy_object_poses(self.diagram, plant_context, world)
         self._context.SetTime(world.time)
         self.diagram.diagram.ForcedPublish(self._context)
 
@@ -134,10 +128,10 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
             self._world.command_lift(self._approach.length, 0.0, 0.0)
             self._world.close_hand()
 
-    def lift(self, number: int, check: int) -> None:
+    def lift(self, segment_index: int, check: int) -> None:
         """Commands one interval. Before another segment, the hand comes to rest in one more."""
-        segment = self.segments[number]
-        if self._begin_segment(number):
+        segment = self.segments[segment_index]
+        if self._begin_segment(segment_index):
             self._world.turn_lift(segment.direction_W)
         self._length = segment.length
         self._step = check * self.approach_steps
@@ -145,7 +139,7 @@ class MujocoCarrier(FloatingCarrier[MujocoWorld]):
     def stop(self) -> None:
         """Holds the hand at the end of the last segment."""
         self._step = None
-        self._world.command_lift(self.segments[self._number].length, 0.0, 0.0)
+        self._world.command_lift(self.segments[self._segment_index].length, 0.0, 0.0)
 
     def advance_to(self, time: float) -> None:
         """Advances the simulation; on a segment, with a command for the end of each step."""
@@ -221,12 +215,12 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
         check_objects(scene)
         super().__init__(scene, station, engine, settings=settings, motion=motion, lock=lock)
         self._picture = None if meshcat is None else WorldPicture(scene, station, meshcat)
-        self._layout, self._parts = lay_out(scene, station), read_hand(self._plain)
+        self._layout, self._parts = lay_out(scene, station), read_hand(self._plain_diagram)
 
     @property
     def diagram(self) -> StationDiagram:
         """The Drake diagram of scene and hand that shows the trials."""
-        return self._plain if self._picture is None else self._picture.diagram
+        return self._plain_diagram if self._picture is None else self._picture.diagram
 
     def run(
         self,

@@ -83,8 +83,8 @@ class ModelIndex:
         spheres: geoms of each finger's pad.
         finger_geoms: geoms of both fingers.
         palm: geoms of the hand's body.
-        lift_joint, lift_qpos, lift_dof: of the carrier's joint.
-        lift_place, lift_speed: position and velocity servos of the carrier.
+        lift_joint, lift_qpos, lift_dof: the carrier's joint, its position and its velocity.
+        lift_position_servo, lift_speed_servo: servos of the carrier.
         finger_qpos, finger_dofs, finger_servos: positions, velocities and servos of both fingers.
     """
 
@@ -114,8 +114,8 @@ class ModelIndex:
         lift = model.joint(LIFT_JOINT.name)
         self.lift_joint, self.lift_qpos = int(lift.id), int(lift.qposadr[0])
         self.lift_dof = int(lift.dofadr[0])
-        self.lift_place = int(model.actuator(LIFT_JOINT.name).id)
-        self.lift_speed = int(model.actuator(LIFT_JOINT.speed).id)
+        self.lift_position_servo = int(model.actuator(LIFT_JOINT.name).id)
+        self.lift_speed_servo = int(model.actuator(LIFT_JOINT.speed).id)
         joints = [link_name(finger.joint) for finger in parts.document.fingers]
         self.finger_qpos = np.array([model.joint(name).qposadr[0] for name in joints])
         self.finger_dofs = np.array([model.joint(name).dofadr[0] for name in joints])
@@ -136,7 +136,7 @@ def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list
     """Contacts, one per pair of touching bodies.
 
     Args:
-        model, data: MuJoCo's, after a step with elliptic cones.
+        model, data: MuJoCo's model and data, after a step with elliptic cones.
         shares: (geoms,) contact area that each geom represents [m^2]; 0 for geoms without one.
         table: the body to which the world's own geoms belong.
     """
@@ -157,9 +157,9 @@ def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list
     share = shares[geoms]
     soft = share.max(axis=1)
     for k in np.unique(pair.reshape(-1)[soft > 0.0]):
-        mine = np.flatnonzero((pair.reshape(-1) == k) & (soft > 0.0))
-        one = np.take_along_axis(geoms[mine], share[mine].argmax(axis=1)[:, None], axis=1)
-        area[k] = shares[np.unique(one)].sum()
+        rows = np.flatnonzero((pair.reshape(-1) == k) & (soft > 0.0))
+        pads = np.take_along_axis(geoms[rows], share[rows].argmax(axis=1)[:, None], axis=1)
+        area[k] = shares[np.unique(pads)].sum()
     return [
         BodyContact(BodyIndex(int(a)), BodyIndex(int(b)), force[k], float(area[k]))
         for k, (a, b) in enumerate(pairs)
@@ -193,12 +193,13 @@ class MujocoWorld:
         shown: called at each contact check.
 
     Attributes:
-        model, data: MuJoCo's.
+        model, data: MuJoCo's model and data.
         engine: as given.
         settings: as given, but `steady_time` is at least 0.1 s.
-        free, standing, fixed: bodies by name: movable; movable only in another world; never
-            movable, including the table.
-        table: its body.
+        free: bodies that can move, by name.
+        standing: bodies that can move only in another world, by name.
+        fixed: bodies that never move, by name, including the table.
+        table: body of the table.
         robot, robot_bodies: bodies of the hand.
         fingers: bodies of the two fingers.
         body_names: display names of all bodies.
@@ -286,11 +287,11 @@ class MujocoWorld:
 
         Args:
             instance: the target.
-            X_WG: (4, 4) of the grasp frame in the world.
+            X_WG: (4, 4) start pose of the grasp frame in the world.
             closed: how far the fingers are closed at the start, from 0 (open) to 1 (pads together),
                 from where they close further; None if they stay open.
             direction_W: (3,) unit vector of the hand's first motion.
-            friction, mass: of the target, if not the library's.
+            friction, mass: the target's, if not the library's.
         """
         model, data, hand = self.model, self.data, self._station.hand
         target = self._index.objects[instance]
@@ -321,8 +322,7 @@ class MujocoWorld:
         all other bodies keep moving."""
         data, index = self.data, self._index
         self._mj.mj_kinematics(self.model, data)
-        place = np.array(data.xpos[index.hand])
-        self._place_lift(place, direction_W)
+        self._place_lift(np.array(data.xpos[index.hand]), direction_W)
         data.qpos[index.lift_qpos] = data.qvel[index.lift_dof] = 0.0
         self.command_lift(0.0, 0.0, 0.0)
 
@@ -333,8 +333,8 @@ class MujocoWorld:
         inertia = self.model.dof_armature[index.lift_dof]
         inertia += self.model.body_subtreemass[index.carrier]
         self.data.qfrc_applied[index.lift_dof] = inertia * acceleration
-        self.data.ctrl[self._index.lift_place] = travelled
-        self.data.ctrl[self._index.lift_speed] = speed
+        self.data.ctrl[self._index.lift_position_servo] = travelled
+        self.data.ctrl[self._index.lift_speed_servo] = speed
 
     def advance(self, steps: int) -> None:
         """Advances the simulation with the current commands."""

@@ -34,8 +34,8 @@ class MotionTracker:
     the centre of mass.
 
     Args:
-        world: with the bodies at their start. A body's farthest-moved point is a corner of its
-            convex hull.
+        world: a world with the bodies at their start. A body's farthest-moved point is a corner of
+            its convex hull.
         bodies: bodies to track.
 
     Attributes:

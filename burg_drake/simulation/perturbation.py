@@ -21,7 +21,7 @@ class PerturbedTrial:
 
     Attributes:
         X_OG: (4, 4) grasp in the target's frame.
-        friction, mass: of the target [-, kg]; None where there is no noise.
+        friction, mass: the target's [-, kg]; None without noise.
     """
 
     X_OG: Array
@@ -71,9 +71,9 @@ def perturb(
     Args:
         X_OG: (4, 4) grasp in the target's frame; it is displaced and rotated by normally
             distributed errors along and about the axes of G.
-        mass, friction: of the target [kg, -]; they are multiplied by a log-normal factor.
+        mass, friction: the target's [kg, -]; they are multiplied by a log-normal factor.
         noise: standard deviations.
-        seed: of the run.
+        seed: seed of the run.
         grasp: id of the grasp.
         repeat: number of the repeat.
     """

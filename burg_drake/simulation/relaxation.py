@@ -26,7 +26,7 @@ from burg_drake.core import Array
 from burg_drake.objects import Primitive
 from burg_drake.simulation.contacts import contact_islands, freeze_bodies
 from burg_drake.simulation.falling import is_below
-from burg_drake.simulation.rest_criterion import BodySpeed, body_place, mean_speed
+from burg_drake.simulation.rest_criterion import BodySpeed, center_pose, mean_speed
 from burg_drake.station import Engine, StationDiagram
 
 ROLLING_RESISTANCE = 0.002
@@ -64,8 +64,8 @@ class _RollingBody:
     def __init__(
         self, built: StationDiagram, name: str, primitive: Primitive, share: float
     ) -> None:
-        spring_share = 0.2  # Relative to the stiffness that stops a rolling body in a time step.
-        damper_share = 0.5  # Relative to the damping that stops a rolling body in a time step.
+        spring_share = 0.2  # Share of the stiffness that stops a rolling body in a time step.
+        damper_share = 0.5  # Share of the damping that stops a rolling body in a time step.
         self._body = built.plant.get_body(built.free[name])
         axis = primitive.X_OP.matrix()[:3, 2]
         self._along = np.eye(3) if primitive.shape == "sphere" else np.outer(axis, axis)
@@ -101,7 +101,7 @@ def _limit_length(vector: Array, limit: float) -> Array:
 RELAXING_ENGINE = Engine(name="relaxing", time_step=0.01)
 """Time step and contact model while objects relax."""
 TRIANGLE_RELAXING_ENGINE = replace(RELAXING_ENGINE, contact_surface="triangle")
-"""For wide, flat bodies, which rock by themselves on few large contact polygons."""
+"""Engine for wide, flat bodies, which rock by themselves on few large contact polygons."""
 STEPS_PER_WINDOW = 10
 """Time steps between two measurements of the speeds."""
 WINDOW_DURATION = STEPS_PER_WINDOW * RELAXING_ENGINE.time_step
@@ -144,14 +144,14 @@ def relax(
             and the moving bodies.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     relaxation = _Relaxation(built, {built.free[name] for name in moving})
     windows = max(1, round(time_limit / WINDOW_DURATION))
     for _ in range(windows):
         if before_window is not None:
             before_window(relaxation.context, relaxation.moving_bodies)
-        if not relaxation.window():
+        if not relaxation.advance_window():
             break
     return relaxation.result()
 
@@ -172,9 +172,9 @@ class _Relaxation:
         self.context = self._plant.GetMyMutableContextFromRoot(self._root)
         # The other half of the rolling resistance is a margin.
         resist_rolling(built, self._simulator, share=0.5)
-        found = contact_islands(built)
-        self._islands = [_Island(bodies) for bodies in found if not loose.isdisjoint(bodies)]
-        self._alone = {bodies[0] for bodies in found if len(bodies) == 1}
+        islands = contact_islands(built)
+        self._islands = [_Island(bodies) for bodies in islands if not loose.isdisjoint(bodies)]
+        self._alone = {bodies[0] for bodies in islands if len(bodies) == 1}
         self._loose = {index for island in self._islands for index in island.bodies}
         freeze_bodies(built, self._root, [i for i in built.free.values() if i not in self._loose])
         self._energy = dict.fromkeys(built.free.values(), 0.0)
@@ -187,18 +187,18 @@ class _Relaxation:
         """Bodies that are not calm yet."""
         return [index for island in self._islands for index in island.bodies]
 
-    def window(self) -> int:
+    def advance_window(self) -> int:
         """Simulates one window; returns the number of islands that are not calm yet."""
         awake = [self._plant.get_body(index) for index in self.moving_bodies]
-        before = {body.index(): body_place(body, self.context) for body in awake}
+        before = {body.index(): center_pose(body, self.context) for body in awake}
         for _ in range(STEPS_PER_WINDOW):
             self._steps += 1
             self._simulator.AdvanceTo(self._steps * RELAXING_ENGINE.time_step)
             for body in awake:
                 self._damp(body)
         for body in awake:
-            place = body_place(body, self.context)
-            self._speed[body.index()] = mean_speed(before[body.index()], place, WINDOW_DURATION)
+            after = center_pose(body, self.context)
+            self._speed[body.index()] = mean_speed(before[body.index()], after, WINDOW_DURATION)
         for island in list(self._islands):
             self._inspect(island)
         return len(self._islands)

@@ -25,9 +25,9 @@ class RestCriterion:
     at rest alternates from step to step.
 
     Attributes:
-        speed: of its centre of mass, below this [m/s] ...
-        turning: ... and of its rotation, below this [rad/s] ...
-        duration: ... for this long [s]: something that rocks stands still twice a period.
+        speed: upper bound of the speed of its centre of mass [m/s].
+        turning: upper bound of its angular speed [rad/s].
+        duration: time for which both must hold [s]: a rocking body stands still twice a period.
         poll: interval between checks of the poses [s].
         dying: factor on both speeds for a body that gets slower from poll to poll.
     """
@@ -50,8 +50,8 @@ class BodySpeed:
     """Linear and angular speed of a body.
 
     Attributes:
-        speed: of its centre of mass [m/s].
-        turning: of its rotation [rad/s].
+        speed: speed of its centre of mass [m/s].
+        turning: angular speed [rad/s].
     """
 
     speed: float
@@ -88,7 +88,7 @@ def settle(
     """Advances a simulator until bodies are at rest, or the time limit is reached.
 
     Args:
-        simulator: of a diagram with `plant` in it; its context is advanced.
+        simulator: simulator of a diagram that contains `plant`; its context is advanced.
         plant: a finalized plant.
         bodies: bodies that have to come to rest.
         time_limit: simulated time allowed [s].
@@ -96,21 +96,21 @@ def settle(
         before_poll: called at the beginning of each poll interval; may change the state.
 
     Raises:
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
     context = plant.GetMyContextFromRoot(simulator.get_context())
     watched = [plant.get_body(index) for index in bodies]
     start = simulator.get_context().get_time()
     steps = max(1, round(time_limit / criterion.poll))
-    needed = max(1, round(criterion.duration / criterion.poll))
-    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
-    before = [body_place(body, context) for body in watched]
+    required_polls = max(1, round(criterion.duration / criterion.poll))
+    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=required_polls)
+    before = [center_pose(body, context) for body in watched]
     speeds: dict[BodyIndex, BodySpeed] = {}
     for step in range(1, steps + 1):
         if before_poll is not None:
             before_poll()
         simulator.AdvanceTo(start + step * criterion.poll)
-        after = [body_place(body, context) for body in watched]
+        after = [center_pose(body, context) for body in watched]
         moving = {}
         for body, old, new in zip(watched, before, after, strict=True):
             speed = mean_speed(old, new, criterion.poll)
@@ -119,13 +119,13 @@ def settle(
             speeds[body.index()] = speed
         before = after
         recent.append(moving)
-        if len(recent) == needed and not any(recent):
+        if len(recent) == required_polls and not any(recent):
             break
     moved = {index: speed for moving in recent for index, speed in moving.items()}
     return SettlingResult(simulator.get_context().get_time() - start, moved)
 
 
-def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
+def center_pose(body: RigidBody, context: Context) -> tuple[Array, Array]:
     """Rotation (3, 3) and centre of mass (3,) of a body in the world."""
     X_WO = body.EvalPoseInWorld(context)
     p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
@@ -148,8 +148,8 @@ class Displacement:
     """Displacement of an object.
 
     Attributes:
-        distance: of its centre of mass [m].
-        angle: of its rotation [rad].
+        distance: distance that its centre of mass has moved [m].
+        angle: angle by which it has turned [rad].
     """
 
     distance: float
@@ -161,7 +161,7 @@ def displacement_from_document(built: StationDiagram, name: str, X_WO: Array) ->
 
     Args:
         built: the diagram.
-        name: of the instance.
+        name: name of the instance.
         X_WO: (4, 4) current pose.
     """
     X_OO = inverse(built.X_WO(name)) @ X_WO
@@ -176,7 +176,7 @@ def depth_in_table(scene: Scene, X_WO: Array, name: str) -> float:
     Args:
         scene: the scene.
         X_WO: (4, 4) pose of the instance.
-        name: of the instance.
+        name: name of the instance.
     """
     p_OC = support_vertices(scene.library, scene.instance(name).object)
     return -float((p_OC @ X_WO[2, :3]).min() + X_WO[2, 3])

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, SimulationError
+from burg_drake.core import InvalidInputError
 from burg_drake.scene import SUNKEN_TOLERANCE, TOUCH_TOLERANCE, Scene, SceneLike, as_scene
-from burg_drake.simulation.drift import predict_drift
+from burg_drake.simulation.drift import predict_drift, report_simulation_errors
 from burg_drake.simulation.falling import fall
 from burg_drake.simulation.landing import has_moved, placed_scene, reduce_friction
 from burg_drake.simulation.relaxation import RELAXING_ENGINE, TRIANGLE_RELAXING_ENGINE, relax
@@ -104,7 +104,7 @@ def settle_scene(
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     _require_above_table(built)
     _require_no_overlap(built)
-    try:
+    with report_simulation_errors(scene):
         falling = fall(built, time_limit, progress)
         settled, moving = placed_scene(built, falling.X_WO), falling.moving
         if not moving:
@@ -114,10 +114,6 @@ def settle_scene(
                 if not moving:
                     settled = _undo_sinking(settled, built)
                     break
-    except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-        raise SimulationError(
-            f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
-        ) from error
     return SettledScene(
         scene=settled,
         duration=falling.duration,
@@ -138,7 +134,7 @@ def _bring_to_rest(
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene at rest in its own diagram, and the speeds of objects that do not come to rest."""
     suspects: frozenset[str] | None = None
-    pace = np.inf
+    last_speed = np.inf
     for rounds in itertools.count():
         built = build_station_diagram(scene, station, robot="none", engine=engine)
         predicted = predict_drift(built, among=suspects, once=rounds == 0)
@@ -157,12 +153,12 @@ def _bring_to_rest(
             scene = placed_scene(built, predicted.X_WO, exact)
         suspects = predicted.doubtful & scene.instances.keys()
         # Objects that creep must get slower by 10 % in each round.
-        goes_on = rounds <= 1 or predicted.relative_speed < 0.9 * pace
-        stays = rounds > 0 and scene.document == before.document  # the first check is short
+        slows_down = rounds <= 1 or predicted.relative_speed < 0.9 * last_speed
+        is_unchanged = rounds > 0 and scene.document == before.document  # the first check is short
         # Objects may touch others after each round, so the diagram is built again.
-        if rounds == 4 or not goes_on or stays:
+        if rounds == 4 or not slows_down or is_unchanged:
             break
-        pace = predicted.relative_speed
+        last_speed = predicted.relative_speed
     return scene, predicted.moving
 
 

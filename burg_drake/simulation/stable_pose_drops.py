@@ -83,7 +83,7 @@ class DropTest:
 
     Raises:
         InvalidInputError: the SDF cannot be loaded.
-        RuntimeError, SystemExit: from Drake.
+        RuntimeError, SystemExit: Drake failed.
     """
 
     def __init__(self, library: ObjectLibrary, name: str, support: Array) -> None:
@@ -112,14 +112,14 @@ class DropTest:
             side: azimuth in S towards which the object is tilted [rad].
 
         Raises:
-            RuntimeError, SystemExit: from Drake, or the object flew away.
+            RuntimeError, SystemExit: Drake failed, or the object flew away.
         """
         plant, context = self.built.plant, self._simulator.get_mutable_context()
         context.SetTimeStateAndParametersFrom(self._default)
-        X_WO = self._start(X_SO, side)
+        X_WO = self._start_pose(X_SO, side)
         plant_context = plant.GetMyMutableContextFromRoot(context)
         plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, self._body, RigidTransform(X_WO))
-        self._raise(plant_context)
+        self._raise_out_of_table(plant_context)
         self._simulator.Initialize()
         return self.resume()
 
@@ -127,7 +127,7 @@ class DropTest:
         """Continues until the object is at rest, for at most the time limit once more.
 
         Raises:
-            RuntimeError, SystemExit: from Drake, or the object flew away.
+            RuntimeError, SystemExit: Drake failed, or the object flew away.
         """
         plant = self.built.plant
         settled = settle(self._simulator, plant, [self._body.index()], DropSettings.time_limit)
@@ -138,14 +138,14 @@ class DropTest:
             raise RuntimeError("the dropped object left the table")
         return DropResult(-end[2, :3], settled.at_rest, settled.duration)
 
-    def _start(self, X_SO: Array, side: float) -> Array:
+    def _start_pose(self, X_SO: Array, side: float) -> Array:
         """`X_WO` (4, 4) from which the object is dropped; S is in the world's origin."""
         R = rot_z(side) @ rotation_from_rpy([0.0, DropSettings.tilt, 0.0]) @ rot_z(-side)
         X_WO = make_pose(R) @ X_SO
         X_WO[2, 3] += DropSettings.height - transform_points(X_WO, self.support)[:, 2].min()
         return X_WO
 
-    def _raise(self, plant_context: Context) -> None:
+    def _raise_out_of_table(self, plant_context: Context) -> None:
         """Lifts the object if its contact geometry is in the table: the geometry may exceed the
         support points by its fitting error."""
         graph = self.built.scene_graph
@@ -193,13 +193,13 @@ class _DropOutcome:
 
     Attributes:
         residual: largest angle from the pose [rad].
-        ended: index of the pose in which the first toppled drop ended; None if that pose is
+        end_pose: index of the pose in which the first toppled drop ended; None if that pose is
             unknown, or no drop toppled.
         confirmed: whether no drop toppled.
     """
 
     residual: float
-    ended: int | None
+    end_pose: int | None
     confirmed: bool
 
 
@@ -232,7 +232,7 @@ def confirm_poses(
 def _drop_all_poses(
     library: ObjectLibrary, name: str, search: SymmetrySearch | None
 ) -> list[_DropOutcome]:
-    """Drops the object on all its poses."""
+    """Drops the object in all its poses."""
     entry = library.entry(name)
     p_OOcm = np.array(entry.mass_properties.center_of_mass)
     landscape = PotentialLandscape(support_points(library, name), p_OOcm)
@@ -310,7 +310,7 @@ def _update_probabilities(
         seen: set[int] = set()
         while end is not None and end not in share and end not in seen:
             seen.add(end)
-            end = outcomes[end].ended
+            end = outcomes[end].end_pose
         if end in share:
             share[end] += pose.probability
         else:
@@ -331,13 +331,13 @@ def _update_probabilities(
 
 def _describe_changes(toppled: Sequence[StablePose], lost: float) -> str:
     share = 100.0 * sum(pose.probability for pose in toppled)
-    which = f"a stable pose ({share:.1f} %) topples in simulation and is left out"
+    text = f"a stable pose ({share:.1f} %) topples in simulation and is left out"
     if len(toppled) > 1:
-        which = f"{len(toppled)} stable poses ({share:.1f} %) topple in simulation and are left out"
+        text = f"{len(toppled)} stable poses ({share:.1f} %) topple in simulation and are left out"
     if lost == 0.0:
-        return f"{which}; its probability goes to the poses in which the object ends up"
+        return f"{text}; its probability goes to the poses in which the object ends up"
     return (
-        f"{which}; {100.0 * lost:.1f} % are shared by all others, because the object ends up in no"
+        f"{text}; {100.0 * lost:.1f} % are shared by all others, because the object ends up in no"
         " known pose"
     )
 

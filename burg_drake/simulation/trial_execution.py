@@ -79,9 +79,9 @@ class Carrier(Protocol):
         """Commands the fingers to close, with the hand standing at the grasp."""
         ...
 
-    def lift(self, number: int, check: int) -> None:
-        """Commands the motion from one contact check to the next, in one of the segments. Both are
-        counted from 0; the checks from the start of the segment."""
+    def lift(self, segment_index: int, check: int) -> None:
+        """Commands the motion in a segment from one contact check to the next. Segments and checks
+        are counted from 0, the checks in each segment anew."""
         ...
 
     def stop(self) -> None:
@@ -129,8 +129,9 @@ class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
     Attributes:
         settings: phases of a trial.
         engine: time step and contact settings.
-        free, standing, fixed: bodies by name: movable; movable only in another world; never
-            movable, including the table.
+        free: bodies that can move, by name.
+        standing: bodies that can move only in another world, by name.
+        fixed: bodies that never move, by name, including the table.
         robot: all bodies of the robot.
         fingers: bodies of the two fingers.
         hand_document: the hand's document.
@@ -262,7 +263,7 @@ class Execution:
         return self.result(self.outcome_if_held())
 
     def approach(self) -> Outcome | None:
-        """Moves the hand to the grasp; the outcome if a fixed body blocks it, else None."""
+        """Moves the hand to the grasp; returns the outcome if a fixed body blocks it, else None."""
         carrier = self._carrier
         if not carrier.approach_checks:
             return None
@@ -309,17 +310,17 @@ class Execution:
         outcome."""
         carrier = self._carrier
         last = len(carrier.segments) - 1
-        for number, segment in enumerate(carrier.segments):
+        for segment_index, segment in enumerate(carrier.segments):
             self._start_segment(segment)
             for check in range(segment.checks):
-                carrier.lift(number, check)
+                carrier.lift(segment_index, check)
                 self.advance()
                 if self._blocker:
                     return Outcome.BLOCKED
                 if not self.contact.any:
                     return Outcome.SLIPPED
                 if (
-                    number == last
+                    segment_index == last
                     and carrier.carries_full_load(check)
                     and self._is_decided(segment)
                 ):

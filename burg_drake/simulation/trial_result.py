@@ -1,4 +1,4 @@
-"""What a trial returns: its outcome, its margins, and the confidence in that outcome.
+"""The result of a trial: its outcome, its margins, and the confidence in the outcome.
 
 The confidence is an additive logistic model of the margins and the load on the grip.
 
@@ -77,9 +77,9 @@ class GripLoad:
 
     Attributes:
         friction: coefficient between pads and target.
-        force: of each finger [N].
-        mass: of the target [kg].
-        acceleration: of the lift [m/s^2].
+        force: force of each finger [N].
+        mass: mass of the target [kg].
+        acceleration: acceleration of the lift [m/s^2].
         lever: distance of the centre of mass from the closing axis, seen along the vertical, across
             that axis [m].
     """

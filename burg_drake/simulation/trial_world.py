@@ -46,11 +46,12 @@ class TrialWorld:
     Attributes:
         diagram, hand, settings: as given.
         engine: time step and contact settings.
-        free, standing: bodies by name: movable, and movable only in the complete world.
+        free: bodies that can move, by name.
+        standing: bodies that can move only in the complete world, by name.
         robot: bodies of the robot.
         fingers: bodies of the two fingers.
         hand_document: the hand's document.
-        fixed, table, body_names, robot_bodies: those of the diagram.
+        fixed, table, body_names, robot_bodies: as in the diagram.
         plant_context: the plant's part of `context`.
         contacts: reader of the diagram's contact results.
         neighbours: groups of free objects that are close to each other.
@@ -228,10 +229,10 @@ class TrialWorld:
         self.simulator.Initialize()
 
     def set_friction(self, instance: str, friction: float | None) -> None:
-        """Sets the friction coefficient of the fingers, and of the target if `friction` is given.
-        Without it, the fingers get the target's coefficient in the library.
+        """Sets the friction coefficient of the whole fingers, and of the target if `friction` is
+        given. Without it, the fingers get the target's coefficient in the library.
 
-        Drake combines two coefficients a and b to 2ab/(a+b); of two equal ones that is the same.
+        Drake combines two coefficients a and b to 2ab/(a+b), so two equal ones stay as they are.
         """
         self._prepared = None
         bodies = list(self.hand.fingers)

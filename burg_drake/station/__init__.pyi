@@ -112,6 +112,7 @@ from .surroundings import (
 from .valid_scene import require_valid_scene as require_valid_scene, world_content as world_content
 from .visible_triangles import (
     Triangles as Triangles,
+    hull_vertices as hull_vertices,
     shape_triangles as shape_triangles,
     visible_surfaces as visible_surfaces,
 )

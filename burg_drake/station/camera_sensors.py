@@ -54,7 +54,7 @@ class AreaCamera(LeafSystem):
     """Renders at a higher resolution and averages blocks of pixels.
 
     Ports:
-        geometry_query: of the scene graph.
+        geometry_query: query port of the scene graph.
         X_WC: pose of the camera's optical frame in the world.
         color_image: averaged image (output).
     """
@@ -125,7 +125,7 @@ def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera
 def add_cameras(
     builder: RobotDiagramBuilder, station: Station, names: Iterable[str] | None = None
 ) -> None:
-    """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
+    """Adds a renderer and one `RgbdSensor` per camera; exports their ports as `camera.NAME.*`.
 
     Args:
         builder: builder of the diagram.

@@ -1,4 +1,4 @@
-"""Movable bodies among fixed ones: their overlaps, and distances to the first contact."""
+"""Movable bodies among fixed ones: overlaps, and distances that bodies move to first contact."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ from burg_drake.station.engine import ENGINES
 from burg_drake.station.model_file import set_packages
 from burg_drake.station.object_bodies import add_instance
 from burg_drake.station.station_diagram import StationDiagram
+from burg_drake.station.visible_triangles import hull_vertices
 
 PosedShapes = tuple[tuple[RigidTransform, Shape], ...]
 """Convex shapes with their poses in one frame. Drake takes a mesh for its convex hull."""
@@ -93,16 +94,16 @@ def _body_shapes(
 
 @dataclass(frozen=True, eq=False)
 class MovableBody:
-    """A movable body in the scene graph, in use or waiting.
+    """A movable body in the scene graph, active or parked.
 
     Attributes:
         kind: kind of body; all bodies of a kind have the same shapes.
-        index: index of its place.
+        slot: index of its frame in the scene graph.
         geometries: its convex shapes.
     """
 
     kind: str
-    index: int
+    slot: int
     geometries: tuple[GeometryId, ...]
 
 
@@ -115,7 +116,7 @@ class CollisionWorld:
     Args:
         fixed: shapes of fixed bodies in the world, by name.
         shapes: returns the shapes of a kind of body in the body's frame; called once per kind.
-        places: number of bodies for which the scene graph has room before it is rebuilt.
+        slots: number of frames for movable bodies; with more bodies the scene graph is rebuilt.
 
     Attributes:
         fixed: shapes of the fixed bodies.
@@ -126,11 +127,11 @@ class CollisionWorld:
         self,
         fixed: Mapping[str, PosedShapes],
         shapes: Callable[[str], PosedShapes],
-        places: int = 256,
+        slots: int = 256,
     ) -> None:
-        self.fixed, self._shapes = fixed, shapes
-        self._known: dict[str, PosedShapes] = {}
-        self._build_scene_graph(places)
+        self.fixed, self._read_shapes = fixed, shapes
+        self._shapes_by_kind: dict[str, PosedShapes] = {}
+        self._build_scene_graph(slots)
 
     def place(self, bodies: Mapping[str, tuple[str, RigidTransform]]) -> None:
         """Replaces the movable bodies.
@@ -139,41 +140,41 @@ class CollisionWorld:
             bodies: kind and pose `X_WB` of each body by name; names must differ from those of fixed
                 bodies.
         """
-        for name, body in list(self._used.items()):
+        for name, body in list(self._active.items()):
             if name not in bodies or bodies[name][0] != body.kind:
-                self._waiting.setdefault(body.kind, []).append(self._used.pop(name))
-                self._frame_poses.set_value(self._frames[body.index], _parking_pose(body.index))
-        if self._taken + len(bodies) - len(self._used) > len(self._frames):
+                self._parked.setdefault(body.kind, []).append(self._active.pop(name))
+                self._frame_poses.set_value(self._frames[body.slot], _parking_pose(body.slot))
+        if self._n_used_slots + len(bodies) - len(self._active) > len(self._frames):
             self._build_scene_graph(max(len(self._frames), 2 * len(bodies)))
         for name, (kind, X_WB) in bodies.items():
-            if name not in self._used:
-                waiting = self._waiting.get(kind)
-                self._used[name] = waiting.pop() if waiting else self._new_body(kind)
-            self._frame_poses.set_value(self._frames[self._used[name].index], X_WB)
-        self._owner = {g: name for name in bodies for g in self._used[name].geometries}
+            if name not in self._active:
+                parked = self._parked.get(kind)
+                self._active[name] = parked.pop() if parked else self._new_body(kind)
+            self._frame_poses.set_value(self._frames[self._active[name].slot], X_WB)
+        self._owner = {g: name for name in bodies for g in self._active[name].geometries}
         self._bodies: dict[str, tuple[str, RigidTransform]] = dict(bodies)
         port = self._graph.get_source_pose_port(self._source)
         port.FixValue(self._context, Value(self._frame_poses))
 
     @property
     def bodies(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        """Kind and pose `X_WB` of each movable body, as it was placed."""
+        """Kind and pose `X_WB` of each movable body, as passed to `place`."""
         return self._bodies
 
     def geometries(self, name: str) -> tuple[GeometryId, ...]:
         """Geometries of a movable body, in the order of its shapes."""
-        return self._used[name].geometries
+        return self._active[name].geometries
 
     def shapes(self, name: str) -> PosedShapes:
         """Shapes of a movable body in its frame."""
-        return self._known[self._used[name].kind]
+        return self._shapes_by_kind[self._active[name].kind]
 
     def overlaps(self) -> tuple[Depths, Depths]:
         """Overlaps of the movable bodies.
 
         Returns:
-            Depths of the deepest overlaps [m]: of each overlapping pair of movable bodies, in the
-            order in which they were placed, and of each movable body with a fixed one.
+            Depths of the deepest overlaps [m]: of each overlapping pair of movable bodies, named in
+            the order of `bodies`, and of each movable body with a fixed one.
         """
         order = {name: i for i, name in enumerate(self._bodies)}
         among: Depths = {}
@@ -203,11 +204,11 @@ class CollisionWorld:
         """Drake's geometry queries for the current poses; valid until bodies are moved."""
         return self._graph.get_query_output_port().Eval(self._context)
 
-    def _build_scene_graph(self, places: int) -> None:
+    def _build_scene_graph(self, slots: int) -> None:
         """Creates the scene graph with only the fixed bodies."""
         graph = SceneGraph()
         source = graph.RegisterSource("bodies")
-        frames = [graph.RegisterFrame(source, GeometryFrame(f"{i}")) for i in range(places)]
+        frames = [graph.RegisterFrame(source, GeometryFrame(f"{i}")) for i in range(slots)]
         self.anchored = {
             graph.RegisterAnchoredGeometry(
                 source, _make_geometry_instance(f"{name}_{i}", *posed)
@@ -218,25 +219,26 @@ class CollisionWorld:
         self._graph, self._source, self._frames = graph, source, frames
         self._context = graph.CreateDefaultContext()
         self._frame_poses = FramePoseVector()
-        for index, frame in enumerate(frames):
-            self._frame_poses.set_value(frame, _parking_pose(index))
-        self._taken = 0
-        self._used: dict[str, MovableBody] = {}
-        self._waiting: dict[str, list[MovableBody]] = {}
+        for slot, frame in enumerate(frames):
+            self._frame_poses.set_value(frame, _parking_pose(slot))
+        self._n_used_slots = 0
+        self._active: dict[str, MovableBody] = {}
+        self._parked: dict[str, list[MovableBody]] = {}
 
     def _new_body(self, kind: str) -> MovableBody:
-        """Registers a body at the next place."""
-        if kind not in self._known:
-            self._known[kind] = self._shapes(kind)
-        index, frame = self._taken, self._frames[self._taken]
+        """Registers a body at the next unused slot."""
+        if kind not in self._shapes_by_kind:
+            self._shapes_by_kind[kind] = self._read_shapes(kind)
+        slot = self._n_used_slots
+        frame = self._frames[slot]
         geometries = tuple(
             self._graph.RegisterGeometry(
                 self._context, self._source, frame, _make_geometry_instance(f"{i}", *posed)
             )
-            for i, posed in enumerate(self._known[kind])
+            for i, posed in enumerate(self._shapes_by_kind[kind])
         )
-        self._taken += 1
-        return MovableBody(kind, index, geometries)
+        self._n_used_slots += 1
+        return MovableBody(kind, slot, geometries)
 
 
 def _make_geometry_instance(name: str, X_FG: RigidTransform, shape: Shape) -> GeometryInstance:
@@ -245,22 +247,23 @@ def _make_geometry_instance(name: str, X_FG: RigidTransform, shape: Shape) -> Ge
     return instance
 
 
-def _parking_pose(index: int) -> RigidTransform:
-    parking_distance = 1e4  # Metres below the world, and between unused bodies.
-    return RigidTransform([0.0, 0.0, -parking_distance * (index + 1)])
+def _parking_pose(slot: int) -> RigidTransform:
+    parking_distance = 1e4  # Metres below the world, and between parked bodies.
+    return RigidTransform([0.0, 0.0, -parking_distance * (slot + 1)])
 
 
-class FreeTravel:
-    """Free travel of the movable bodies of a collision world. Their shapes are read once.
+class BodySweep:
+    """Straight motion of bodies of a collision world up to the first contact. The shapes of each
+    kind of body are converted once.
 
     Args:
-        world: the bodies.
+        world: the collision world.
     """
 
     def __init__(self, world: CollisionWorld) -> None:
         self._world = world
         self._fixed = {n: _convex_shapes(shapes) for n, shapes in world.fixed.items() if shapes}
-        self._known: dict[str, ConvexShapes] = {}
+        self._shapes_by_kind: dict[str, ConvexShapes] = {}
 
     def first_contact(
         self, names: Sequence[str], direction: Array, limit: float
@@ -283,16 +286,17 @@ class FreeTravel:
         shapes = [*map(self._shapes, others), *self._fixed.values()]
         still = ConvexShapes.joined(shapes)
         i, j = (index.ravel() for index in np.indices((len(moving), len(still))))
-        offsets, against = np.zeros((len(i), 3)), np.zeros(len(i))
+        offsets, closing_cosine = np.zeros((len(i), 3)), np.zeros(len(i))
         near = np.flatnonzero(_boxes_near(moving, still))
         normals = self._normals(names, others, (i[near], j[near]))
         gap = (moving.support(i[near], -normals) - still.support(j[near], normals)) * normals
-        lacking = np.maximum(start_gap - gap.sum(axis=1), 0.0)
-        offsets[near] = lacking[:, None] * normals
-        against[near] = np.where(lacking > 0.0, -(normals @ direction), 0.0)
+        gap_deficit = np.maximum(start_gap - gap.sum(axis=1), 0.0)
+        offsets[near] = gap_deficit[:, None] * normals
+        closing_cosine[near] = np.where(gap_deficit > 0.0, -(normals @ direction), 0.0)
         found = contact_distances(moving, still, (i, j), direction, limit, offsets)
-        pressing = against > sliding_cosine
-        found[pressing & (found <= 2.0 * start_gap / np.maximum(against, sliding_cosine))] = 0.0
+        pressing = closing_cosine > sliding_cosine
+        start_motion = 2.0 * start_gap / np.maximum(closing_cosine, sliding_cosine)
+        found[pressing & (found <= start_motion)] = 0.0
         first = int(found.argmin())
         if not np.isfinite(found[first]):
             return limit, ""
@@ -302,40 +306,44 @@ class FreeTravel:
     def _shapes(self, name: str) -> ConvexShapes:
         """Shapes of a movable body in the world."""
         kind, X_WB = self._world.bodies[name]
-        if kind not in self._known:
-            self._known[kind] = _convex_shapes(self._world.shapes(name))
-        return self._known[kind].moved(X_WB.GetAsMatrix4())
+        if kind not in self._shapes_by_kind:
+            self._shapes_by_kind[kind] = _convex_shapes(self._world.shapes(name))
+        return self._shapes_by_kind[kind].moved(X_WB.GetAsMatrix4())
 
     def _normals(
         self, names: Sequence[str], others: Sequence[str], pairs: tuple[Indices, Indices]
     ) -> Array:
         """Contact normals (K, 3): unit vectors along which shapes of moving bodies separate from
-        others by the shortest motion."""
-        # Metres; Drake has no normals at distances that are rounding errors.
-        offset = np.array([4.8e-7, 6e-7, 6.4e-7])
+        others by the shortest motion.
+
+        Drake has no normals at distances that are rounding errors. So the moving bodies are placed
+        in the world with a small offset, with the opposite one for normals that are still missing,
+        and at the end where they were.
+        """
+        offset = np.array([4.8e-7, 6e-7, 6.4e-7])  # Metres.
         moving = [g for name in names for g in self._world.geometries(name)]
         still = [g for name in others for g in self._world.geometries(name)]
         still += self._world.anchored
-        asked = [(moving[i], still[j]) for i, j in zip(*pairs, strict=True)]
-        normals = np.full((len(asked), 3), np.nan)
+        geometries = [(moving[i], still[j]) for i, j in zip(*pairs, strict=True)]
+        normals = np.full((len(geometries), 3), np.nan)
         bodies = self._world.bodies
-        for nudge in (offset, -offset):
-            here = RigidTransform(nudge)
-            nudged = {name: (bodies[name][0], here @ bodies[name][1]) for name in names}
-            self._world.place({**bodies, **nudged})
+        for translation in (offset, -offset):
+            X_offset = RigidTransform(translation)
+            moved = {name: (bodies[name][0], X_offset @ bodies[name][1]) for name in names}
+            self._world.place({**bodies, **moved})
             for k in np.flatnonzero(np.isnan(normals).any(axis=1)):
-                normals[k] = self._normal(*asked[k])
+                normals[k] = self._normal(*geometries[k])
         self._world.place(bodies)
-        unit: Array = np.nan_to_num(normals)
-        return unit
+        return np.asarray(np.nan_to_num(normals))
 
     def _normal(self, a: GeometryId, b: GeometryId) -> Array:
+        """Contact normal (3,) that points from b to a."""
         pair = self._world.query().ComputeSignedDistancePairClosestPoints(a, b)
         return np.asarray(pair.nhat_BA_W if pair.id_A == a else -pair.nhat_BA_W)
 
 
 def _boxes_near(a: ConvexShapes, b: ConvexShapes) -> NDArray[np.bool_]:
-    """Whether bounding boxes of shapes are near each other (A, B)."""
+    """(A, B) whether the bounding boxes of two shapes are near each other."""
     near_distance = 1e-4  # Metres; Drake's distances of cylinders are wrong by up to 3e-5 m.
     (low_a, high_a), (low_b, high_b) = a.boxes(), b.boxes()
     near = (low_a[:, None] <= high_b + near_distance) & (low_b <= high_a[:, None] + near_distance)
@@ -343,14 +351,14 @@ def _boxes_near(a: ConvexShapes, b: ConvexShapes) -> NDArray[np.bool_]:
 
 
 def _convex_shapes(posed: PosedShapes) -> ConvexShapes:
-    """Converts Drake's shapes, in the frame of their poses."""
+    """Drake's shapes, converted and expressed in the frame of their poses."""
     return ConvexShapes.joined(
         [_convex_shape(shape).moved(X_FG.GetAsMatrix4()) for X_FG, shape in posed]
     )
 
 
 def _convex_shape(shape: Shape) -> ConvexShapes:
-    """Converts one of Drake's shapes, in its own frame."""
+    """One of Drake's shapes, converted and in its own frame."""
     middle, flat = np.zeros((1, 3)), np.zeros((3, 3))
     if isinstance(shape, Box):
         corners = np.stack(np.meshgrid(*([-0.5, 0.5],) * 3), axis=-1).reshape(-1, 3)
@@ -364,10 +372,7 @@ def _convex_shape(shape: Shape) -> ConvexShapes:
         round_in = [1.0, 1.0, 0.0 if isinstance(shape, Cylinder) else 1.0]
         return ConvexShapes.of([ends], [shape.radius() * np.diag(round_in)])
     if isinstance(shape, (Convex, Mesh)):
-        hull = shape.GetConvexHull()
-        return ConvexShapes.of(
-            [np.array([hull.vertex(i) for i in range(hull.num_vertices())])], [flat]
-        )
+        return ConvexShapes.of([hull_vertices(shape)], [flat])
     raise InvalidInputError(
         f"a shape of kind {type(shape).__name__} cannot be checked for how far it can move"
     )

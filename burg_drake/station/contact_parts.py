@@ -85,7 +85,7 @@ def add_contact_parts(
             convex hulls.
         hulls: add hulls that replace the pieces of free objects.
     """
-    surfaces, feet, around = [], [], []
+    surfaces, feet, hull_geometries = [], [], []
     for name, body in {**free, **fixed}.items():
         if name in station.document.background:
             continue
@@ -94,8 +94,8 @@ def add_contact_parts(
         if name in free and not is_ball(scene, name):
             feet += _add_feet(plant, scene, station, name, body)
         if name in free and hulls:
-            around.append(add_hull(plant, scene, name, body))
-    return ContactParts(tuple(surfaces), tuple(feet), tuple(around))
+            hull_geometries.append(add_hull(plant, scene, name, body))
+    return ContactParts(tuple(surfaces), tuple(feet), tuple(hull_geometries))
 
 
 def needs_no_pieces(scene: Scene, station: Station, name: str) -> bool:
@@ -173,7 +173,7 @@ def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
     entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
     corners = support_corners(scene.library, entry)
     ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
-    rolling = [one for one, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
+    rolling = [up_O for up_O, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
     center = np.array(entry.mass_properties.center_of_mass)
     carrying = carrying_corners(corners, up, center, settled_tolerance)
     placed = corners.copy()
@@ -183,17 +183,17 @@ def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
 
 
 def _raise_to_table(
-    points: Array, X_WO: Array, corners: Array, most: float = SUPPORT_HEIGHT_TOLERANCE
+    points: Array, X_WO: Array, corners: Array, max_gap: float = SUPPORT_HEIGHT_TOLERANCE
 ) -> Array:
-    """Points (N, 3) in O, of which those below the table's top, or less than `most` above it, are
-    moved vertically to it. Only points in the lower half of the object with corners (M, 3) move,
-    and no farther than to its middle, so that thin objects keep some height."""
+    """Moves points (N, 3) in O vertically to the table's top if they are below it, or less than
+    `max_gap` above it. Only points in the lower half of the object with corners (M, 3) move, and no
+    farther than to its middle, so that thin objects keep some height."""
     up = np.round(X_WO[2, :3], 9)
     heights, reach = X_WO[2, 3] + points @ up, X_WO[2, 3] + corners @ up
     middle = (reach.min() + reach.max()) / 2
-    drawn = heights - min(0.0, middle)
-    low = (heights < most) & (heights <= middle)
-    moved: Array = points - np.where(low, drawn, 0.0)[:, None] * up
+    shift = heights - min(0.0, middle)
+    low = (heights < max_gap) & (heights <= middle)
+    moved: Array = points - np.where(low, shift, 0.0)[:, None] * up
     return moved
 
 

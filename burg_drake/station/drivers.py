@@ -65,7 +65,7 @@ class PlannedCommand:
     Attributes:
         q, v: (n,) positions and velocities of the arm [rad, rad/s].
         closed: whether the hand closes or holds.
-        opening: distance between the pads otherwise [m].
+        opening: distance between the pads of the open hand [m].
     """
 
     q: Array
@@ -188,7 +188,7 @@ class _PlanFollower(LeafSystem):
     _desired_state: InputPort
 
     def _declare_plan_ports(self, player: PlanPlayer, ahead: float = 0.0) -> None:
-        """Declares the ports of the plan, which is sampled `ahead` [s] in advance."""
+        """Declares the ports of the plan, which is sampled a time `ahead` [s] in advance."""
         self._player, self._ahead = player, ahead
         self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
         self._start = self.DeclareVectorInputPort("plan.start_time", 1)
@@ -203,7 +203,7 @@ class _PlanFollower(LeafSystem):
         return self._player.command(self._plan.Eval(context), time + ahead)
 
     def _connected_inputs(self, context: Context, role: str) -> tuple[bool, bool]:
-        """Whether the port for positions, and that for a desired state, are connected."""
+        """Whether the ports `position` and `desired_state` are connected."""
         position, desired_state = (
             port.HasValue(context) for port in (self._position, self._desired_state)
         )
@@ -219,11 +219,11 @@ class ArmDriver(_PlanFollower):
     """Follows a plan that has begun, else a position or a desired state, else holds the last
     command.
 
-    The velocity that goes with a position is its difference from that of one step before, and 0 in
-    the first step. Drake's `StateInterpolatorWithDiscreteDerivative` does the same a step later.
+    With a position, the commanded velocity is its change since the previous step per time step, and
+    0 in the first step. Drake's `StateInterpolatorWithDiscreteDerivative` does this a step later.
 
     Ports:
-        position: (n) [rad].
+        position: (n) positions [rad].
         desired_state: (2 n) positions and velocities.
         plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
         state: (2 n) positions and velocities of the arm; read when a simulation begins.
@@ -303,14 +303,15 @@ class Fingers:
 
     Attributes:
         hand: the document.
-        q, v: their indices in the hand's positions, and in its positions and velocities.
-        dofs: their indices among all velocities of the plant.
-        closed, open: (2,) positions [m].
+        position_index, rate_index: (2,) indices of their positions and velocities in the state of
+            the hand's model.
+        dofs: (2,) indices of their velocities among all velocities of the plant.
+        closed, open: (2,) positions of the closed and the open hand [m].
     """
 
     hand: Hand
-    q: Array
-    v: Array
+    position_index: Array
+    rate_index: Array
     dofs: Array
     closed: Array
     open: Array
@@ -328,15 +329,15 @@ class Fingers:
         v = [int(np.flatnonzero(velocities == j.velocity_start())[0]) for j in joints]
         return cls(
             hand=hand,
-            q=np.array(q),
-            v=len(positions) + np.array(v),
+            position_index=np.array(q),
+            rate_index=len(positions) + np.array(v),
             dofs=np.array([joint.velocity_start() for joint in joints]),
             closed=np.array([finger.closed for finger in fingers]),
             open=np.array([finger.open for finger in fingers]),
         )
 
     @property
-    def towards_closed(self) -> Array:
+    def closing_signs(self) -> Array:
         """Signs (2,) of the joints' velocities while the hand closes."""
         return np.sign(self.closed - self.open)
 
@@ -367,7 +368,7 @@ class HandDriver(_PlanFollower):
         plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
         state: (2 k) state of the hand's model.
         command: (4) command of the servos (output).
-        brake: (v) generalized force on the whole plant that limits the fingers' (output).
+        brake: (v) generalized force on the whole plant, which brakes the fingers (output).
         braked: (2) brake force of the fingers in the last step [N] (output).
     """
 
@@ -396,7 +397,7 @@ class HandDriver(_PlanFollower):
         self.DeclareStateOutputPort("braked", self._braked)
 
     def _initialize(self, context: Context, values: DiscreteValues) -> None:
-        values.set_value(self._held, self._state.Eval(context)[self._fingers.q])
+        values.set_value(self._held, self._state.Eval(context)[self._fingers.position_index])
         values.set_value(self._braked, np.zeros(2))
 
     def _store_command(self, context: Context, state: State) -> None:
@@ -416,25 +417,26 @@ class HandDriver(_PlanFollower):
 
     def _braking_force(self, context: Context, speed: Array) -> Array:
         """Force (2,) against the commanded motion [N]."""
-        most = self._fingers.hand.force
-        limit = most
+        full_force = self._fingers.hand.force
+        limit = full_force
         if self._force_limit.HasValue(context):
             limit = float(self._force_limit.Eval(context)[0])
-            if not 0.0 < limit <= most:
+            if not 0.0 < limit <= full_force:
                 raise InvalidInputError(
                     f"hand.force_limit is {limit:g} N; give more than 0 and at most the"
-                    f" {most:g} N of {self._fingers.hand.name!r}"
+                    f" {full_force:g} N of {self._fingers.hand.name!r}"
                 )
-        return np.asarray(-np.sign(speed) * (most - limit))
+        return np.asarray(-np.sign(speed) * (full_force - limit))
 
     def _finger_command(self, context: Context) -> tuple[Array, Array]:
         """Goal positions (2,) of the fingers [m], and their current velocities (2,) [m/s]."""
         position_gain = 50.0  # Ratio of finger speed to distance from the goal, 1/s.
         position, desired_state = self._connected_inputs(context, "hand")
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
-        q, planned = self._state.Eval(context)[self._fingers.q], self._planned_command(context)
+        q = self._state.Eval(context)[fingers.position_index]
+        planned = self._planned_command(context)
         if planned is not None and planned.closed:
-            return fingers.closed, fingers.towards_closed * fastest
+            return fingers.closed, fingers.closing_signs * fastest
         if planned is None and desired_state:
             speeds = self._desired_state.Eval(context)[2:]
             if not np.isfinite(speeds).all():

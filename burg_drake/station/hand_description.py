@@ -15,6 +15,7 @@ from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.scene import convex_polygon, polygon_area
 from burg_drake.station.hand_document import Finger, Hand
 from burg_drake.station.station_diagram import FloatingHand, StationDiagram
+from burg_drake.station.visible_triangles import hull_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class PadFront:
         area: area of the front [m^2].
         stiffness: pressure over depth [N/m^3].
         thickness: thickness of the pad behind the front [m].
-        corners: (M, 3) of the whole pad's convex hull, in P [m].
+        corners: (M, 3) corners of the whole pad's convex hull, in P [m].
     """
 
     X_BP: Array
@@ -67,16 +68,16 @@ def find_pad_front(
         raise ValueError("cannot be modelled by springs, as the pad is not convex")
     heights = p_BV @ closing_B
     other_B = np.cross(closing_B, side_B)
-    flat = p_BV @ np.stack([side_B, other_B], axis=1)
-    front = flat[heights > heights.max() - flat_tolerance]
+    projected = p_BV @ np.stack([side_B, other_B], axis=1)
+    front = projected[heights > heights.max() - flat_tolerance]
     outline = _convex_outline(front)
-    area, whole = (
+    area, pad_area = (
         0.0 if polygon is None else polygon_area(polygon)
-        for polygon in (outline, _convex_outline(flat))
+        for polygon in (outline, _convex_outline(projected))
     )
-    if outline is None or area < min_area_share * whole:
+    if outline is None or area < min_area_share * pad_area:
         raise ValueError(
-            f"has only {1e6 * area:.0f} mm2 of the pad's {1e6 * whole:.0f} mm2 facing the"
+            f"has only {1e6 * area:.0f} mm2 of the pad's {1e6 * pad_area:.0f} mm2 facing the"
             " closing direction; the pad needs a flat front: use a box or a convex mesh"
         )
     R, low, high = _smallest_rectangle(outline)
@@ -159,7 +160,7 @@ class HandLink:
     """A rigid part of a hand, with the frame B.
 
     Attributes:
-        name: of the link in the model.
+        name: name of the link in the model.
         X_HB: (4, 4) pose in the hand's body, with the joint at 0.
         shapes: collision shapes; for a finger, without its pad.
         mass: [kg].
@@ -183,7 +184,7 @@ class FingerLink(HandLink):
         finger: the finger in the hand's document.
         axis_B: (3,) direction in which the joint moves it.
         pad: the collision shape that touches objects.
-        front: of the pad, where it is soft.
+        front: front of the pad, if the pad is soft.
     """
 
     finger: Finger
@@ -236,7 +237,7 @@ def read_hand(station_diagram: StationDiagram) -> HandDescription:
 
 
 class _HandReader:
-    """Reads a diagram, with both joints at 0."""
+    """Reads the hand of a diagram, with both finger joints at 0."""
 
     def __init__(self, station_diagram: StationDiagram) -> None:
         self.hand = FloatingHand(station_diagram)
@@ -333,9 +334,7 @@ class _HandReader:
                 size = (shape.radius(), shape.length())
                 return HandShape(name, "cylinder", X_BC, size, none, friction)
             case Convex() | Mesh():
-                hull = inspector.GetConvexHull(geometry)
-                points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-                return HandShape(name, "mesh", X_BC, (), points, friction)
+                return HandShape(name, "mesh", X_BC, (), hull_vertices(shape), friction)
         raise self._error(
             f"collision geometry {name!r} is a {type(shape).__name__}; supported are"
             " boxes, spheres, cylinders and meshes (as their convex hulls)"
@@ -343,15 +342,15 @@ class _HandReader:
 
     def _axis(self, index: int, lead: RigidBody) -> Array:
         """Direction of a finger's joint, measured by moving the joint."""
-        places = []
+        origins = []
         for q in (0.0, 1.0):
             self.hand.joints[index].set_translation(self.plant_context, q)
             X_HB = self.plant.CalcRelativeTransform(
                 self.plant_context, self.hand.body.body_frame(), lead.body_frame()
             ).GetAsMatrix4()
-            places.append(X_HB[:3, 3])
+            origins.append(X_HB[:3, 3])
         self.hand.joints[index].set_translation(self.plant_context, 0.0)
-        return np.asarray(X_HB[:3, :3].T @ (places[1] - places[0]))
+        return np.asarray(X_HB[:3, :3].T @ (origins[1] - origins[0]))
 
     def _modulus(self, finger: Finger, pad: GeometryId) -> float:
         properties = self._inspector.GetProximityProperties(pad)

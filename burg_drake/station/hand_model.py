@@ -43,9 +43,11 @@ from burg_drake.station.model_file import (
     without_hydroelastic,
 )
 from burg_drake.station.station_document import Station
+from burg_drake.station.visible_triangles import hull_vertices
 
 STALL_FORCE_RATIO = 1.25
-"""Servo force at standstill over grip force; above 1, the finger presses with the limit."""
+"""Ratio of the servo's force at standstill to the grip force. Above 1, the grip force is the force
+limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,8 @@ class HandModel:
     Attributes:
         instance: its model instance.
         body: the link that the arm carries.
-        fingers, joints, pads: of the two fingers, in the order of the document.
+        fingers, joints, pads: bodies, joints and pads of the two fingers, in the order of the
+            document.
     """
 
     instance: ModelInstanceIndex
@@ -236,9 +239,9 @@ def check_hand(
         InvalidInputError: document and model differ; the message says where.
     """
     try:
-        found = tuple(sorted(referenced_packages(path, packages).items()))
+        package_folders = tuple(sorted(referenced_packages(path, packages).items()))
         return _check_document(
-            hand, path, content_hash([path, *referenced_files(path, packages)]), found
+            hand, path, content_hash([path, *referenced_files(path, packages)]), package_folders
         )
     except InvalidInputError as error:
         if document is None:
@@ -248,9 +251,9 @@ def check_hand(
 
 @lru_cache(maxsize=16)
 def _check_document(
-    hand: Hand, path: Path, content: str, found: tuple[tuple[str, Path], ...]
+    hand: Hand, path: Path, content: str, package_folders: tuple[tuple[str, Path], ...]
 ) -> HandFigures:
-    bench = _HandBench(hand, path, Packages(dict(found)))
+    bench = _HandBench(hand, path, Packages(dict(package_folders)))
     bench.check_limits()
     bench.check_pads()
     bench.check_closing_direction()
@@ -359,7 +362,7 @@ class _HandBench:
         """Requires the hand's body behind G along +z."""
         X_GH = inverse(self._hand.X_HG.matrix())
         geometries = self._plant.GetCollisionGeometriesForBody(self._model.body)
-        heights = [self._points(X_GH, geometry)[:, 2].mean() for geometry in geometries]
+        heights = [self._corners(X_GH, geometry)[:, 2].mean() for geometry in geometries]
         if heights and max(heights) > 0.0:
             raise self._error(
                 f"+z of G, the approach direction, points towards {self._hand.body!r}; turn X_HG"
@@ -399,7 +402,7 @@ class _HandBench:
             self._model.fingers[index].body_frame(),
         )
         X_GB = inverse(self._hand.X_HG.matrix()) @ X_HB.GetAsMatrix4()
-        p_GV = self._points(X_GB, self._model.pads[index])
+        p_GV = self._corners(X_GB, self._model.pads[index])
         return np.stack([p_GV.min(axis=0), p_GV.max(axis=0)])
 
     def pad_modulus(self) -> float:
@@ -407,15 +410,13 @@ class _HandBench:
         properties = self._inspector.GetProximityProperties(self._model.pads[0])
         return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
 
-    def _points(self, X_GB: Array, geometry: GeometryId) -> Array:
-        """Corners (N, 3) of a geometry of body B in G [m]; for a round one those of its bounding
+    def _corners(self, X_GB: Array, geometry: GeometryId) -> Array:
+        """Corners (N, 3) of a geometry of body B in G [m]; of a round one, corners of its bounding
         box."""
         X_BC = self._inspector.GetPoseInFrame(geometry).GetAsMatrix4()
         shape = self._inspector.GetShape(geometry)
         if isinstance(shape, (Mesh, Convex)):
-            hull = self._inspector.GetConvexHull(geometry)
-            p_CV = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-            return transform_points(X_GB @ X_BC, p_CV)
+            return transform_points(X_GB @ X_BC, hull_vertices(shape))
         box = self._inspector.GetObbInGeometryFrame(geometry)
         corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * box.half_width()
         return transform_points(X_GB @ X_BC @ box.pose().GetAsMatrix4(), corners)

@@ -273,7 +273,7 @@ def add_models(
         InvalidInputError: it cannot be read, is too large, or has an invalid mass, inertia or other
             number.
         UnknownNameError: it names a package that is not found.
-        RuntimeError, ValueError: from `AddModels`.
+        RuntimeError, ValueError: `AddModels` failed.
     """
     set_packages(parser, referenced_packages(path, packages))
     try:
@@ -310,14 +310,14 @@ def without_collisions(text: str) -> str:
     return COLLISION_ELEMENT.sub("", text)
 
 
-def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
+def set_packages(parser: Parser, folders: Mapping[str, Path]) -> None:
     """Adds packages by their folders, and the installed data, to a parser. Removes Drake's own
     models, which it would fetch from the network."""
     known = parser.package_map()
-    for name in {"drake_models", *found}:
+    for name in {"drake_models", *folders}:
         if known.Contains(name):
             known.Remove(name)
-    for name, folder in {**found, "burg_drake": data_root()}.items():
+    for name, folder in {**folders, "burg_drake": data_root()}.items():
         known.Add(name, folder)
 
 

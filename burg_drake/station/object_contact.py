@@ -45,7 +45,7 @@ def filter_contact_pairs(station_diagram: StationDiagram, context: Context | Non
     geometries = {name: collision_geometries(plant, [index]) for name, index in objects.items()}
     robot = collision_geometries(plant, station_diagram.robot_bodies)
     table = collision_geometries(plant, [station_diagram.table])
-    surroundings = [g for one in geometries.values() for g in one] + table
+    surroundings = [g for own in geometries.values() for g in own] + table
     declaration = CollisionFilterDeclaration()
     patches, rolling = _ball_geometries(station_diagram, geometries)
     _exclude_pairs(declaration, patches, surroundings)
@@ -57,13 +57,13 @@ def filter_contact_pairs(station_diagram: StationDiagram, context: Context | Non
     _exclude_pairs(declaration, surfaces, surroundings + hard)
     _exclude_pairs(declaration, feet, [g for g in surroundings if g not in set(table)] + robot)
     _exclude_pairs(declaration, hulls, table + soft)
-    for one in geometries.values():
-        pieces = [g for g in one if g not in surfaces | feet | hulls]
-        if surfaces & set(one):
+    for own in geometries.values():
+        pieces = [g for g in own if g not in surfaces | feet | hulls]
+        if surfaces & set(own):
             _exclude_pairs(declaration, pieces, soft)
-        if feet & set(one):
+        if feet & set(own):
             _exclude_pairs(declaration, pieces, table)
-        if hulls & set(one):
+        if hulls & set(own):
             _exclude_pairs(declaration, pieces, [g for g in surroundings if g not in set(table)])
     manager = (
         graph.collision_filter_manager()

@@ -26,7 +26,7 @@ from burg_drake.core import Array, InvalidInputError
 from burg_drake.scene import Scene
 from burg_drake.station.drivers import ArmDriver, Fingers, HandDriver, PlanPlayer
 from burg_drake.station.model_file import add_models
-from burg_drake.station.robot import has_inverse_dynamics, joint_actuators
+from burg_drake.station.robot import RobotModels, has_inverse_dynamics, joint_actuators
 from burg_drake.station.station_document import Station
 
 
@@ -38,7 +38,7 @@ class ExternalTorque(LeafSystem):
         state: state of the whole plant.
         contact: (n) generalized contact forces of the model.
         applied_forces: list of ExternallyAppliedSpatialForce; none if not connected.
-        torque: (n) [Nm] (output).
+        torque: (n) joint torques [Nm] (output).
     """
 
     def __init__(self, plant: MultibodyPlant, model: ModelInstanceIndex) -> None:
@@ -111,11 +111,11 @@ class HandMeasurement(LeafSystem):
         actuation: (2) sum of servos and brake [N] (output).
     """
 
-    def __init__(self, states: int, fingers: Fingers) -> None:
-        """Declares the ports; `states` is the size of the hand's state."""
+    def __init__(self, state_size: int, fingers: Fingers) -> None:
+        """Declares the ports; `state_size` is the size of the hand's state."""
         super().__init__()
         self._fingers = fingers
-        self._state = self.DeclareVectorInputPort("state", states)
+        self._state = self.DeclareVectorInputPort("state", state_size)
         self._servos = self.DeclareVectorInputPort("servos", 2)
         self._braked = self.DeclareVectorInputPort("braked", 2)
         state, force = {self._state.ticket()}, {self._servos.ticket(), self._braked.ticket()}
@@ -125,12 +125,14 @@ class HandMeasurement(LeafSystem):
 
     def _calc_state(self, context: Context, output: BasicVector) -> None:
         state, fingers = self._state.Eval(context), self._fingers
-        rate = fingers.distance(fingers.closed + state[fingers.v]) - fingers.hand.opening[0]
-        output.SetFromVector([fingers.distance(state[fingers.q]), rate])
+        rate = (
+            fingers.distance(fingers.closed + state[fingers.rate_index]) - fingers.hand.opening[0]
+        )
+        output.SetFromVector([fingers.distance(state[fingers.position_index]), rate])
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         total = self._servos.Eval(context) + self._braked.Eval(context)
-        output.SetFromVector([float((total * self._fingers.towards_closed).mean())])
+        output.SetFromVector([float((total * self._fingers.closing_signs).mean())])
 
     def _calc_actuation(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._servos.Eval(context) + self._braked.Eval(context))
@@ -147,7 +149,7 @@ class InverseDynamicsControl(LeafSystem):
         desired_state: (2 n) positions and velocities.
         state: (2 n) positions and velocities of the arm.
         feedforward: (n) additional torques; 0 if not connected.
-        torque: (n) [Nm] (output).
+        torque: (n) joint torques [Nm] (output).
     """
 
     def __init__(self, model: MultibodyPlant, kp: Array, kd: Array, limits: Array) -> None:
@@ -182,15 +184,15 @@ class InverseDynamicsControl(LeafSystem):
 def make_inverse_dynamics(
     plant: MultibodyPlant,
     station: Station,
-    models: dict[str, ModelInstanceIndex],
+    models: RobotModels,
     actuators: list[JointActuator],
 ) -> InverseDynamicsControl:
     """The controller of a station's arm.
 
     Args:
-        plant: finalized, with arm and hand.
+        plant: a finalized plant with arm and hand.
         station: station whose arm has the gains.
-        models: arm and hand.
+        models: models of arm and hand.
         actuators: actuators of the arm's joints, in order.
 
     Raises:
@@ -216,14 +218,14 @@ def make_inverse_dynamics(
 
 
 def make_controller_plant(
-    plant: MultibodyPlant, station: Station, models: dict[str, ModelInstanceIndex]
+    plant: MultibodyPlant, station: Station, models: RobotModels
 ) -> MultibodyPlant:
     """The arm alone; its flange carries the open hand's mass and inertia.
 
     Args:
-        plant: finalized, with arm and hand.
+        plant: a finalized plant with arm and hand.
         station: their station.
-        models: arm and hand.
+        models: models of arm and hand.
     """
     arm = station.document.arm
     assert arm is not None
@@ -244,9 +246,6 @@ def make_controller_plant(
     return model
 
 
-Models = dict[str, ModelInstanceIndex]
-
-
 @dataclass(frozen=True, eq=False)
 class _Servo:
     """Ports of an arm's servo: desired positions and velocities (2 n), feedforward torques (n), and
@@ -258,7 +257,7 @@ class _Servo:
 
 
 def export_ports(
-    builder: RobotDiagramBuilder, station: Station, models: Models, *, controlled: bool
+    builder: RobotDiagramBuilder, station: Station, models: RobotModels, *, controlled: bool
 ) -> None:
     """Exports the servos' inputs and the plant's outputs.
 
@@ -284,14 +283,14 @@ def export_ports(
 
 
 def export_driven_ports(
-    builder: RobotDiagramBuilder, scene: Scene, station: Station, models: Models
+    builder: RobotDiagramBuilder, scene: Scene, station: Station, models: RobotModels
 ) -> None:
     """Adds drivers of arm and hand, and exports their inputs and the robot's measurements.
 
     Args:
         builder: builder of the diagram; its plant is finalized.
         scene, station: scene and station of the plans.
-        models: arm and hand.
+        models: models of arm and hand.
 
     Raises:
         InvalidInputError: the arm's model has joints and actuators in different orders.
@@ -362,7 +361,7 @@ def _arm_joints(
     return tuple(names)
 
 
-def _arm_servo(builder: RobotDiagramBuilder, station: Station, models: Models) -> _Servo:
+def _arm_servo(builder: RobotDiagramBuilder, station: Station, models: RobotModels) -> _Servo:
     plant, arm = builder.plant(), models["arm"]
     if not has_inverse_dynamics(station):
         return _Servo(
@@ -429,7 +428,7 @@ def _measure_hand(
         system.ExportOutput(measurement.GetOutputPort(name), f"hand.{name}")
 
 
-def _wrist_joint(plant: MultibodyPlant, station: Station, models: Models) -> JointIndex:
+def _wrist_joint(plant: MultibodyPlant, station: Station, models: RobotModels) -> JointIndex:
     """The weld between arm and hand."""
     hand = plant.GetBodyByName(station.hand.body, models["hand"])
     joints = map(plant.get_joint, plant.GetJointIndices())

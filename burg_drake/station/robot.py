@@ -25,13 +25,16 @@ from burg_drake.station.station_document import Station
 
 Robot = Literal["arm", "hand", "none"]
 
+RobotModels = dict[str, ModelInstanceIndex]
+"""Model instances of the robot by name."""
+
 ROBOT_MODELS = ("hand", "arm", "lift")
 """Names of the robot's model instances."""
 
 
 def add_robot(
     builder: RobotDiagramBuilder, station: Station, robot: Robot, *, simulated: bool = True
-) -> dict[str, ModelInstanceIndex]:
+) -> RobotModels:
     """Adds hand and arm with their servos.
 
     Gravity does not pull them, unless an inverse-dynamics controller will carry the arm's weight;
@@ -146,7 +149,7 @@ def _add_arm(
 def _find_arm_frame(
     plant: MultibodyPlant, arm: ModelInstanceIndex, station: Station, key: str, name: str
 ) -> Frame:
-    """The arm's frame whose name is at a key of the station."""
+    """The arm's frame that the station names at a key."""
     if not plant.HasFrameNamed(name, arm):
         frames = [plant.get_frame(index).name() for index in plant.GetFrameIndices(arm)]
         # Suffixes of the frames that Drake's parser adds for each joint.
@@ -166,9 +169,7 @@ def joint_actuators(plant: MultibodyPlant, model: ModelInstanceIndex) -> list[Jo
     return sorted(own, key=lambda a: int(a.joint().index()))
 
 
-def set_default_posture(
-    plant: MultibodyPlant, station: Station, models: dict[str, ModelInstanceIndex]
-) -> None:
+def set_default_posture(plant: MultibodyPlant, station: Station, models: RobotModels) -> None:
     """Opens the hand and puts the arm into its home posture in default contexts.
 
     Raises:

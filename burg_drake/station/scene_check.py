@@ -44,8 +44,8 @@ from burg_drake.scene import (
     validate_scene,
 )
 from burg_drake.station.collision_world import (
+    BodySweep,
     CollisionWorld,
-    FreeTravel,
     PosedShapes,
     read_object_shapes,
     surrounding_shapes,
@@ -57,6 +57,7 @@ from burg_drake.station.robot import ROBOT_MODELS, Robot
 from burg_drake.station.station_diagram import StationDiagram
 from burg_drake.station.station_document import StationLike, as_station
 from burg_drake.station.surroundings import SurroundingsProperties, obstacle_name_error
+from burg_drake.station.visible_triangles import hull_vertices
 
 
 def table_force(shapes: PosedShapes, X_WO: RigidTransform, thickness: float) -> float:
@@ -82,8 +83,7 @@ def _volume_below(shape: Shape, X_WG: RigidTransform) -> float:
     elif isinstance(shape, Cylinder):
         p_GV = _cylinder_corners(shape.radius(), shape.length())
     elif isinstance(shape, (Convex, Mesh)):
-        hull = shape.GetConvexHull()
-        p_GV = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+        p_GV = hull_vertices(shape)
     else:
         return np.inf
     p_WV = transform_points(X_WG.GetAsMatrix4(), p_GV)
@@ -241,12 +241,12 @@ class SceneCheck:
             raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")
         self._update_poses(scene)
         direction_W = self._X_WS[:3, :3] @ direction / length
-        return self._travel.first_contact(chosen, direction_W, limit)[0]
+        return self._sweep.first_contact(chosen, direction_W, limit)[0]
 
     @cached_property
-    def _travel(self) -> FreeTravel:
-        """Free travel in the world, created on first use."""
-        return FreeTravel(self._world)
+    def _sweep(self) -> BodySweep:
+        """Motion of bodies to the first contact, created on first use."""
+        return BodySweep(self._world)
 
     def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
         """Overlaps: instance, other body and depth [m], in the order of the document."""
@@ -335,7 +335,7 @@ class SceneCheck:
         height = min(placed.surface, placed.support)
         if height <= HOVER_TOLERANCE:
             return None
-        fall, below = self._travel.first_contact([name], down_direction, np.inf)
+        fall, below = self._sweep.first_contact([name], down_direction, np.inf)
         if below in ("table", ""):
             fall, below = height, BOARD_NAME if below else ""
         elif fall <= HOVER_TOLERANCE + sum(self._gap_to_surface(n) for n in (name, below)):

@@ -1,4 +1,4 @@
-"""Triangles of all visual shapes, for ray casting."""
+"""Triangles of visual shapes, for ray casting, and vertices of the hulls of meshes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import trimesh
 from pydrake.geometry import (
     Box,
     Capsule,
+    Convex,
     Cylinder,
     Ellipsoid,
     GeometrySet,
@@ -27,6 +28,12 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.core import Array, Indices, MeshError, report_read_errors, transform_points
 
 Triangles = tuple[Array, Indices]
+
+
+def hull_vertices(shape: Convex | Mesh) -> Array:
+    """Vertices (V, 3) of the convex hull of a mesh [m]."""
+    hull = shape.GetConvexHull()
+    return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core import NO_PACKAGES, Array, Packages, make_pose, transform_points
-from burg_drake.station import Hand, add_hand
+from burg_drake.station import Hand, add_hand, hull_vertices
 from burg_drake.visualization.gltf import gltf_mesh
 from burg_drake.visualization.object_drawing import box_corners
 
@@ -97,8 +97,7 @@ def _meshcat_shape(shape: Shape, opacity: float) -> Shape:
 def _shape_corners(shape: Shape) -> Array:
     """Points (N, 3) with the bounds of a shape [m]."""
     if isinstance(shape, Mesh | Convex):
-        hull = shape.GetConvexHull()
-        return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
+        return hull_vertices(shape)
     box = CalcObb(shape)
     if box is None:  # a half space
         return np.zeros((1, 3))

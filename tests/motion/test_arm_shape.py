@@ -24,7 +24,7 @@ def built(scene: Scene, station: Station) -> StationDiagram:
 def test_another_scene_has_the_same_robot_with_other_numbers() -> None:
     few, many = built(EMPTY, PANDA), built(SIX, PANDA)
     one, two = ArmShape.of(few), ArmShape.of(many)
-    assert one.itself is two.itself
+    assert one.self_clearance is two.self_clearance
     for a, b in zip(one.trees.bodies, two.trees.bodies, strict=True):
         assert a.body != b.body
         assert few.plant.get_body(a.body).name() == many.plant.get_body(b.body).name()
@@ -49,4 +49,4 @@ def test_a_robot_that_differs_is_another_one() -> None:
     turned = replace(arm, X_FH=Pose(rpy_deg=(0.0, 0.0, -44.0)))
     other = replace(PANDA, document=replace(PANDA.document, arm=turned))
     found = ArmShape.of(built(EMPTY, PANDA)), ArmShape.of(built(EMPTY, other))
-    assert found[0].itself is not found[1].itself
+    assert found[0].self_clearance is not found[1].self_clearance

@@ -12,7 +12,7 @@ from burg_drake.motion import (
     ArmKinematics,
     ArmProximity,
     ClosedFormLineSearch,
-    LinePoses,
+    HandPath,
     LineSearchBatch,
     PandaIk,
     ReachSettings,
@@ -36,10 +36,10 @@ def search() -> ClosedFormLineSearch:
     arm = ArmKinematics.of(diagram)
     ik = PandaIk.of(arm)
     assert ik is not None and STATION.document.arm is not None
-    lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3), GraspMotion())
+    path = HandPath.of(STATION.hand.X_HG.matrix(), np.eye(3), GraspMotion())
     home = np.array(STATION.document.arm.home)
     settings = ReachSettings()
-    return ClosedFormLineSearch(arm, ik.within(0.01), lines, ArmProximity(diagram), home, settings)
+    return ClosedFormLineSearch(arm, ik.within(0.01), path, ArmProximity(diagram), home, settings)
 
 
 def begin(search: ClosedFormLineSearch, *grasps: Array) -> LineSearchBatch:
@@ -66,35 +66,35 @@ def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormL
 def test_a_refused_chain_does_not_come_back_and_at_last_there_is_none(
     search: ClosedFormLineSearch,
 ) -> None:
-    lines = begin(search, ABOVE)
+    batch = begin(search, ABOVE)
     starts: list[Array] = []
     for _ in range(1000):
-        (chain,) = lines.propose([0])
+        (chain,) = batch.propose([0])
         if chain is None:
             break
         assert not starts or np.abs(chain.q[0] - starts[-1]).max() > 1e-9
         starts.append(chain.q[0])
-        lines.refuse(0, chain, None)
+        batch.refuse(0, chain, None)
     else:
         pytest.fail("the search does not end")
     assert len(starts) > 5
 
 
 def test_refusing_one_grasp_leaves_the_others_alone(search: ClosedFormLineSearch) -> None:
-    lines = begin(search, ABOVE, ABOVE)
-    first, second = lines.propose([0, 1])
+    batch = begin(search, ABOVE, ABOVE)
+    first, second = batch.propose([0, 1])
     assert first is not None and second is not None
-    lines.refuse(0, first, 20)
-    other, same = lines.propose([0, 1])
+    batch.refuse(0, first, 20)
+    other, same = batch.propose([0, 1])
     assert other is not None and same is not None
     np.testing.assert_array_equal(same.q, second.q)
     assert other.q.shape != first.q.shape or not np.array_equal(other.q, first.q)
 
 
 def test_beyond_the_arm_there_is_no_ik(search: ClosedFormLineSearch) -> None:
-    lines = begin(search, FAR, ABOVE)
-    assert lines.propose([0, 1])[0] is None
-    assert lines.failure(0).outcome is Outcome.NO_IK
+    batch = begin(search, FAR, ABOVE)
+    assert batch.propose([0, 1])[0] is None
+    assert batch.failure(0).outcome is Outcome.NO_IK
 
 
 @pytest.mark.thorough
@@ -102,7 +102,7 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
     search: ClosedFormLineSearch,
 ) -> None:
     """Postures with a joint beyond its limit; where no other posture is within, that is said."""
-    still = replace(search.lines, standoff=0.0, lift=0.0)
+    still = replace(search.hand_path, standoff=0.0, lift=0.0)
     ends = ClosedFormLineSearch(
         search.arm, search.ik, still, search.proximity, search.home, search.settings
     )
@@ -111,9 +111,9 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
     excess = rng.uniform(0.1, 0.5, 400)
     q[:, 5] = search.ik.lower[5] - excess  # the wrist is folded too far
     X_AG = panda_forward(q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
-    lines = begin(ends, *X_AG)
-    lines.propose(range(400))
-    failures = [lines.failure(k) for k in range(400)]
+    batch = begin(ends, *X_AG)
+    batch.propose(range(400))
+    failures = [batch.failure(k) for k in range(400)]
     beyond = [k for k in range(400) if failures[k].outcome is Outcome.JOINT_LIMIT]
     assert len(beyond) > 5
     for k in beyond:
@@ -121,9 +121,9 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
 
 
 def test_where_the_lift_leads_out_of_reach_the_line_fails(search: ClosedFormLineSearch) -> None:
-    lines = begin(search, HIGH)
-    assert lines.propose([0]) == [None]
-    assert lines.failure(0).outcome is Outcome.LIFT_LINE
+    batch = begin(search, HIGH)
+    assert batch.propose([0]) == [None]
+    assert batch.failure(0).outcome is Outcome.LIFT_LINE
 
 
 def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLineSearch) -> None:
@@ -136,12 +136,12 @@ def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLineSearch) -> N
 
 
 def test_a_way_that_is_closed_is_not_proposed(search: ClosedFormLineSearch) -> None:
-    lines = begin(search, ABOVE, ABOVE)
-    first, second = lines.propose([0, 1])
+    batch = begin(search, ABOVE, ABOVE)
+    first, second = batch.propose([0, 1])
     assert first is not None and second is not None
-    lines.close(0, first.flip)
-    other, same = lines.propose([0, 1])
+    batch.close(0, first.flip)
+    other, same = batch.propose([0, 1])
     assert other is not None and same is not None
     assert other.flip != first.flip and same.flip == second.flip
-    lines.close(0, other.flip)
-    assert lines.propose([0]) == [None]
+    batch.close(0, other.flip)
+    assert batch.propose([0]) == [None]

@@ -3,18 +3,18 @@
 import numpy as np
 
 from burg_drake.core import inverse, make_pose, pregrasp, rotation_from_rpy
-from burg_drake.motion import LinePoses
+from burg_drake.motion import HandPath
 from burg_drake.station import GraspMotion
 
 X_HG = make_pose(rotation_from_rpy((0.0, 0.0, np.pi / 2)), (0.0, 0.0, 0.1034))
 X_WA = make_pose(rotation_from_rpy((0.4, -0.2, 1.1)), (0.3, -0.1, 0.05))
 X_WG = make_pose(rotation_from_rpy((2.8, 0.3, -0.5)), (0.5, 0.1, 0.12))
-LINES = LinePoses.of(X_HG, X_WA[:3, :3], GraspMotion())
+PATH = HandPath.of(X_HG, X_WA[:3, :3], GraspMotion())
 BACK_AND_ASIDE = GraspMotion(retreat=0.08, lift_height=0.2, lift_direction=(0.0, 3.0, 4.0))
 
 
-def grasp_in_world(way: float, lines: LinePoses = LINES) -> np.ndarray:
-    X_AH = lines.X_AH(inverse(X_WA) @ X_WG, np.array(way))
+def grasp_in_world(way: float, path: HandPath = PATH) -> np.ndarray:
+    X_AH = path.X_AH(inverse(X_WA) @ X_WG, np.array(way))
     return X_WA @ X_AH @ X_HG
 
 
@@ -33,13 +33,13 @@ def test_after_it_the_hand_is_straight_above_whatever_the_base() -> None:
 
 
 def test_after_a_retreat_the_lift_begins_back_on_the_approach() -> None:
-    lines = LinePoses.of(X_HG, X_WA[:3, :3], BACK_AND_ASIDE)
+    path = HandPath.of(X_HG, X_WA[:3, :3], BACK_AND_ASIDE)
     back, aside = pregrasp(X_WG, 0.08), pregrasp(X_WG, 0.08)
     aside[:3, 3] += 0.2 * np.array((0.0, 0.6, 0.8))
-    np.testing.assert_allclose(grasp_in_world(0.08, lines), back, atol=1e-12)
-    np.testing.assert_allclose(grasp_in_world(0.28, lines), aside, atol=1e-12)
-    np.testing.assert_allclose(lines.layers[[0, lines.at_retreated, -1]], [-0.1, 0.08, 0.28])
-    carried = lines.target_displacement(inverse(X_WA) @ X_WG, np.array((-0.1, 0.0, 0.28))[:, None])
+    np.testing.assert_allclose(grasp_in_world(0.08, path), back, atol=1e-12)
+    np.testing.assert_allclose(grasp_in_world(0.28, path), aside, atol=1e-12)
+    np.testing.assert_allclose(path.layers[[0, path.at_retreated, -1]], [-0.1, 0.08, 0.28])
+    carried = path.target_displacement(inverse(X_WA) @ X_WG, np.array((-0.1, 0.0, 0.28))[:, None])
     np.testing.assert_allclose(
         carried[:, 0], [np.zeros(3), np.zeros(3), aside[:3, 3] - X_WG[:3, 3]], atol=1e-12
     )
@@ -48,6 +48,6 @@ def test_after_a_retreat_the_lift_begins_back_on_the_approach() -> None:
 def test_shapes_broadcast() -> None:
     X_AG = np.broadcast_to(X_WG, (3, 2, 4, 4))
     ways = np.linspace(-0.1, 0.3, 5)[:, None, None]
-    X_AH = LINES.X_AH(X_AG[None], ways)
+    X_AH = PATH.X_AH(X_AG[None], ways)
     assert X_AH.shape == (5, 3, 2, 4, 4)
-    np.testing.assert_array_equal(X_AH[4, 1, 0], LINES.X_AH(X_WG, ways[4, 0, 0]))
+    np.testing.assert_array_equal(X_AH[4, 1, 0], PATH.X_AH(X_WG, ways[4, 0, 0]))

@@ -36,11 +36,13 @@ def test_all_bodies_are_where_drake_puts_them(station: str, tmp_path: Path) -> N
             X_WB = built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(body))
             X_FB = links.X_FB[body]
             in_frame = (points @ X_FB[:3, :3].T + X_FB[:3, 3]).astype(np.float32)
-            placed = poses.place(frame, in_frame)[:, :, k]
+            placed = poses.transform_points(frame, in_frame)[:, :, k]
             np.testing.assert_allclose(placed, X_WB.multiply(points.T), atol=2e-6)
-            own = poses.place_own(np.array([frame] * 4), in_frame)
+            own = poses.transform_per_frame(np.array([frame] * 4), in_frame)
             np.testing.assert_array_equal(own[:, :, k], placed)
-            each = poses.place_each(np.array([frame]), in_frame.T[:, :, None], np.array([k]))
+            each = poses.transform_per_node(
+                np.array([frame]), in_frame.T[:, :, None], np.array([k])
+            )
             np.testing.assert_array_equal(each[:, :, 0], placed)
 
 

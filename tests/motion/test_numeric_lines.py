@@ -15,8 +15,8 @@ from burg_drake.motion import (
     ArmProximity,
     Chain,
     ClosedFormLineSearch,
+    HandPath,
     IkRoutine,
-    LinePoses,
     LineSearch,
     NumericLineSearch,
     PandaIk,
@@ -47,13 +47,13 @@ class Arm:
         self.X_HG = self.station.hand.X_HG.matrix()
         self.home = np.array(document.home)
         self.kinematics = ArmKinematics.of(self.diagram)
-        self.lines = LinePoses.of(self.X_HG, self.X_WA[:3, :3], MOTION)
+        self.hand_path = HandPath.of(self.X_HG, self.X_WA[:3, :3], MOTION)
         self.proximity = ArmProximity(self.diagram)
 
     def numeric(self, kinematics: ArmKinematics | None = None) -> NumericLineSearch:
         """The search."""
         return NumericLineSearch(
-            kinematics or self.kinematics, self.lines, self.proximity, self.home, SETTINGS
+            kinematics or self.kinematics, self.hand_path, self.proximity, self.home, SETTINGS
         )
 
     def by_routine(self, routine: IkRoutine) -> NumericLineSearch:
@@ -64,7 +64,7 @@ class Arm:
         )
         return NumericLineSearch(
             self.kinematics,
-            self.lines,
+            self.hand_path,
             self.proximity,
             self.home,
             SETTINGS,
@@ -119,9 +119,9 @@ def ur_routine(arm: Arm) -> IkRoutine:
 
 def outcomes(search: LineSearch, X_AG: np.ndarray) -> list[Outcome | None]:
     """Why there is no chain; None where there is one."""
-    lines = search.begin(X_AG, np.full((len(X_AG), 2), CLEARANCE))
-    chains = lines.propose(range(len(X_AG)))
-    return [None if c is not None else lines.failure(g).outcome for g, c in enumerate(chains)]
+    batch = search.begin(X_AG, np.full((len(X_AG), 2), CLEARANCE))
+    chains = batch.propose(range(len(X_AG)))
+    return [None if c is not None else batch.failure(g).outcome for g, c in enumerate(chains)]
 
 
 @pytest.mark.parametrize("station", ["ur5e", "panda"])
@@ -172,7 +172,7 @@ def test_verdicts_are_those_of_the_closed_form(panda: Arm) -> None:
     assert ik is not None
     ik = ik.within(SETTINGS.limit_margin)
     swept = ClosedFormLineSearch(
-        panda.kinematics, ik, panda.lines, panda.proximity, panda.home, SETTINGS
+        panda.kinematics, ik, panda.hand_path, panda.proximity, panda.home, SETTINGS
     )
     expected, found = outcomes(swept, X_AG), outcomes(panda.numeric(), X_AG)
     assert sum(a == b for a, b in zip(expected, found, strict=True)) >= 23
@@ -232,9 +232,9 @@ def test_a_verdict_does_not_depend_on_the_batch(ur5e: Arm) -> None:
 
 def test_out_of_reach(ur5e: Arm) -> None:
     X_WG = grasp(np.array([1.2, 0.0, 0.3]), np.random.default_rng(0))
-    lines = ur5e.numeric().begin(ur5e.X_AG(X_WG[None]), np.full((1, 2), CLEARANCE))
-    assert lines.propose([0]) == [None]
-    failure = lines.failure(0)
+    batch = ur5e.numeric().begin(ur5e.X_AG(X_WG[None]), np.full((1, 2), CLEARANCE))
+    assert batch.propose([0]) == [None]
+    failure = batch.failure(0)
     assert failure.outcome is Outcome.NO_IK and np.isnan(failure.excess)
 
 
@@ -243,9 +243,9 @@ def test_beyond_a_joint_limit(ur5e: Arm) -> None:
     X_AG = ur5e.X_AG(ur5e.grasps(1, seed=8))
     upper = np.where(np.arange(6) == 2, 0.05, 2 * np.pi)
     tight = replace(ur5e.kinematics, lower=-upper, upper=upper)
-    lines = ur5e.numeric(tight).begin(X_AG, np.full((1, 2), CLEARANCE))
-    assert lines.propose([0]) == [None]
-    failure = lines.failure(0)
+    batch = ur5e.numeric(tight).begin(X_AG, np.full((1, 2), CLEARANCE))
+    assert batch.propose([0]) == [None]
+    failure = batch.failure(0)
     assert failure.outcome is Outcome.JOINT_LIMIT
     X_AF = X_AG[0] @ inverse(ur5e.X_HG) @ inverse(ur5e.X_FH)
     elbow = np.abs(np.concatenate([ur_ik.solve(X)[:, 2] for X in X_AF])).min()
@@ -256,9 +256,9 @@ def test_what_is_in_the_way_is_in_the_way(ur5e: Arm) -> None:
     """A grasp behind the base, where the arm stands on the table itself."""
     rng = np.random.default_rng(9)
     X_WG = np.array([grasp(np.array([0.05, 0.1, 0.02]), rng) for _ in range(6)])
-    lines = ur5e.numeric().begin(ur5e.X_AG(X_WG), np.full((6, 2), CLEARANCE))
-    none = [g for g, chain in enumerate(lines.propose(range(6))) if chain is None]
-    named = [lines.failure(g) for g in none]
+    batch = ur5e.numeric().begin(ur5e.X_AG(X_WG), np.full((6, 2), CLEARANCE))
+    none = [g for g, chain in enumerate(batch.propose(range(6))) if chain is None]
+    named = [batch.failure(g) for g in none]
     blocked = [f for f in named if f.outcome is Outcome.ARM_COLLISION]
     assert blocked
     for failure in blocked:
@@ -275,24 +275,24 @@ def test_what_is_in_the_way_is_in_the_way(ur5e: Arm) -> None:
     ],
 )
 def test_refused_chains_are_not_proposed_again(ur5e: Arm, row, outcome: Outcome) -> None:  # type: ignore[no-untyped-def]
-    lines = ur5e.numeric().begin(ur5e.X_AG(ur5e.grasps(1, seed=0)), np.full((1, 2), CLEARANCE))
+    batch = ur5e.numeric().begin(ur5e.X_AG(ur5e.grasps(1, seed=0)), np.full((1, 2), CLEARANCE))
     seen: list[np.ndarray] = []
-    while (chain := lines.propose([0])[0]) is not None:
+    while (chain := batch.propose([0])[0]) is not None:
         start = chain.q[chain.at_grasp]
         assert all(np.abs(start - other).max() > 0.01 for other in seen)
         seen.append(start)
-        lines.refuse(0, chain, row(chain))
+        batch.refuse(0, chain, row(chain))
     assert len(seen) >= 2
-    failure = lines.failure(0)
+    failure = batch.failure(0)
     assert failure.outcome is outcome and 1 <= len(failure.q) <= 3
 
 
 def test_a_start_that_is_not_reached_is_left_out(ur5e: Arm) -> None:
-    lines = ur5e.numeric().begin(ur5e.X_AG(ur5e.grasps(1, seed=0)), np.full((1, 2), CLEARANCE))
-    first = lines.propose([0])[0]
-    assert first is not None and lines.propose([0])[0].q is not first.q  # type: ignore[union-attr]
-    lines.refuse(0, first, None)
-    second = lines.propose([0])[0]
+    batch = ur5e.numeric().begin(ur5e.X_AG(ur5e.grasps(1, seed=0)), np.full((1, 2), CLEARANCE))
+    first = batch.propose([0])[0]
+    assert first is not None and batch.propose([0])[0].q is not first.q  # type: ignore[union-attr]
+    batch.refuse(0, first, None)
+    second = batch.propose([0])[0]
     assert second is not None and np.abs(second.q[0] - first.q[0]).max() > 0.01
 
 

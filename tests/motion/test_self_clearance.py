@@ -64,14 +64,14 @@ def test_only_pairs_that_cannot_meet_are_left_out() -> None:
             built.plant, built.scene_graph.model_inspector(), [b.body for b in shape.trees.bodies]
         )
     }
-    compared = {frozenset((known[i], known[j])) for i, j in shape.itself.pairs}
+    compared = {frozenset((known[i], known[j])) for i, j in shape.self_clearance.pairs}
     collision = ArmCollision(built)
     met = set()
     low, high = shape.limits.T
     for q in np.random.default_rng(0).uniform(low, high, (1500, 7)):
         if not collision.is_free(q):
             met |= {frozenset((o.link, o.other)) for o in collision.overlaps(q)}
-    ((_, pairs),) = shape.itself.tables
+    ((_, pairs),) = shape.self_clearance.tables
     tabled = {frozenset((known[i], known[j])) for i, j in pairs}
     assert frozenset(("panda_link5", "panda_hand")) in tabled & met
     assert met & counted <= compared | tabled

@@ -27,7 +27,7 @@ def world(asked: list[str]) -> CollisionWorld:
         asked.append(kind)
         return ((RigidTransform(), Sphere(RADII[kind])),)
 
-    return CollisionWorld(FLOOR, shapes, places=3)
+    return CollisionWorld(FLOOR, shapes, slots=3)
 
 
 def put(world: CollisionWorld, **bodies: tuple[str, float, float]) -> None:
