@@ -142,6 +142,7 @@ from .grasp_set import (
 )
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,
+    NO_VALUE as NO_VALUE,
     count_with_noun as count_with_noun,
     format_count as format_count,
     format_duration as format_duration,

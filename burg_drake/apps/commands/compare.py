@@ -22,9 +22,9 @@ def add_rejudge_options(parser: options.Parser) -> None:
         help="evaluate each trial with objects where they were measured, to separate placement"
         " from physics; results are kept in FOLDER (default: beside the trials file)",
     )
-    who = group.add_mutually_exclusive_group()
-    options.add_workers(who, "worker processes (default: one for each core)")
-    options.add_cluster(who)
+    workers_group = group.add_mutually_exclusive_group()
+    options.add_workers(workers_group, "worker processes (default: one for each core)")
+    options.add_cluster(workers_group)
     group.add_argument("--quiet", action="store_true", help="do not show progress")
 
 

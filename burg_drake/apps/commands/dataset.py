@@ -227,9 +227,9 @@ def add_dataset_generate_options(parser: options.Parser) -> None:
     parser.add_argument(
         "--recipe", metavar="FILE", help="YAML file with settings that have no option"
     )
-    who = parser.add_mutually_exclusive_group()
-    options.add_workers(who, "worker processes (default: %(default)d)", default=1)
-    options.add_cluster(who)
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group, "worker processes (default: %(default)d)", default=1)
+    options.add_cluster(workers_group)
     options.add_quiet(parser)
 
 

@@ -240,9 +240,9 @@ def add_evaluate_options(parser: options.Parser) -> None:
     )
     options.add_settings_options(parser, evaluation.EvaluationSettings, "engine")
     add_rejudge_contested(parser)
-    who = parser.add_mutually_exclusive_group()
-    options.add_workers(who)
-    options.add_cluster(who)
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group)
+    options.add_cluster(workers_group)
     options.add_settings_options(parser, evaluation.EvaluationSettings, "table", "mode", "shard")
     options.add_settings_options(
         parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach"

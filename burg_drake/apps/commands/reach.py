@@ -92,7 +92,8 @@ def outcome_table(
         mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(max_blockers)
         counts = [
-            core.format_count(n) if (n := by_object[name][outcome]) else "·" for name in names
+            core.format_count(n) if (n := by_object[name][outcome]) else core.NO_VALUE
+            for name in names
         ]
         share = core.format_percent(total[outcome] / len(grasps))
         in_the_way = ", ".join(f"{name} ({core.format_count(n)})" for name, n in blockers)

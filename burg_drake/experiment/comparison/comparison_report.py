@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
-from burg_drake.core import format_count, format_number, outcome_label
+from burg_drake.core import NO_VALUE, format_count, format_number, outcome_label
 from burg_drake.evaluation import command, folded_section, header, html_page, section, table, tiles
 from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
@@ -327,7 +327,7 @@ def _outcome_section(comparison: Comparison, judged: Judgement) -> Html:
     """Section of simulated by actual outcomes."""
     happened = sorted({name for row in judged.outcomes.values() for name in row})
     rows = [
-        (outcome_label(simulated), [row.get(name, "·") for name in happened])
+        (outcome_label(simulated), [row.get(name, NO_VALUE) for name in happened])
         for simulated, row in judged.outcomes.items()
     ]
     head, judge, other = "simulated", "in simulation", "on the robot"
@@ -368,7 +368,7 @@ def _stage_section(found: RunAgreement) -> Html:
     def cell(stage: str, other: str) -> Child:
         count = found.stages[stage].get(other, 0)
         parted = found.apart.get(stage, {}).get(other, 0)
-        return f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
+        return f"{format_count(count)} ({format_count(parted)})" if parted else count or NO_VALUE
 
     rows = [(stage, [cell(stage, other) for other in columns]) for stage in found.stages]
     text = (
