@@ -43,7 +43,7 @@ def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> d
 
     Args:
         live: the session.
-        actions: on the session.
+        actions: actions on the session.
         after: number of the last event that is left out.
 
     Returns:
@@ -152,9 +152,9 @@ class ViewServer(PageServer):
 
     Args:
         live: the session.
-        actions: on the session.
+        actions: actions on the session.
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `first_port` on if None, any if 0.
+        port: port to listen on; the first free one from `first_port` on if None, any if 0.
         connections: maximum number served at a time.
 
     Raises:
@@ -246,7 +246,7 @@ def finish_script(
 
     Args:
         live: the session, closed.
-        actions: on the session.
+        actions: actions on the session.
         check: whether to measure the placement errors of objects.
         snapshot: folder for a snapshot; None for no snapshot.
     """

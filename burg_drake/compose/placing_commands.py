@@ -19,7 +19,6 @@ from burg_drake.compose.scene_checker import (
     find_free_place,
     instance_bounds,
     instance_shadow,
-    library_shapes,
     missing_objects,
     object_bounds,
     object_shadow,
@@ -127,9 +126,9 @@ class Duplicate(InstancesCommand):
     """Puts copies of instances beside them.
 
     Attributes:
-        names: of the instances to copy; several keep their relative poses.
-        offset: from each instance to its copy along x and y [m]; if None, the shortest one with
-            all copies on the board and free, else to the right of all objects.
+        names: names of the instances to copy; several keep their relative poses.
+        offset: offset from each instance to its copy along x and y [m]; if None, the shortest
+            offset with all copies on the board and free, else to the right of all objects.
     """
 
     verb = "duplicate"
@@ -278,7 +277,7 @@ class RandomConfiguration:
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._object_requests(state, surroundings, rng)
-        shapes, board = library_shapes(surroundings.checker, state), state.document.board
+        shapes, board = surroundings.checker.shapes(state), state.document.board
         covered = sum(min(map(polygon_area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(

@@ -111,7 +111,7 @@ class SceneChecker:
     """Checks states on one station; to be used by one thread at a time.
 
     Args:
-        station: of the scenes.
+        station: station of the scenes.
     """
 
     def __init__(self, station: StationLike) -> None:
@@ -127,7 +127,7 @@ class SceneChecker:
 
         Args:
             state: scene and library.
-            path: of the scene's file, for messages.
+            path: path of the scene's file, for messages.
 
         Raises:
             BurgError: the scene cannot be checked, for example as an object's file is missing.
@@ -144,7 +144,7 @@ class SceneChecker:
 
         Args:
             state: scene, library and selection.
-            path: of the scene's file, for messages.
+            path: path of the scene's file, for messages.
 
         Raises:
             BurgError: see `issues`.
@@ -170,12 +170,11 @@ class SceneChecker:
             self._check, self._library = SceneCheck(self._station, state.library), state.library
         return self._check
 
-
-def library_shapes(checker: SceneChecker, state: State) -> ObjectShapes:
-    """The shapes of a state's library, from the checker's cache."""
-    if checker._shapes is None or checker._shapes.library is not state.library:
-        checker._shapes = ObjectShapes(state.library)
-    return checker._shapes
+    def shapes(self, state: State) -> ObjectShapes:
+        """The shapes of the objects of a state's library."""
+        if self._shapes is None or self._shapes.library is not state.library:
+            self._shapes = ObjectShapes(state.library)
+        return self._shapes
 
 
 def missing_objects(state: State) -> tuple[str, ...]:
@@ -212,9 +211,9 @@ class Surroundings:
     """The context in which a command is applied.
 
     Attributes:
-        station: of the scene.
+        station: station of the scene.
         planar: whether moved objects keep their tilt, and their height unless they are raised.
-        path: of the scene's file, for messages.
+        path: path of the scene's file, for messages.
         checker: finds contacts and free places.
     """
 
@@ -249,7 +248,7 @@ def find_free_place(
 
     Args:
         polygon: (N, 2) footprint of the object, with its centre of mass above the origin [m].
-        state: with the objects that are on the board.
+        state: state with the objects that are on the board.
         obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:
@@ -271,7 +270,7 @@ def find_free_offset(
 
     Args:
         polygons: (N, 2) footprint of each object now [m].
-        state: with the objects that are on the board.
+        state: state with the objects that are on the board.
         obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:

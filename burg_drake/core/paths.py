@@ -387,7 +387,7 @@ def is_resolved(reference: str, *kinds: str) -> bool:
     are relative to the file's former folder, not to the working directory.
 
     Args:
-        reference: from a provenance.
+        reference: reference from a provenance.
         kinds: kinds of built-in names, see `builtin_names`.
     """
     if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):

@@ -32,7 +32,7 @@ class BoardPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
@@ -93,7 +93,7 @@ class LivePicture:
 
     Args:
         camera: argument of `cameras.open_source`.
-        board: in front of the camera.
+        board: board in front of the camera.
         show: called with each picture, or with one line that says why there is none.
         after: closed live picture that may still hold the camera; waits for its end.
 
@@ -159,8 +159,8 @@ class BackdropPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        layers: of the board.
+        actions: actions of the page.
+        layers: layers of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
@@ -301,8 +301,8 @@ class DisplayPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        views: of all pages.
+        actions: actions of the page.
+        views: views of all pages.
         on_change: called after each change of a choice.
     """
 

@@ -141,7 +141,7 @@ class GraspPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
@@ -184,8 +184,8 @@ class ReachPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        layers: of the board.
+        actions: actions of the page.
+        layers: layers of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:

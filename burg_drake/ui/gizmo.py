@@ -125,7 +125,7 @@ class Handle:
         """Distance along the ray through Q to the handle [m]; None if the ray misses it.
 
         Args:
-            camera: of the page.
+            camera: camera of the page.
             p_SQ: (3,) a point on the pointer's ray [m].
         """
         half_width = 0.07 * GIZMO_SIZE  # Metres by which a pointer may miss an arrow or a ring.
@@ -159,7 +159,7 @@ class Handle:
         """(4, 4) motion in S of the dragged objects for a movement of the pointer.
 
         Args:
-            camera: of the page.
+            camera: camera of the page.
             p_SQ, p_SQ_now: (3,) points on the pointer's ray at the start and now [m].
 
         Returns:
@@ -205,7 +205,7 @@ def handle_under(handles: Iterable[Handle], camera: PageCamera, p_SQ: Array) -> 
 
     Args:
         handles: shown handles.
-        camera: of the page.
+        camera: camera of the page.
         p_SQ: (3,) a point on the pointer's ray [m].
     """
     found = [(handle.distance(camera, p_SQ), handle) for handle in handles]
@@ -218,8 +218,8 @@ class _GizmoPart:
     """The arrows or the rings of the gizmo.
 
     Attributes:
-        name: of the node.
-        node: of viser; None until it is first shown.
+        name: name of the node.
+        node: node of viser; None until it is first shown.
         X_SG: (4, 4) shown pose; None while hidden.
     """
 
@@ -233,7 +233,7 @@ class Gizmo:
 
     Args:
         scene: API of viser.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:

@@ -26,11 +26,11 @@ class _PageDrag:
     """A drag with the mouse on one page.
 
     Attributes:
-        drag: of the session.
+        drag: drag of the session.
         p_SM: (3,) centre of turns [m].
         p_SG: (3,) grabbed point [m].
         x: horizontal position of the pointer at the start, 0 to 1 on the page.
-        handle: of the gizmo, if one was grabbed.
+        handle: handle of the gizmo, if one was grabbed.
     """
 
     drag: Drag
@@ -44,7 +44,7 @@ class ObjectDrags:
     """Makes handles in the scene draggable.
 
     Args:
-        actions: of the page.
+        actions: actions of the page.
         gizmo: its handles take precedence over objects.
     """
 
@@ -70,7 +70,7 @@ class ObjectDrags:
         reports a drag with Shift as both.
 
         Args:
-            client_id: of the page.
+            client_id: id of the page.
             corners: (2, 2) lower and upper corner of the rectangle, 0 to 1 on the page.
         """
         place_tolerance = 5e-3  # Share of the page's width and height.
@@ -160,7 +160,7 @@ class Picking:
 
     Args:
         scene: API of viser.
-        actions: of the page.
+        actions: actions of the page.
         drags: tells turns with Shift from selection rectangles.
     """
 

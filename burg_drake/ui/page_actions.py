@@ -27,7 +27,7 @@ class _QueuedAction:
     """A queued action.
 
     Attributes:
-        action: to run.
+        action: action to run.
         who: page that submitted it and is told of errors.
         key: a new action replaces the last queued one if that has the same key.
         due: when it may run if no other action follows [s of the monotonic clock].
@@ -69,7 +69,7 @@ class ActionQueue:
         """Appends an action.
 
         Args:
-            action: to run; its result is dropped.
+            action: action to run; its result is dropped.
             who: page that is told of errors.
             key: the action replaces the last queued one if that has the same key; of a drag, for
                 example, only the last position counts.
@@ -145,13 +145,13 @@ class TypedField:
     """A field for typing.
 
     Args:
-        handle: of viser; it sends the value after each key.
+        handle: handle of viser; it sends the value after each key.
         submit: submits an action; `PageActions.submit`.
         action: called with the typed value.
         after: delay after the last key [s].
 
     Attributes:
-        handle: of viser.
+        handle: handle of viser.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class PageActions:
     """Connects controls of panels with actions on the session, and shows messages.
 
     Args:
-        server: that shows the messages.
+        server: server that shows the messages.
         session: the scene.
 
     Attributes:
@@ -241,7 +241,7 @@ class PageActions:
         """Submits an action for each value that a user sets in a field; returns the field.
 
         Args:
-            field: of viser.
+            field: field of viser.
             action: called with the value.
             key: see `ActionQueue.submit`.
         """

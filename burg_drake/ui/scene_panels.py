@@ -34,7 +34,7 @@ class SummaryPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
         keys: dialog with mouse actions and shortcuts.
     """
 
@@ -86,7 +86,7 @@ def scene_names(folder: Path) -> tuple[str, ...]:
     """Names of the scene files of a folder, without their suffix, in alphabetical order.
 
     Args:
-        folder: that was opened; unreadable files in it are left out.
+        folder: the folder that was opened; unreadable files in it are left out.
     """
     max_files = 500  # Maximum number of files read.
     head_bytes = 4096  # Bytes from the start of a file that are searched for the library.

@@ -58,7 +58,7 @@ class ObjectMeshes:
     """Meshes by object name, loaded when first used.
 
     Args:
-        library: of the objects.
+        library: library of the objects.
     """
 
     def __init__(self, library: ObjectLibrary) -> None:
@@ -167,7 +167,7 @@ class SceneView:
 
     Args:
         scene: API of viser, whose world frame is the scene frame.
-        shapes: of the library's objects.
+        shapes: shapes of the library's objects.
         attach: called with each new handle that can be clicked or dragged, and its instance's
             name.
     """
@@ -312,8 +312,8 @@ class ProposalView:
         """Shows a proposal in the browser.
 
         Args:
-            proposal: of the view; None hides it.
-            shapes: of the library's objects.
+            proposal: proposal of the view; None hides it.
+            shapes: shapes of the library's objects.
         """
         if proposal is self._shown:
             return

@@ -39,7 +39,7 @@ class SetupPage:
         session: the scene.
 
     Attributes:
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:

@@ -69,7 +69,7 @@ class GalleryLayout:
     """The gallery.
 
     Attributes:
-        rows: in the order given.
+        rows: rows in the order given.
         banks: (2, 2) corners (lower, upper) in x and y of each bank's floor [m].
         height: height of the highest item [m].
     """
@@ -98,7 +98,7 @@ def layout_gallery(
     """Places rows in the number of banks that lets the camera come nearest.
 
     Args:
-        rows: at least one.
+        rows: at least one row.
         unit: typical size of an object [m].
         line: height of a line of text [m].
         max_banks: largest number of banks, at least 1.

@@ -358,7 +358,7 @@ def show_objects_for_grasps(
 
     Args:
         library: library of the objects.
-        grasps: at least one.
+        grasps: at least one grasp.
         width: (N,) distance between the fingers of the drawn grasps [m].
         meshcat: Meshcat to draw in; anything below `/drake/library` is replaced.
 

@@ -32,7 +32,7 @@ def rejudge_trials(arguments: argparse.Namespace) -> experiment.Rejudging | None
     """Judges trials again as --rejudge requests; None without that option.
 
     Args:
-        arguments: of `compare`.
+        arguments: parsed arguments of `compare`.
 
     Raises:
         InvalidInputError: there are no trials; see also `rejudge`.

@@ -172,8 +172,8 @@ class _SceneGraspFile:
     `scene_id`.
 
     Attributes:
-        arguments: of the command.
-        station: with the hand.
+        arguments: parsed arguments of the command.
+        station: station with the hand.
         content: hash of the grasps and of the poses that place them.
         correction: applied when reading.
     """

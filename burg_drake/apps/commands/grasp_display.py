@@ -130,9 +130,9 @@ class DisplayedGrasps:
     Attributes:
         grasps: all grasps; with the column `instance` if there is a scene.
         source: objects of the grasps.
-        station: of the hand and the scene.
-        ranking: of the grasps.
-        title: of the page.
+        station: station of the hand and the scene.
+        ranking: ranking of the grasps.
+        title: title of the page.
     """
 
     grasps: core.GraspSet

@@ -26,7 +26,7 @@ def print_reach_tables(
     Args:
         grasps: judged by `reach`.
         asked: requested objects, some of which may have no grasp.
-        motion: of the hand.
+        motion: motion of the hand.
         given: whether the grasps are the user's own.
     """
     outcomes = [core.Outcome(text) for text in grasps.column("outcome").tolist()]

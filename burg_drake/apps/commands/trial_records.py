@@ -42,7 +42,7 @@ def add_show_simulated_option(parser: options.Parser, more: str = "") -> None:
     """Adds the option --show-simulated, for commands whose output operators see.
 
     Args:
-        parser: to add the option to.
+        parser: parser that gets the option.
         more: text after "the simulated outcomes" on what else is hidden.
     """
     parser.add_argument(

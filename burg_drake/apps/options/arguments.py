@@ -225,7 +225,7 @@ def add_measured_board(
     """Adds the option --measured-mm, for commands that print a board or see a printed one.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
     """
     parser.add_argument(
@@ -251,7 +251,7 @@ def add_station(
     """Adds the option --station.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         default: None if the station comes from elsewhere or is optional.
     """
@@ -262,7 +262,7 @@ def add_only(parser: Parser, what: str) -> None:
     """Adds the option --only, which chooses objects.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         what: text before "of this object".
     """
     parser.add_argument(
@@ -304,7 +304,7 @@ def add_workers(
     """Adds the option --workers, for commands with worker processes.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         default: None lets the library choose.
     """
@@ -330,7 +330,7 @@ def add_page_options(parser: Any, network: str) -> None:
     """Adds the options of commands that serve a page.
 
     Args:
-        parser: to add the options to.
+        parser: parser, or group of options, that gets the options.
         network: text after "with 0.0.0.0" on what others in the network can do with the page.
     """
     parser.add_argument(
@@ -352,7 +352,7 @@ def add_intrinsics(
     """Adds the option --intrinsics.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         required: whether the command needs the option.
     """
@@ -365,7 +365,7 @@ def add_live_camera(parser: Any, more: str, default: str | None = None) -> None:
     """Adds --camera, --intrinsics, --fps and --measured-mm, for commands with a live camera.
 
     Args:
-        parser: to add the options to.
+        parser: parser, or group of options, that gets the options.
         more: text after the kinds of cameras in the help.
         default: the camera.
     """
@@ -418,7 +418,7 @@ def add_cluster(group: Any) -> None:
     """Adds the option --cluster.
 
     Args:
-        group: of mutually exclusive options, as the cluster has its own workers.
+        group: group of mutually exclusive options, as the cluster has its own workers.
     """
     group.add_argument(
         "--cluster",
@@ -443,7 +443,7 @@ def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
     """Adds the option --retry-failed.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         what: plural noun for the items that are tried again.
     """
     parser.add_argument(

@@ -27,7 +27,7 @@ def add_sampling_options(parser: Parser, default: int, source_group: Any = None)
     """Adds the options for grasp sampling.
 
     Args:
-        parser: to add the options to.
+        parser: parser that gets the options.
         default: number of grasps for each object.
         source_group: mutually exclusive options for the grasps, such as --grasps; None for none.
     """
@@ -75,7 +75,7 @@ def add_grasp_file_options(parser: Parser, source_group: Any) -> None:
     """Adds the options for grasps from a file.
 
     Args:
-        parser: to add a group of options to.
+        parser: parser that gets a group of options.
         source_group: mutually exclusive options that --grasps belongs to.
     """
     source_group.add_argument(

@@ -165,8 +165,8 @@ class GraspSource:
     """The objects of grasps.
 
     Attributes:
-        library: of the objects.
-        scene: of the objects; None if unknown.
+        library: library of the objects.
+        scene: scene of the objects; None if unknown.
     """
 
     library: ObjectLibrary
@@ -223,9 +223,9 @@ def load_grasp_source(
     """The objects of a grasp file.
 
     Args:
-        arguments: with the options of `add_source_options`.
+        arguments: parsed arguments with the options of `add_source_options`.
         grasps: the grasps; their provenance names the objects if no option does.
-        path: of the file, for messages.
+        path: path of the file, for messages.
 
     Raises:
         InvalidInputError: neither the options nor the file name the objects, or the grasps are far
@@ -267,7 +267,7 @@ class GraspOutput:
 
     Attributes:
         path: file or folder.
-        format: of the file, or of each file in the folder.
+        format: format of the file, or of each file in the folder.
         is_folder: whether `path` is a folder.
     """
 

@@ -22,7 +22,7 @@ def add_settings_options(
     Args:
         parser: or group of options, to add the options to.
         settings: the dataclass.
-        names: of the fields; all declared fields if empty.
+        names: names of the fields; all declared fields if empty.
         unset: whether the value is None if not given, as the default comes from elsewhere; the
             help then shows no default.
         shown_default: default in the help in spite of `unset`.
