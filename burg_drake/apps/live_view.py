@@ -272,8 +272,8 @@ def finish_script(
         actions.snapshot(snapshot, live.picture_of(located, placement))
 
 
-def placement_exit_code(live: LiveSession) -> int:
-    """The exit code of a scripted session; prints why if no frame gave a pose."""
+def report_missing_pose(live: LiveSession) -> int:
+    """Prints why no frame of a scripted session gave a pose; returns 1 then, else 0."""
     if live.counts.valid:
         return 0
     reason = live.counts.reason or live.reader.fault or "no image arrived"

@@ -29,6 +29,7 @@ from burg_drake.core import (
     builtin_names,
     data_root,
     document_text,
+    name_or_reference,
     portable_reference,
     require_name,
     resolve_reference,
@@ -373,8 +374,7 @@ def open_scene_file(path: Path, address: str = "") -> OpenedScene:
 def new_scene(library: str | Path, folder: Path, address: str = "") -> OpenedScene:
     """A new scene with an empty A3 board in landscape, for the objects of a library."""
     loaded = load_library(library)
-    built_in = str(library) in builtin_names("models")
-    reference = str(library) if built_in else portable_reference(loaded.root, folder)
+    reference = name_or_reference(library, "models", loaded.root, folder)
 
     def make_state(name: str) -> State:
         board = Board(size=board_size("A3"))

@@ -40,7 +40,7 @@ from burg_drake.core import (
     UnknownNameError,
     builtin_names,
     list_names,
-    portable_reference,
+    name_or_reference,
     suggest_names,
 )
 from burg_drake.objects import LIBRARY_FILE, ObjectLibrary, load_library
@@ -258,8 +258,7 @@ class ComposeSession(Editor):
             DocumentError: its document does not fit the schema.
         """
         library = load_library(self._library_path(reference))
-        built_in = str(reference) in builtin_names("models")
-        written = str(reference) if built_in else portable_reference(library.root, self.folder)
+        written = name_or_reference(reference, "models", library.root, self.folder)
         return self.do(UseLibrary(library, written))
 
     def _library_path(self, reference: str | Path) -> str | Path:

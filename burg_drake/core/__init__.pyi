@@ -173,6 +173,7 @@ from .paths import (
     is_resolved as is_resolved,
     make_name as make_name,
     may_reference_packages as may_reference_packages,
+    name_or_reference as name_or_reference,
     package_file as package_file,
     portable_reference as portable_reference,
     referenced_files as referenced_files,

@@ -318,7 +318,6 @@ def _load_scenes(references: list[str]) -> list[Scene]:
 def _parse_sample_option(
     arguments: argparse.Namespace, asked: DatasetRecipe, station: Station
 ) -> tuple[ObjectLibrary, int, SceneRecipe]:
-    from burg_drake.apps.commands.scene_sampling import library_reference, station_reference
     from burg_drake.objects import load_library
     from burg_drake.scene import SceneRecipe
 
@@ -330,14 +329,14 @@ def _parse_sample_option(
         )
     library = load_library(name)
     folder = Path(arguments.output) / "scenes"
-    reference = library_reference(name, library, folder)
+    reference = core.name_or_reference(name, "models", library.root, folder)
     sampled = asked.sampled or SceneRecipe(library=reference, seed=asked.seed)
     sampled = replace(
         sampled,
         library=reference,
         count=sampled.count if arguments.objects is None else arguments.objects,
         seed=sampled.seed if arguments.seed is None else arguments.seed,
-        station=station_reference(arguments.station, station, folder),
+        station=core.name_or_reference(arguments.station, "stations", station.path, folder),
     )
     return library, int(count), sampled
 

@@ -104,7 +104,7 @@ class Parser(argparse.ArgumentParser):
     def _required_usage(self) -> str:
         """The command with its positional arguments and required options."""
         formatter = HelpFormatter(self.prog)
-        either = {
+        required_choices = {
             action: " | ".join(
                 f"{other.option_strings[0]} {formatter.value_text(other)}"
                 for other in group._group_actions
@@ -113,19 +113,19 @@ class Parser(argparse.ArgumentParser):
             if group.required
             for action in group._group_actions[:1]
         }
-        words, more = [self.prog.replace("%", "%%")], ""
+        words, optional = [self.prog.replace("%", "%%")], ""
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
                 return f"{words[0]} VERB ..."
             elif not action.option_strings:
                 words.append(formatter.value_text(action))
-            elif action in either:
-                words.append(f"({either[action]})")
+            elif action in required_choices:
+                words.append(f"({required_choices[action]})")
             elif action.required:
                 words.append(f"{action.option_strings[0]} {formatter.value_text(action)}")
             elif action.help is not argparse.SUPPRESS:
-                more = "[options]"
-        words.append(more)
+                optional = "[options]"
+        words.append(optional)
         indent = " " * len(f"usage: {self.prog} ")
         usage = " ".join(filter(None, words))
         return textwrap.fill(usage, formatter.line_width - len("usage: "), subsequent_indent=indent)
@@ -181,11 +181,11 @@ class CommandGroup:
         self._action: Any = parser.add_subparsers(
             metavar="VERB", required=True, help=argparse.SUPPRESS
         )
-        self._list: Any = None
+        self._heading: Any = None
 
-    def heading(self, title: str) -> None:
+    def begin_heading(self, title: str) -> None:
         """Lists the commands that are added next under this title."""
-        self._list = self._parser.add_argument_group(title)
+        self._heading = self._parser.add_argument_group(title)
 
     def add_parser(self, name: str, summary: str) -> Parser:
         """Adds a command.
@@ -195,10 +195,10 @@ class CommandGroup:
             summary: one sentence, without capital and period.
         """
         name_width = 11  # Characters of the column of command names.
-        if self._list is None:
-            self.heading("verbs")
+        if self._heading is None:
+            self.begin_heading("verbs")
         line = f"{name:<{name_width}}  {summary}"
-        self._list.description = "\n".join(filter(None, [self._list.description, line]))
+        self._heading.description = "\n".join(filter(None, [self._heading.description, line]))
         sentence = f"{summary[0].upper()}{summary[1:]}."
         parser: Parser = self._action.add_parser(name, help=summary, description=sentence)
         return parser
