@@ -107,9 +107,9 @@ class Packages:
         near = (near or Path()).resolve()
         for folder in _package_folders(name, near):
             return folder
-        raise UnknownNameError(self._not_found(name, near))
+        raise UnknownNameError(self._not_found_message(name, near))
 
-    def _not_found(self, name: str, near: Path) -> str:
+    def _not_found_message(self, name: str, near: Path) -> str:
         places = [f"{near} and the folders above it"]
         for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
             paths = _folders_in_variable(variable)
