@@ -129,8 +129,8 @@ def tick_line(ticks: Sequence[tuple[float, str]], width: int) -> str:
     (_, first), *inner, (_, last) = ticks
     line = first
     end = width - len(last)
-    for place, text in inner:
-        start = round(place * width - len(text) / 2)
+    for position, text in inner:
+        start = round(position * width - len(text) / 2)
         if start > len(line) and start + len(text) < end:
             line = line.ljust(start) + text
     return line.ljust(max(end, len(line) + 1)) + last

@@ -19,6 +19,7 @@ from burg_drake.compose.scene_checker import (
     find_free_place,
     instance_bounds,
     instance_shadow,
+    library_shapes,
     missing_objects,
     object_bounds,
     object_shadow,
@@ -277,7 +278,7 @@ class RandomConfiguration:
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._object_requests(state, surroundings, rng)
-        shapes, board = surroundings.checker.shapes(state), state.document.board
+        shapes, board = library_shapes(surroundings.checker, state), state.document.board
         covered = sum(min(map(polygon_area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(

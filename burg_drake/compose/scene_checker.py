@@ -170,11 +170,12 @@ class SceneChecker:
             self._check, self._library = SceneCheck(self._station, state.library), state.library
         return self._check
 
-    def shapes(self, state: State) -> ObjectShapes:
-        """The shapes of the objects of a state's library."""
-        if self._shapes is None or self._shapes.library is not state.library:
-            self._shapes = ObjectShapes(state.library)
-        return self._shapes
+
+def library_shapes(checker: SceneChecker, state: State) -> ObjectShapes:
+    """The shapes of a state's library, from the checker's cache."""
+    if checker._shapes is None or checker._shapes.library is not state.library:
+        checker._shapes = ObjectShapes(state.library)
+    return checker._shapes
 
 
 def missing_objects(state: State) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ class SessionView:
         grasps: how many grasps of each instance are clear and reachable, as far as they are
             counted; see `ComposeSession.watch_grasps`.
         grasps_revision: the revision of these counts; while a newer revision is counted, some
-            counts are already of that one.
+            counts already belong to the newer one.
     """
 
     serial: int

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final, Literal
 
 from burg_drake.core.errors import quote_value
-from burg_drake.core.outcomes import Least, Mode, Stage, mode_includes
+from burg_drake.core.outcomes import FirstMode, Mode, Stage, mode_includes
 
 TEXT_UNIT: Final = ""
 """Unit of a column of texts."""
@@ -22,7 +22,7 @@ class Column:
 
     Attributes:
         unit: `TEXT_UNIT`, `DIMENSIONLESS`, or a unit such as m, rad, N, s; `g` is the standard
-            gravity of 9.81 m/s2, and `weights` are those of the object.
+            gravity of 9.81 m/s2, and `weights` are multiples of the object's weight.
         description: what its values are, in which frame.
         own_unit: unit for display and the factor to it, if not the usual one of `unit`.
         title: name for people in a line or the head of a table; the column's name if empty.
@@ -66,9 +66,9 @@ class TableShape:
     joints: int = 0
     approach: bool = False
 
-    def includes(self, least: Least) -> bool:
-        """Whether the table has the columns that `least` is the first mode to determine."""
-        return mode_includes(self.mode, least, approach=self.approach)
+    def includes(self, first: FirstMode) -> bool:
+        """Whether the table has columns whose first mode is `first`."""
+        return mode_includes(self.mode, first, approach=self.approach)
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class VerdictField:
     unit: str
     meaning: str
     name: str = field(default="", kw_only=True)
-    mode: Least = field(default="hand", kw_only=True)
+    mode: FirstMode = field(default="hand", kw_only=True)
     part: VerdictPart = field(default="measured", kw_only=True)
 
     @property
@@ -310,7 +310,7 @@ def margin_field(
     unit: str,
     meaning: str,
     *,
-    mode: Least = "hand",
+    mode: FirstMode = "hand",
     stage: Stage = Stage.EXECUTED,
     smaller_is_better: bool = False,
     **display: Any,

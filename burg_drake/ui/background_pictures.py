@@ -147,7 +147,7 @@ class ReachTask:
 
     Attributes:
         station: station with an arm.
-        board: under the grasps.
+        board: board under the grasps.
         height: height of the grasps above the board [m].
     """
 

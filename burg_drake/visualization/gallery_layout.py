@@ -40,7 +40,7 @@ class GalleryRow:
 
     Attributes:
         label: width of the text at the row's start [m].
-        columns: items in columns, aligned with those of other rows.
+        columns: items in columns, aligned with the columns of other rows.
         rest: items that follow without alignment.
     """
 
@@ -55,7 +55,7 @@ class PlacedGalleryRow:
 
     Attributes:
         p_WL: (3,) left foot of its label [m].
-        p_WI: (3,) origins of its items, those in columns first [m].
+        p_WI: (3,) origins of its items [m]: the items in columns, then the rest.
         captions: (3,) middle of each item's caption's foot [m].
     """
 
