@@ -133,7 +133,7 @@ class ObjectDrags:
         elif x is not None:
             turn = 2.0 * np.pi * (x - page_drag.x)  # a full turn over the width of the page
             X = rotation_about_point(page_drag.p_SM, rot_z(turn), np.zeros(3))
-        elif (p_SP := camera.on_plane(p_SQ, page_drag.p_SG, (0.0, 0.0, 1.0))) is not None:
+        elif (p_SP := camera.intersect_plane(p_SQ, page_drag.p_SG, (0.0, 0.0, 1.0))) is not None:
             X = make_pose(p_AB=p_SP - page_drag.p_SG)
         if X is None:
             return
@@ -217,5 +217,5 @@ class Picking:
 
 def _is_center_within(view: Any, name: str, camera: PageCamera, lower: Any, upper: Any) -> bool:
     """Whether an instance's centre is projected into a rectangle."""
-    seen = camera.on_screen(instance_center(view, name))[0]
+    seen = camera.project(instance_center(view, name))[0]
     return bool((seen >= lower).all() and (seen <= upper).all())

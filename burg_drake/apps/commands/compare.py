@@ -117,7 +117,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
     second, trials = _split_compared_paths(arguments.run_folder, arguments.others)
     if arguments.html is not None:
         core.require_writable(arguments.html)
-    found = experiment.compare(
+    comparison = experiment.compare(
         arguments.run_folder,
         second,
         trials,
@@ -126,32 +126,36 @@ def run_compare(arguments: argparse.Namespace) -> int:
         robustness=arguments.robustness,
         seed=arguments.seed,
     )
-    again = rejudge_trials(arguments)
+    rejudging = rejudge_trials(arguments)
     if arguments.html is not None:
-        more = [] if again is None else [experiment.rejudged_section(again)]
-        page = experiment.comparison_page(found, Path(arguments.html), arguments.command_line, more)
+        additions = [] if rejudging is None else [experiment.rejudged_section(rejudging)]
+        page = experiment.comparison_page(
+            comparison, Path(arguments.html), arguments.command_line, additions
+        )
         core.atomic_write(arguments.html, page)
-    _print_comparison(found, again, arguments)
+    _print_comparison(comparison, rejudging, arguments)
     return 0
 
 
 def _print_comparison(
-    found: experiment.Comparison, again: experiment.Rejudging | None, arguments: argparse.Namespace
+    comparison: experiment.Comparison,
+    rejudging: experiment.Rejudging | None,
+    arguments: argparse.Namespace,
 ) -> None:
     if arguments.json:
-        more = {} if again is None else {"rejudged": experiment.rejudging_json(again)}
-        print(experiment.comparison_json(found, more), end="")
+        additions = {} if rejudging is None else {"rejudged": experiment.rejudging_json(rejudging)}
+        print(experiment.comparison_json(comparison, additions), end="")
         return
     from rich.console import Console
 
     console = Console(markup=False, highlight=False)
-    for part in experiment.comparison_tables(found):
+    for part in experiment.comparison_tables(comparison):
         console.print(part, crop=False)
         if not isinstance(part, str) or not part.startswith(("differs", "note")):
             console.print()
-    if again is not None:
-        experiment.rejudged_view(again).show()
-        print(f"again   {again.path}")
+    if rejudging is not None:
+        experiment.rejudged_view(rejudging).show()
+        print(f"again   {rejudging.path}")
     if arguments.html is not None:
         print(f"page    {arguments.html}")
 
