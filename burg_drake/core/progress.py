@@ -214,20 +214,17 @@ class _LogLines:
         has_forecast = event.remaining is not None and (
             event.left is not None or event.elapsed >= min_elapsed
         )
-        is_new_phase = event.phase != self._phase
-        starting = is_new_phase and event.phase == STARTING_PHASE and event.done < event.total
-        if not (
-            self._any_shown or has_forecast or starting or now - self._start_time >= min_elapsed
+        new_phase = event.phase != self._phase
+        starting = new_phase and event.phase == STARTING_PHASE and event.done < event.total
+        if (
+            not (self._any_shown or has_forecast or starting)
+            and now - self._start_time < min_elapsed
         ):
             return
-        forecast_shown = self._forecast_shown and not is_new_phase
+        forecast_shown = self._forecast_shown and not new_phase
         finished = 0 < event.total == event.done
-        if (
-            is_new_phase
-            or finished
-            or (has_forecast and not forecast_shown)
-            or now - self._last_time >= 30.0
-        ):
+        due = new_phase or finished or now - self._last_time >= 30.0
+        if due or (has_forecast and not forecast_shown):
             self._phase, self._last_time = event.phase, now
             self._any_shown = self._any_shown or not starting
             self._forecast_shown = forecast_shown or has_forecast
