@@ -189,7 +189,7 @@ def build_parser() -> Parser:
     )
     groups = {"": CommandGroup(parser)}
     for title, commands in COMMANDS.items():
-        groups[""].heading(title)
+        groups[""].begin_heading(title)
         for command in commands:
             group, _, name = command.words.rpartition(" ")
             command_parser = groups[group].add_parser(name, command.summary)
@@ -248,8 +248,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_command(arguments: argparse.Namespace) -> int:
-    """Runs a command. Raises `KeyboardInterrupt` in place of any exception that it has caused.
-    For resumable commands SIGTERM, which batch systems send, is an interrupt, too."""
+    """Runs a command. Raises `KeyboardInterrupt` in place of an exception that an interrupt has
+    caused. Resumable commands treat SIGTERM, which batch systems send, as an interrupt, too."""
     is_resumable = hasattr(arguments, "after_interrupt")
     try:
         with sigterm_as_interrupt() if is_resumable else contextlib.nullcontext():
@@ -270,8 +270,8 @@ def _describe_error(
 ) -> str | None:
     """The message of an error that a user can fix, with the options concerned; else None."""
     if isinstance(error, BurgError):
-        names = (OPTION_DESTINATIONS.get(name, (name,)) for name in error.arguments)
-        flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
+        names = [n for name in error.arguments for n in OPTION_DESTINATIONS.get(name, (name,))]
+        flags = [arguments.flags[name] for name in names if name in arguments.flags]
         return f"{error} ({', '.join(flags)})" if flags else str(error)
     if isinstance(error, MemoryError):
         return f"there is not enough memory for this input. {error}"

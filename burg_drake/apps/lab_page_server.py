@@ -52,7 +52,7 @@ def parse_lab_entry(body: dict[str, Any], plan: str) -> LabEntry:
 
     Args:
         body: JSON object of the request.
-        plan: of the served trials file.
+        plan: plan of the served trials file.
 
     Raises:
         RequestError: a field is unknown, missing or invalid, or the plan is another one.
@@ -162,12 +162,12 @@ class LabServer(PageServer):
 
     Args:
         lab: the trials.
-        pictures: of the trials.
-        camera: over the board, if there is one.
+        pictures: pictures of the trials.
+        camera: camera over the board, if there is one.
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `first_port` on if None, any if 0.
-        secret: for the cookies of browsers on other machines, so that they stay valid after a
-            restart; a new one if None.
+        port: port to listen on; the first free one from `first_port` on if None, any if 0.
+        secret: secret for the cookies of browsers on other machines, so that the cookies stay valid
+            after a restart; a new one if None.
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.

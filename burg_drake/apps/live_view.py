@@ -43,7 +43,7 @@ def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> d
 
     Args:
         live: the session.
-        actions: on the session.
+        actions: actions on the session.
         after: number of the last event that is left out.
 
     Returns:
@@ -152,9 +152,9 @@ class ViewServer(PageServer):
 
     Args:
         live: the session.
-        actions: on the session.
+        actions: actions on the session.
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from `first_port` on if None, any if 0.
+        port: port to listen on; the first free one from `first_port` on if None, any if 0.
         connections: maximum number served at a time.
 
     Raises:
@@ -246,7 +246,7 @@ def finish_script(
 
     Args:
         live: the session, closed.
-        actions: on the session.
+        actions: actions on the session.
         check: whether to measure the placement errors of objects.
         snapshot: folder for a snapshot; None for no snapshot.
     """
@@ -272,8 +272,8 @@ def finish_script(
         actions.snapshot(snapshot, live.picture_of(located, placement))
 
 
-def placement_exit_code(live: LiveSession) -> int:
-    """The exit code of a scripted session; prints why if no frame gave a pose."""
+def report_missing_pose(live: LiveSession) -> int:
+    """Prints why no frame of a scripted session gave a pose; returns 1 then, else 0."""
     if live.counts.valid:
         return 0
     reason = live.counts.reason or live.reader.fault or "no image arrived"

@@ -66,7 +66,7 @@ def file_routes(folder: str, pages: Mapping[str, tuple[str, str]]) -> list[Route
     """The routes of the files of a page.
 
     Args:
-        folder: of the files, in `burg_drake.apps`.
+        folder: folder of the files, in `burg_drake.apps`.
         pages: file name and content type by path.
     """
 
@@ -250,18 +250,18 @@ class PageServer:
     """Serves a page in its own thread until it is closed.
 
     Args:
-        routes: of the page.
+        routes: routes of the page.
         host: address to listen on.
-        port: to listen on; the first free one from `first_port` on if None, any if 0.
+        port: port to listen on; the first free one from `first_port` on if None, any if 0.
         connections: maximum number served at a time; half as many, but at least six, for one
             address of another machine. If all are admitted, further ones get status 503.
 
     Attributes:
         first_port: the first port that is tried.
-        title: of the page, for messages.
+        title: title of the page, for messages.
         policy: the Content-Security-Policy of every answer.
         refused_code: status of the answer if an action raises a `BurgError`.
-        host: as given.
+        host: address to listen on, as given.
         server_address: address and port that it listens on.
 
     Raises:

@@ -44,7 +44,7 @@ def show_progress(
 
     Args:
         phase: name of the job, such as `sampling`.
-        unit: of the counted things.
+        unit: noun of the counted things.
         total: their number; 0 if unknown.
         quiet: show nothing.
     """
@@ -129,8 +129,8 @@ def tick_line(ticks: Sequence[tuple[float, str]], width: int) -> str:
     (_, first), *inner, (_, last) = ticks
     line = first
     end = width - len(last)
-    for place, text in inner:
-        start = round(place * width - len(text) / 2)
+    for position, text in inner:
+        start = round(position * width - len(text) / 2)
         if start > len(line) and start + len(text) < end:
             line = line.ljust(start) + text
     return line.ljust(max(end, len(line) + 1)) + last
@@ -168,11 +168,11 @@ def present_view(
 
     Args:
         meshcat: the view.
-        arguments: of `add_view_options`.
-        title: of the page.
+        arguments: parsed options of `add_view_options`.
+        title: title of the page.
         caption: lines of the page.
-        legend: of the page.
-        controls: of the page; the live view has a slider of Meshcat instead.
+        legend: legend of the page.
+        controls: controls of the page; the live view has a slider of Meshcat instead.
     """
     if arguments.html is not None:
         visualization.save_html(

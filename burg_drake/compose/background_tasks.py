@@ -42,7 +42,7 @@ class BackgroundJob(Generic[T]):
 
     Attributes:
         progress: share that is done, in [0, 1], and a short text.
-        partial: partial result of the latest report; None if the task reports none.
+        partial: partial result in the latest report; None if it has none.
         cancelled: whether the job was cancelled.
         done: whether the job has a result or an error, or was cancelled.
         error: why there is no result; None if there is one, or the job is not done.
@@ -95,8 +95,8 @@ class BackgroundJob(Generic[T]):
     def report(self, message: tuple[float, str, Any]) -> None:
         """Takes a report of the worker: share done, short text, partial result."""
         if not self.cancelled:
-            share, word, self.partial = message
-            self.progress = (share, word)
+            share, text, self.partial = message
+            self.progress = (share, text)
             self._on_change(self)
 
     def finish(self, result: T | BurgError) -> None:
@@ -116,7 +116,7 @@ class BackgroundWorker:
     def __init__(self) -> None:
         self._pool = WorkerPool(1, retries=0)
         self._lock = threading.Lock()
-        self._newest: BackgroundJob[Any] | None = None
+        self._current_job: BackgroundJob[Any] | None = None
 
     @property
     def process(self) -> int | None:
@@ -131,13 +131,13 @@ class BackgroundWorker:
         """Submits a task; cancels the previous job if it is not done.
 
         Args:
-            task: to run.
+            task: task to run.
             on_change: called with the job when it reports progress or is done, in a thread of the
                 worker.
         """
         job = BackgroundJob(self.cancel, on_change)
         with self._lock:
-            older, self._newest = self._newest, job
+            older, self._current_job = self._current_job, job
             try:
                 job._future = self._pool.submit_task(
                     Task(run_task_in_worker, (task,), on_progress=job.report)
@@ -166,16 +166,16 @@ class BackgroundWorker:
     def close(self) -> None:
         """Ends the process."""
         with self._lock:
-            if self._newest is not None:
-                self._newest.cancelled = True
+            if self._current_job is not None:
+                self._current_job.cancelled = True
         self._pool.kill_workers(5.0)  # seconds until the process is killed
 
 
 def run_task_in_worker(task: BackgroundTask[T]) -> T:
     """Runs a task in a worker; turns a `SystemExit` into a `SimulationError`."""
 
-    def report(share: float, word: str, partial: Any = None) -> None:
-        report_progress((share, word, partial))
+    def report(share: float, text: str, partial: Any = None) -> None:
+        report_progress((share, text, partial))
 
     try:
         return task(report)
@@ -228,8 +228,8 @@ class SettlingTask:
     """Settles a scene in a worker process.
 
     Attributes:
-        scene: to settle.
-        station: of the scene.
+        scene: scene to settle.
+        station: station of the scene.
         time_limit: simulated time allowed [s].
     """
 
@@ -282,9 +282,9 @@ class GraspCountTask:
     """Counts the grasps of a scene in a worker process.
 
     Attributes:
-        scene: whose grasps are counted.
-        station: of the scene.
-        names: of instances, in the order of counting.
+        scene: scene whose grasps are counted.
+        station: station of the scene.
+        names: names of instances, in the order of counting.
         grasps_per_object: grasps that are sampled for each object.
     """
 
@@ -314,7 +314,7 @@ class GraspWatch:
     """Counts the grasps of the latest scene passed to `update`.
 
     Args:
-        station: of the scenes.
+        station: station of the scenes.
         grasps_per_object: grasps that are sampled for each object.
         on_change: called with the counting job and the revision of its scene when the job reports
             progress or is done, in a thread of the worker.
@@ -330,7 +330,7 @@ class GraspWatch:
         self._on_change = on_change
         self._worker = BackgroundWorker()
         self._timer: threading.Timer | None = None
-        self._newest = -1
+        self._latest_revision = -1
 
     def update(self, scene: Scene, revision: int, first: tuple[str, ...]) -> None:
         """Starts counting for a changed scene, unless this revision was passed before.
@@ -340,9 +340,9 @@ class GraspWatch:
             revision: its number.
             first: instances that are counted first.
         """
-        if revision == self._newest:
+        if revision == self._latest_revision:
             return
-        self._newest = revision
+        self._latest_revision = revision
         if self._timer is not None:
             self._timer.cancel()
         names = tuple(sorted(scene.instances, key=lambda name: name not in first))
@@ -354,11 +354,11 @@ class GraspWatch:
 
     def close(self) -> None:
         """Stops counting, and ends the worker."""
-        self._newest = -1
+        self._latest_revision = -1
         if self._timer is not None:
             self._timer.cancel()
         self._worker.close()
 
     def _count(self, task: GraspCountTask, revision: int) -> None:
-        if revision == self._newest:
+        if revision == self._latest_revision:
             self._worker.submit(task, lambda job: self._on_change(job, revision))

@@ -149,7 +149,7 @@ class UseLibrary:
 
     Attributes:
         library: must have all objects of the scene.
-        reference: to the library, in the scene's document.
+        reference: reference to the library, in the scene's document.
     """
 
     library: ObjectLibrary

@@ -43,9 +43,9 @@ class Drag:
         self._session = session
         self._start = {name: start.X_SO(name) for name in names}
         self._move = MoveObjects(self._start)
-        self._asked = self._checked = 0
-        self._newest = threading.Lock()
-        self._checking = threading.Lock()
+        self._last_requested = self._last_checked = 0
+        self._move_lock = threading.Lock()
+        self._check_lock = threading.Lock()
 
     @property
     def is_over(self) -> bool:
@@ -70,15 +70,15 @@ class Drag:
                 raise InvalidInputError(
                     f"{name!r} is not part of this drag; start a drag that includes it"
                 )
-        with self._newest:
+        with self._move_lock:
             self._move = MoveObjects({**self._move.X_SO, **X_SO}, changes_height)
-            self._asked += 1
-            number = self._asked
-        with self._checking:
-            with self._newest:
-                if number <= self._checked:  # newer poses were checked while this call waited
+            self._last_requested += 1
+            number = self._last_requested
+        with self._check_lock:
+            with self._move_lock:
+                if number <= self._last_checked:  # newer poses were checked while this call waited
                     return self._session.view
-                self._checked, move = self._asked, self._move
+                self._last_checked, move = self._last_requested, self._move
             session = self._session
             with session._exclusive():
                 self._require_current()
@@ -133,7 +133,7 @@ class Editor:
 
     Args:
         opened: the scene.
-        station: of the scene.
+        station: station of the scene.
     """
 
     def __init__(self, opened: OpenedScene, station: StationLike) -> None:
@@ -184,9 +184,9 @@ class Editor:
         """Applies a command and adds a step to the history, unless it changes nothing.
 
         Args:
-            command: to apply.
-            field: that the user is typing in. The step replaces the last one if that is of the
-                same field and recent, and nothing was selected since.
+            command: command to apply.
+            field: name of the field that the user types in. The step replaces the last step if
+                that is recent and of the same field, and nothing was selected since.
 
         Raises:
             BurgError: the command cannot be applied; its one-line message says why.

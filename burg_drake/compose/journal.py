@@ -39,7 +39,7 @@ class JournalWriter:
         self._head = ""
         self._library = ""
 
-    def begin(self, origin: str) -> str:
+    def first_line(self, origin: str) -> str:
         """The first line.
 
         Args:
@@ -47,30 +47,30 @@ class JournalWriter:
         """
         return _json_line({"journal": JOURNAL_VERSION, "origin": origin})
 
-    def step(self, step: HistoryStep, position: int) -> str:
+    def step_line(self, step: HistoryStep, position: int) -> str:
         """The line for a new step, with its number in the history."""
         values: dict[str, Any] = {"step": step.label, "at": position}
         values["selection"] = list(step.state.selection)
         library = str(step.state.library.root)
         if library != self._library:
             values["library"] = self._library = library
-        return _json_line(values | self._document(step.state.document))
+        return _json_line(values | self._document_values(step.state.document))
 
-    def position(self, position: int) -> str:
+    def position_line(self, position: int) -> str:
         """The line for the session's position in the history."""
         return _json_line({"at": position})
 
-    def saved(self, document: SceneDocument | None, known: str | None) -> str:
+    def saved_line(self, document: SceneDocument | None, known: str | None) -> str:
         """The line for the content of the scene's file.
 
         Args:
             document: the scene in the file; None if there is no file.
             known: fingerprint of the file.
         """
-        values = {} if document is None else self._document(document)
+        values = {} if document is None else self._document_values(document)
         return _json_line({"saved": document is not None, "known": known} | values)
 
-    def _document(self, document: SceneDocument) -> dict[str, Any]:
+    def _document_values(self, document: SceneDocument) -> dict[str, Any]:
         values: dict[str, Any] = {}
         head = dump_document(replace(document, instances=(), background=()))
         if head != self._head:
@@ -93,7 +93,7 @@ class RecoveredSession:
     """The content of a journal.
 
     Attributes:
-        history: of the session.
+        history: history of the session.
         saved: scene in the scene's file; None if there was no file.
         known: fingerprint of that file.
         origin: reference that the session was opened with; empty for a scene file.
@@ -111,7 +111,7 @@ class JournalReader:
     """Reads the lines of one journal, in their order.
 
     Args:
-        libraries: by their folders.
+        libraries: libraries by folder.
 
     Attributes:
         session: the content read so far.
@@ -155,7 +155,7 @@ class JournalReader:
         elif "at" in values:
             self._go_to(_read_integer(values["at"]))
         elif "saved" in values:
-            saved = self._document(values) if values["saved"] else None
+            saved = self._read_document(values) if values["saved"] else None
             known = values["known"]
             if not isinstance(known, str | None):
                 raise TypeError("known")
@@ -167,9 +167,9 @@ class JournalReader:
         library = self._libraries[values["library"]] if "library" in values else self._library
         if library is None:
             raise ValueError("no library")
-        state = State(self._document(values), library)
-        label, there = _read_text(values["step"]), state.instances
-        state = state.select(name for name in values["selection"] if name in there)
+        state = State(self._read_document(values), library)
+        label, placed = _read_text(values["step"]), state.instances
+        state = state.select(name for name in values["selection"] if name in placed)
         history = self.session.history
         last = self._positions[history.position] if history else -1
         position = _read_integer(values.get("at", last + 1))
@@ -191,7 +191,7 @@ class JournalReader:
             raise ValueError(f"no step {position}")
         history.position = sum(known <= position for known in self._positions) - 1
 
-    def _document(self, values: dict[str, Any]) -> SceneDocument:
+    def _read_document(self, values: dict[str, Any]) -> SceneDocument:
         head = self._head
         if "head" in values:
             head = parse_document(values["head"], SceneDocument, "journal")
@@ -204,8 +204,8 @@ class JournalReader:
         instances = self._instances | new
         document = replace(
             head,
-            instances=self._instances_of(values["instances"], instances),
-            background=self._instances_of(values.get("background", []), instances),
+            instances=self._select_instances(values["instances"], instances),
+            background=self._select_instances(values.get("background", []), instances),
         )
         placed = (*document.instances, *document.background)
         if len({instance_name(instance) for instance in placed}) < len(placed):
@@ -225,7 +225,7 @@ class JournalReader:
                 self._whole_line = False
         return found
 
-    def _instances_of(
+    def _select_instances(
         self, numbers: list[Any], instances: dict[int, Instance]
     ) -> tuple[Instance, ...]:
         """The instances of these numbers; unreadable ones are left out."""

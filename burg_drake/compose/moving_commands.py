@@ -123,7 +123,7 @@ class SnapToGrid(InstancesCommand):
 
     Attributes:
         names: instances.
-        spacing: of the grid, which starts at the board's corner [m].
+        spacing: spacing of the grid, which starts at the board's corner [m].
     """
 
     verb = "snap to grid"
@@ -146,9 +146,9 @@ def pose_on_board(
 
     Args:
         X_SO: (4, 4) stable pose as in a library, with the centre of mass above the origin.
-        position: of the centre of mass in the scene [m].
+        position: position of the centre of mass in the scene [m].
         yaw: rotation about the vertical [rad].
-        height: of the support above the board [m].
+        height: height of the support above the board [m].
     """
     return make_pose(rot_z(yaw), (*position, height)) @ X_SO
 
@@ -198,7 +198,7 @@ class Align(InstancesCommand):
 
     Attributes:
         names: instances, two or more.
-        edge: of the footprints; all are aligned with that of the outermost object.
+        edge: edge of the footprints; all are aligned with that of the outermost object.
     """
 
     edge: Edge

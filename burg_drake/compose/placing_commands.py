@@ -127,9 +127,9 @@ class Duplicate(InstancesCommand):
     """Puts copies of instances beside them.
 
     Attributes:
-        names: of the instances to copy; several keep their relative poses.
-        offset: from each instance to its copy along x and y [m]; if None, the shortest one with
-            all copies on the board and free, else to the right of all objects.
+        names: names of the instances to copy; several keep their relative poses.
+        offset: offset from each instance to its copy along x and y [m]; if None, the shortest
+            offset with all copies on the board and free, else to the right of all objects.
     """
 
     verb = "duplicate"

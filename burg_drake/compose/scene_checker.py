@@ -111,7 +111,7 @@ class SceneChecker:
     """Checks states on one station; to be used by one thread at a time.
 
     Args:
-        station: of the scenes.
+        station: station of the scenes.
     """
 
     def __init__(self, station: StationLike) -> None:
@@ -127,7 +127,7 @@ class SceneChecker:
 
         Args:
             state: scene and library.
-            path: of the scene's file, for messages.
+            path: path of the scene's file, for messages.
 
         Raises:
             BurgError: the scene cannot be checked, for example as an object's file is missing.
@@ -144,7 +144,7 @@ class SceneChecker:
 
         Args:
             state: scene, library and selection.
-            path: of the scene's file, for messages.
+            path: path of the scene's file, for messages.
 
         Raises:
             BurgError: see `issues`.
@@ -212,9 +212,9 @@ class Surroundings:
     """The context in which a command is applied.
 
     Attributes:
-        station: of the scene.
+        station: station of the scene.
         planar: whether moved objects keep their tilt, and their height unless they are raised.
-        path: of the scene's file, for messages.
+        path: path of the scene's file, for messages.
         checker: finds contacts and free places.
     """
 
@@ -249,7 +249,7 @@ def find_free_place(
 
     Args:
         polygon: (N, 2) footprint of the object, with its centre of mass above the origin [m].
-        state: with the objects that are on the board.
+        state: state with the objects that are on the board.
         obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:
@@ -271,7 +271,7 @@ def find_free_offset(
 
     Args:
         polygons: (N, 2) footprint of each object now [m].
-        state: with the objects that are on the board.
+        state: state with the objects that are on the board.
         obstacles: (N, 2) convex footprints of other obstacles [m].
 
     Returns:

@@ -29,6 +29,7 @@ from burg_drake.core import (
     builtin_names,
     data_root,
     document_text,
+    name_or_reference,
     portable_reference,
     require_name,
     resolve_reference,
@@ -66,7 +67,7 @@ def scene_path(name: str, folder: Path) -> Path:
 
     Args:
         name: `breakfast` or `breakfast.yaml`.
-        folder: that was opened.
+        folder: the folder that was opened.
 
     Raises:
         FieldError: the name is invalid: it leads out of the folder, or gives a hidden file.
@@ -128,7 +129,7 @@ class SceneInUse(InvalidInputError):
     """A scene is open in another session.
 
     Attributes:
-        address: of the other session's page; empty if unknown.
+        address: address of the other session's page; empty if unknown.
     """
 
     def __init__(self, message: str, address: str) -> None:
@@ -147,7 +148,7 @@ class SceneLock:
 
         Args:
             scene: the scene's file, which need not exist.
-            address: of the session's page.
+            address: address of the session's page.
 
         Raises:
             SceneInUse: another session holds the lock.
@@ -200,8 +201,8 @@ class SceneStorage:
     """The files of one scene.
 
     Attributes:
-        place: path of the scene's file, whether or not the file exists.
-        path: the scene's file; None if it has none.
+        place: path for the scene's file, which may not exist yet.
+        path: path of the existing file; None if the scene was never saved.
         known: expected `file_fingerprint` of the file.
         saved: the scene in the file.
         problem: why the last steps are not in the journal; None if they are.
@@ -229,18 +230,21 @@ class SceneStorage:
     def record_step(self, history: History) -> None:
         """Writes the newest step of the history to the journal."""
         position = history.position
-        self._append(lambda journal: journal.step(history.steps[position], position), history)
+        self._append(lambda journal: journal.step_line(history.steps[position], position), history)
 
     def record_position(self, history: History) -> None:
         """Writes the position in the history to the journal."""
-        self._append(lambda journal: journal.position(history.position), history)
+        self._append(lambda journal: journal.position_line(history.position), history)
 
     def record_all(self, history: History) -> None:
         """Writes the whole journal again, for another history."""
         journal = JournalWriter()
-        lines = [journal.begin(self._origin)]
-        lines += [journal.step(step, position) for position, step in enumerate(history.steps)]
-        lines += [journal.position(history.position), journal.saved(self.saved, self.known)]
+        lines = [journal.first_line(self._origin)]
+        lines += [journal.step_line(step, position) for position, step in enumerate(history.steps)]
+        lines += [
+            journal.position_line(history.position),
+            journal.saved_line(self.saved, self.known),
+        ]
         try:
             atomic_write(journal_path(self.place), "".join(lines))
         except InvalidInputError as error:
@@ -248,14 +252,14 @@ class SceneStorage:
         else:
             self._journal, self.problem = journal, None
 
-    def _append(self, line: Callable[[JournalWriter], str], history: History) -> None:
+    def _append(self, make_line: Callable[[JournalWriter], str], history: History) -> None:
         """Adds a line to the journal. After an error, the next call writes the whole journal."""
         if self._journal is None:
             self.record_all(history)
             return
         path = journal_path(self.place)
         try:
-            append_line(path, line(self._journal).encode())
+            append_line(path, make_line(self._journal).encode())
         except OSError as error:
             self._journal = None
             self.problem = f"cannot write {path}: {error.strerror or error}"
@@ -309,9 +313,9 @@ class OpenedScene:
     """An opened scene.
 
     Attributes:
-        history: with the scene's state, and the earlier steps of a recovered session.
+        history: history with the scene's state, and the earlier steps of a recovered session.
         storage: files of the scene.
-        notices: for the user, one line each.
+        notices: texts for the user, one line each.
     """
 
     history: History
@@ -370,28 +374,27 @@ def open_scene_file(path: Path, address: str = "") -> OpenedScene:
 def new_scene(library: str | Path, folder: Path, address: str = "") -> OpenedScene:
     """A new scene with an empty A3 board in landscape, for the objects of a library."""
     loaded = load_library(library)
-    built_in = str(library) in builtin_names("models")
-    reference = str(library) if built_in else portable_reference(loaded.root, folder)
+    reference = name_or_reference(library, "models", loaded.root, folder)
 
-    def make(name: str) -> State:
+    def make_state(name: str) -> State:
         board = Board(size=board_size("A3"))
         return State(SceneDocument(name=name, library=reference, board=board), loaded)
 
-    return _open_unsaved_scene("new_scene", make, folder, reference, address)
+    return _open_unsaved_scene("new_scene", make_state, folder, reference, address)
 
 
 def _open_built_in_scene(path: Path, folder: Path, address: str) -> OpenedScene:
     """A new scene that starts as a copy of a built-in one."""
     scene = load_scene(path)
 
-    def make(name: str) -> State:
+    def make_state(name: str) -> State:
         return State(replace(scene.document, name=name), scene.library)
 
-    return _open_unsaved_scene(scene.name, make, folder, f"scene {path.stem}", address)
+    return _open_unsaved_scene(scene.name, make_state, folder, f"scene {path.stem}", address)
 
 
 def _open_unsaved_scene(
-    name: str, make: Callable[[str], State], folder: Path, origin: str, address: str
+    name: str, make_state: Callable[[str], State], folder: Path, origin: str, address: str
 ) -> OpenedScene:
     """A scene without a file, under the first unused name of `name`, `name_2` and so on.
 
@@ -408,7 +411,7 @@ def _open_unsaved_scene(
             continue
         try:
             found = recover_journal(journal_path(place))
-            first = make(place.stem)
+            first = make_state(place.stem)
             if found is None or found.history is None:
                 notices += _set_damaged_aside(found, place)
                 return OpenedScene(

@@ -40,7 +40,7 @@ from burg_drake.core import (
     UnknownNameError,
     builtin_names,
     list_names,
-    portable_reference,
+    name_or_reference,
     suggest_names,
 )
 from burg_drake.objects import LIBRARY_FILE, ObjectLibrary, load_library
@@ -86,7 +86,7 @@ class ComposeSession(Editor):
     with its history.
 
     Attributes:
-        station: of the scene.
+        station: station of the scene.
         folder: the only folder that scenes are saved to and loaded from.
     """
 
@@ -95,7 +95,7 @@ class ComposeSession(Editor):
     ) -> None:
         self.folder = folder
         self._address = address
-        self._library_seen: tuple[Path, object] | None = None
+        self._seen_library: tuple[Path, object] | None = None
         self._seen_fingerprint: str | None = opened.storage.known
         self._settler = BackgroundWorker()
         self._settling: BackgroundJob[SettlingProposal] | None = None
@@ -119,11 +119,11 @@ class ComposeSession(Editor):
         Unsaved changes of a killed session are recovered, with a notice.
 
         Args:
-            reference: of a scene (path or built-in name) or a library (folder or built-in name). A
+            reference: a scene (path or built-in name) or a library (folder or built-in name). A
                 built-in scene is copied to a new one, which has no file until it is saved.
-            station: of the scene.
-            folder: for scenes; that of the scene's file, or the working directory, if None.
-            address: of the page, for others who try to open the scene; see `announce`.
+            station: station of the scene.
+            folder: folder for scenes; that of the scene's file, or the working directory, if None.
+            address: address of the page, for others who try to open the scene; see `announce`.
 
         Raises:
             SceneInUse: the scene is open in another session; the error has its address.
@@ -181,7 +181,7 @@ class ComposeSession(Editor):
         another scene starts a new history.
 
         Args:
-            name: of the file; None for the scene's own file.
+            name: name of the file; None for the scene's own file.
             discard: discard unsaved changes.
 
         Raises:
@@ -258,8 +258,7 @@ class ComposeSession(Editor):
             DocumentError: its document does not fit the schema.
         """
         library = load_library(self._library_path(reference))
-        built_in = str(reference) in builtin_names("models")
-        written = str(reference) if built_in else portable_reference(library.root, self.folder)
+        written = name_or_reference(reference, "models", library.root, self.folder)
         return self.do(UseLibrary(library, written))
 
     def _library_path(self, reference: str | Path) -> str | Path:
@@ -305,7 +304,7 @@ class ComposeSession(Editor):
         """Accepts a settling proposal; adds a step.
 
         Args:
-            proposal: that of the view if None.
+            proposal: the proposal to accept; that of the view if None.
 
         Raises:
             InvalidInputError: there is no proposal, or the scene has changed since then.
@@ -364,8 +363,8 @@ class ComposeSession(Editor):
     def _update_surroundings(self) -> None:
         self._check_scene_file()
         library = self._history.state.library
-        seen, self._library_seen = self._library_seen, (library.root, _library_stamp(library.root))
-        if seen is None or seen[0] != library.root or seen == self._library_seen:
+        seen, self._seen_library = self._seen_library, (library.root, _library_stamp(library.root))
+        if seen is None or seen[0] != library.root or seen == self._seen_library:
             return
         try:
             changed = load_library(library.root)
@@ -432,8 +431,8 @@ class ComposeSession(Editor):
             self._grasp_watch.update(scene, self._revision, self._state.selection)
         working = None
         if self._settling is not None:
-            share, word = self._settling.progress
-            working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
+            share, text = self._settling.progress
+            working = f"settling: {text}" if share == 0.0 else f"settling: {share:.0%}, {text}"
         grasps, revision = self._grasps
         return replace(
             view, working=working, proposal=self._proposal, grasps=grasps, grasps_revision=revision

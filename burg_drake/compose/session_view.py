@@ -41,23 +41,23 @@ class SessionView:
         serial: increases with every view of a session; of two views, the larger is newer.
         revision: increases with every change of the scene, once at the end of a drag.
         state: the scene, its library and the selection, with the current poses of a drag.
-        issues: of the scene.
-        status: of every instance, the worst first; background is `ok` unless something is in it.
-        undo_label: of the step that undo takes back; None if there is none.
-        redo_label: of the step that redo takes again; None if there is none.
+        issues: issues of the scene.
+        status: worst status of every instance; background is `ok` unless something is in it.
+        undo_label: label of the step that undo takes back; None if there is none.
+        redo_label: label of the step that redo takes again; None if there is none.
         saved: whether the file holds the current scene.
         changed: whether there are unsaved changes.
         path: the file; None if the scene was never saved.
         planar: whether moved objects keep their tilt, and their height unless they are raised.
         gaps: heights of selected instances above the surface below, if they do not touch it [m].
         dragging: instances that are being dragged.
-        notices: for the user, one line each, until `ComposeSession.dismiss`.
+        notices: texts for the user, one line each, until `ComposeSession.dismiss`.
         working: progress of settling, as text; None if no settling runs.
         proposal: result of settling, to be accepted or reverted.
         grasps: how many grasps of each instance are clear and reachable, as far as they are
             counted; see `ComposeSession.watch_grasps`.
         grasps_revision: the revision of these counts; while a newer revision is counted, some
-            counts are already of that one.
+            counts already belong to the newer one.
     """
 
     serial: int
@@ -110,8 +110,8 @@ def instance_statuses(
     """The worst status of each instance; both instances of an overlap are in collision.
 
     Args:
-        state: with the instances.
-        issues: of the scene; None if the scene cannot be checked.
+        state: state with the instances.
+        issues: issues of the scene; None if the scene cannot be checked.
     """
     worst_first = ("collision", "in_ground", "out_of_bounds", "hovering", "sunken", "ok")
     if issues is None:

@@ -146,7 +146,7 @@ class HistoryStep:
     """A state, and the label of the command that led to it.
 
     Attributes:
-        label: of the command.
+        label: label of the command.
         state: after the command.
     """
 

@@ -143,6 +143,7 @@ from .grasp_set import (
 )
 from .number_text import (
     MISSING_NUMBER as MISSING_NUMBER,
+    NO_VALUE as NO_VALUE,
     count_with_noun as count_with_noun,
     format_count as format_count,
     format_duration as format_duration,
@@ -173,6 +174,7 @@ from .paths import (
     is_resolved as is_resolved,
     make_name as make_name,
     may_reference_packages as may_reference_packages,
+    name_or_reference as name_or_reference,
     package_file as package_file,
     portable_reference as portable_reference,
     referenced_files as referenced_files,

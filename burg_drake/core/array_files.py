@@ -82,7 +82,7 @@ class StoredArray:
         type: its type, for messages.
         itemsize: bytes of memory per value; 0 if unknown before reading.
         load: reads the data.
-        allowance: memory budget of the file.
+        budget: memory budget of the file.
     """
 
     where: str
@@ -91,7 +91,7 @@ class StoredArray:
     type: str
     itemsize: int
     load: Callable[[], NDArray[Any]]
-    allowance: ReadBudget
+    budget: ReadBudget
 
     def read(self, kinds: str, *shapes: ArrayShape) -> NDArray[Any]:
         """Reads the data, after checking its type and shape.
@@ -117,7 +117,7 @@ class StoredArray:
         if shapes and self.shape not in shapes:
             expected = " or ".join(map(str, shapes))
             raise InvalidInputError(f"{self.where} has shape {self.shape}; expected {expected}")
-        self.allowance.take(self.where, self.itemsize * math.prod(self.shape))
+        self.budget.take(self.where, self.itemsize * math.prod(self.shape))
         return self.load()
 
     def require_rows(self, *shape: int) -> int:
@@ -147,13 +147,13 @@ def require_grasp_count(where: str, n: int) -> None:
         )
 
 
-def text_array(where: str, texts: list[str], allowance: ReadBudget) -> NDArray[np.str_]:
+def text_array(where: str, texts: list[str], budget: ReadBudget) -> NDArray[np.str_]:
     """Converts texts to an array (N,), in which each takes the memory of the longest one.
 
     Raises:
         InvalidInputError: they take too much memory.
     """
-    allowance.require(where, 4 * len(texts) * max(map(len, texts), default=0))
+    budget.require(where, 4 * len(texts) * max(map(len, texts), default=0))
     return np.array(texts, dtype=str)
 
 
@@ -177,7 +177,7 @@ class NpzFile:
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.path = path
         self._archive = archive
-        self._allowance = ReadBudget(path)
+        self._budget = ReadBudget(path)
         self.names = [
             name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")
         ]
@@ -207,8 +207,8 @@ class NpzFile:
             with self._archive.open(info) as stream:
                 return np.lib.format.read_array(stream, allow_pickle=False)
 
-        allowance = self._allowance
-        return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)
+        budget = self._budget
+        return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, budget)
 
 
 @contextmanager
@@ -233,8 +233,8 @@ def open_npy(path: Path) -> Iterator[StoredArray]:
             stream.seek(0)
             return np.lib.format.read_array(stream, allow_pickle=False)
 
-        allowance = ReadBudget(path)
-        yield StoredArray(str(path), shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)
+        budget = ReadBudget(path)
+        yield StoredArray(str(path), shape, dtype.kind, str(dtype), dtype.itemsize, load, budget)
 
 
 def npy_shape(path: Path) -> ArrayShape | None:
@@ -285,7 +285,7 @@ class Hdf5File:
     def __init__(self, path: Path, file: Any) -> None:
         self.path = path
         self._file = file
-        self._allowance = ReadBudget(path)
+        self._budget = ReadBudget(path)
 
     def __contains__(self, key: str) -> bool:
         return self._find_object(key) is not None
@@ -338,7 +338,7 @@ class Hdf5File:
         text = h5py.check_string_dtype(data.dtype)
         if text is not None:
             kind, itemsize = "U", 5 * (text.length or 0)  # bytes in the file, and as UTF-32
-        self._allowance.require(where, data.dtype.itemsize * math.prod(data.chunks or ()))
+        self._budget.require(where, data.dtype.itemsize * math.prod(data.chunks or ()))
 
         def load() -> NDArray[Any]:
             if text is not None and text.length is None:
@@ -348,7 +348,7 @@ class Hdf5File:
             return values if text is None else np.char.decode(values, "utf-8")
 
         type = "text" if text is not None else str(data.dtype)
-        return StoredArray(where, data.shape, kind, type, itemsize, load, self._allowance)
+        return StoredArray(where, data.shape, kind, type, itemsize, load, self._budget)
 
     def _read_variable_texts(self, where: str, data: Any) -> NDArray[np.str_]:
         """Texts of any length, many of which may share the same bytes of the file."""
@@ -358,16 +358,16 @@ class Hdf5File:
         if len(data.shape) != 1:
             raise InvalidInputError(f"{where} has shape {data.shape}; expected (N,)")
         if data.chunks is None:  # chunks that fit even if each text is as long as the file
-            part = max(1, self._allowance.bytes_left // (4 * self.path.stat().st_size))
+            part = max(1, self._budget.bytes_left // (4 * self.path.stat().st_size))
         else:
             part = max(1, len(data))
-            self._allowance.require(where, _total_text_bytes(where, data))
+            self._budget.require(where, _total_text_bytes(where, data))
         found: list[str] = []
         for begin in range(0, len(data), part):
             more = texts[begin : begin + part].tolist()
-            self._allowance.take(where, sum(map(len, more)))
+            self._budget.take(where, sum(map(len, more)))
             found += more
-        return text_array(where, found, self._allowance)
+        return text_array(where, found, self._budget)
 
     def _require_object(self, key: str) -> Any:
         found = self._find_object(key)

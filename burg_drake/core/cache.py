@@ -89,7 +89,7 @@ def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
 def _read_entry(path: Path, made_by: str) -> Arrays | None:
     """Reads the arrays of an entry; if it cannot be used, logs the reason and returns None."""
     try:
-        mark = path.stat().st_mtime
+        last_use = path.stat().st_mtime
     except OSError:
         return None  # no entry
     try:
@@ -106,7 +106,7 @@ def _read_entry(path: Path, made_by: str) -> Arrays | None:
         return None
     if found is None:
         _log_other_version(path.parent)
-    elif time.time() - mark > 86_400.0:  # updated once a day
+    elif time.time() - last_use > 86_400.0:  # updated once a day
         with contextlib.suppress(OSError):
             os.utime(path)
     return found
@@ -117,15 +117,15 @@ def _log_other_version(folder: Path) -> None:
     """Logs once that entries are from another version, as all are after an update: the first
     process leaves a mark file for its workers and later processes."""
     marker_prefix = ".told-"  # Empty files that record which version has logged the warning.
-    mark = folder / f"{marker_prefix}{content_hash(*_code_version())[:16]}"
+    mark_file = folder / f"{marker_prefix}{content_hash(*_code_version())[:16]}"
     try:
-        mark.touch(exist_ok=False)
+        mark_file.touch(exist_ok=False)
     except FileExistsError:
         return
     except OSError as error:
         _log.debug("%s", error)  # read-only folder: each process logs the warning
     for other in folder.glob(f"{marker_prefix}*"):
-        if other != mark:
+        if other != mark_file:
             with contextlib.suppress(OSError):
                 other.unlink()
     _log.warning(
@@ -139,8 +139,8 @@ def _log_other_version(folder: Path) -> None:
 def _write_entry(path: Path, arrays: Arrays, made_by: str) -> None:
     """Writes an entry if possible."""
     buffer = io.BytesIO()
-    every: dict[str, Any] = {"made_by": np.array(made_by), **arrays}
-    np.savez(buffer, **every)
+    entry: dict[str, Any] = {"made_by": np.array(made_by), **arrays}
+    np.savez(buffer, **entry)
     try:
         atomic_write(path, buffer.getvalue())
     except InvalidInputError as error:
@@ -155,10 +155,10 @@ def _remove_old_entries(folder: Path) -> None:
     entries, now = [], time.time()
     for path in folder.iterdir():
         with contextlib.suppress(OSError):  # another process has removed it
-            found = path.stat()
+            status = path.stat()
             if path.suffix == ".npz" and not path.name.startswith("."):
-                entries.append((found.st_mtime, found.st_size, path))
-            elif UNFINISHED_FILE.fullmatch(path.name) and now - found.st_mtime > 3_600.0:
+                entries.append((status.st_mtime, status.st_size, path))
+            elif UNFINISHED_FILE.fullmatch(path.name) and now - status.st_mtime > 3_600.0:
                 path.unlink()  # left by a killed process
     total = 0
     for _, size, path in sorted(entries, reverse=True):

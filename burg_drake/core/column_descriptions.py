@@ -29,8 +29,8 @@ from burg_drake.core.verdict import RecordedFields
 
 def _verdict_columns(kind: type[VerdictField]) -> dict[str, Column]:
     """Columns of a verdict's fields of one kind."""
-    of_kind = (one for one in RecordedFields.verdict if isinstance(one, kind))
-    return {name: meaning for one in of_kind for name, meaning in one.meanings().items()}
+    matching = (one for one in RecordedFields.verdict if isinstance(one, kind))
+    return {name: column for one in matching for name, column in one.described_columns().items()}
 
 
 COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {

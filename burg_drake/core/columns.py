@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final, Literal
 
 from burg_drake.core.errors import quote_value
-from burg_drake.core.outcomes import Least, Mode, Stage, mode_includes
+from burg_drake.core.outcomes import FirstMode, Mode, Stage, mode_includes
 
 TEXT_UNIT: Final = ""
 """Unit of a column of texts."""
@@ -22,12 +22,12 @@ class Column:
 
     Attributes:
         unit: `TEXT_UNIT`, `DIMENSIONLESS`, or a unit such as m, rad, N, s; `g` is the standard
-            gravity of 9.81 m/s2, and `weights` are those of the object.
+            gravity of 9.81 m/s2, and `weights` are multiples of the object's weight.
         description: what its values are, in which frame.
-        own_unit: for people, where it is not the usual one of its unit, and the factor to it.
-        title: what people call it in a line or the head of a table; its name if empty.
-        axis: what they call it at an axis, where there is room for more; the title if empty.
-        digits: decimals of its numbers in the unit for people.
+        own_unit: unit for display and the factor to it, if not the usual one of `unit`.
+        title: name for people in a line or the head of a table; the column's name if empty.
+        axis: longer name for the axis of a chart; the title if empty.
+        digits: decimals of its numbers in the unit for display.
     """
 
     unit: str
@@ -66,9 +66,9 @@ class TableShape:
     joints: int = 0
     approach: bool = False
 
-    def has(self, least: Least) -> bool:
-        """Whether the table has the columns of a mode."""
-        return mode_includes(self.mode, least, approach=self.approach)
+    def includes(self, first: FirstMode) -> bool:
+        """Whether the table has columns whose first mode is `first`."""
+        return mode_includes(self.mode, first, approach=self.approach)
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class VerdictField:
     unit: str
     meaning: str
     name: str = field(default="", kw_only=True)
-    mode: Least = field(default="hand", kw_only=True)
+    mode: FirstMode = field(default="hand", kw_only=True)
     part: VerdictPart = field(default="measured", kw_only=True)
 
     @property
@@ -126,12 +126,12 @@ class VerdictField:
         """Merges the values of several stages, given in order."""
         return {key: float(number) for value in values for key, number in value.items()}
 
-    def compared(self, value: Any) -> dict[str, float | str]:
+    def replayed_values(self, value: Any) -> dict[str, float | str]:
         """Values that a replay must reproduce bit for bit, by display name."""
         return {}
 
-    def meanings(self) -> dict[str, Column]:
-        """Its columns by name, with variable parts in capitals."""
+    def described_columns(self) -> dict[str, Column]:
+        """Its columns by name, with variable parts of the names in capitals."""
         return {self.name: Column(self.unit, self.meaning)}
 
 
@@ -140,11 +140,11 @@ class TextField(VerdictField):
     """A text in a column with the field's name. The last stage's text counts.
 
     Attributes:
-        of: type: any text, or the members of an enumeration.
+        value_type: `str` for any text, or an enumeration for its members.
         replayed: whether a replay must reproduce the text.
     """
 
-    of: type[str] = str
+    value_type: type[str] = str
     replayed: bool = True
     part: VerdictPart = "decided"
 
@@ -164,12 +164,12 @@ class TextField(VerdictField):
     def from_json(self, data: Any) -> Any:
         if not isinstance(data, str):
             raise TypeError(f"{quote_value(data)} is not a text")
-        return self.of(data)
+        return self.value_type(data)
 
     def merge(self, values: Sequence[Any]) -> Any:
         return values[-1]
 
-    def compared(self, value: Any) -> dict[str, float | str]:
+    def replayed_values(self, value: Any) -> dict[str, float | str]:
         return {self.name: str(value)} if self.replayed else {}
 
 
@@ -205,15 +205,18 @@ class MarginsField(VerdictField):
     """Numbers by the names of margins, each in its own column.
 
     A later stage does not remove an earlier measurement.
+
+    Attributes:
+        margins: dataclass whose fields are the margins.
     """
 
-    of: type[Any]
+    margins: type[Any]
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {f.name: f.name for f in fields(self.of) if shape.has(f.metadata["mode"])}
+        return {f.name: f.name for f in fields(self.margins) if shape.includes(f.metadata["mode"])}
 
     def from_row(self, row: Mapping[str, Any]) -> Any:
-        return {f.name: row[f.name] for f in fields(self.of) if f.name in row}
+        return {f.name: row[f.name] for f in fields(self.margins) if f.name in row}
 
     def merge(self, values: Sequence[Any]) -> Any:
         found: dict[str, float] = {}
@@ -222,11 +225,11 @@ class MarginsField(VerdictField):
                 found[name] = float(number)
         return found
 
-    def compared(self, value: Any) -> dict[str, float | str]:
-        return {f.name: value[f.name] for f in fields(self.of) if f.name in value}
+    def replayed_values(self, value: Any) -> dict[str, float | str]:
+        return {f.name: value[f.name] for f in fields(self.margins) if f.name in value}
 
-    def meanings(self) -> dict[str, Column]:
-        return {f.name: f.metadata["column"] for f in fields(self.of)}
+    def described_columns(self) -> dict[str, Column]:
+        return {f.name: f.metadata["column"] for f in fields(self.margins)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,10 +245,10 @@ class InstancesField(VerdictField):
         cells = {k: float(v) for k, v in row.items() if k.startswith(self.prefix)}
         return {k.removeprefix(self.prefix): v for k, v in cells.items() if math.isfinite(v)}
 
-    def compared(self, value: Any) -> dict[str, float | str]:
+    def replayed_values(self, value: Any) -> dict[str, float | str]:
         return {self.prefix.replace("_", " ") + name: number for name, number in value.items()}
 
-    def meanings(self) -> dict[str, Column]:
+    def described_columns(self) -> dict[str, Column]:
         return {self.prefix + "NAME": Column(self.unit, self.meaning)}
 
 
@@ -275,7 +278,7 @@ class JointsField(VerdictField):
     def merge(self, values: Sequence[Any]) -> Any:
         return next(filter(None, values), ())
 
-    def meanings(self) -> dict[str, Column]:
+    def described_columns(self) -> dict[str, Column]:
         return {self.prefix + "NUMBER": Column(self.unit, self.meaning)}
 
 
@@ -291,7 +294,7 @@ class StagesField(VerdictField):
     part: VerdictPart = "cost"
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {n: stage for stage, (n, _, mode) in self.times.items() if shape.has(mode)}
+        return {n: stage for stage, (n, _, mode) in self.times.items() if shape.includes(mode)}
 
     def to_json(self, value: Any) -> Any:
         return {stage.value: round(seconds, 6) for stage, seconds in value.items()}
@@ -299,7 +302,7 @@ class StagesField(VerdictField):
     def from_json(self, data: Any) -> Any:
         return {Stage(stage): _require_number(seconds) for stage, seconds in data.items()}
 
-    def meanings(self) -> dict[str, Column]:
+    def described_columns(self) -> dict[str, Column]:
         return {name: Column(self.unit, says) for name, says, _ in self.times.values()}
 
 
@@ -307,7 +310,7 @@ def margin_field(
     unit: str,
     meaning: str,
     *,
-    mode: Least = "hand",
+    mode: FirstMode = "hand",
     stage: Stage = Stage.EXECUTED,
     smaller_is_better: bool = False,
     **display: Any,

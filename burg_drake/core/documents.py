@@ -65,6 +65,7 @@ _SCALARS = {
 class Reader:
     """Turns YAML nodes into typed values; every error names file, line and key.
 
+    `where` is the path of keys to a node, such as `board.size[0]`; empty for the whole document.
     `LINES` is False in classes that read data without line numbers.
     """
 
@@ -73,7 +74,7 @@ class Reader:
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def fail(self, node: yaml.Node, where: str, what: str) -> DocumentError:
+    def error_at(self, node: yaml.Node, where: str, what: str) -> DocumentError:
         line = f":{node.start_mark.line + 1}" if self.LINES else ""
         key = f" {where}:" if where else ""
         return DocumentError(f"{self.name}{line}:{key} {what}")
@@ -86,17 +87,17 @@ class Reader:
         if required and not keys_given.intersection(required) and keys_given - names:
             kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", schema.__name__).lower()
             keys = ", ".join(["version", *required])
-            raise self.fail(node, "", f"not a {kind}; one has the keys {keys}")
+            raise self.error_at(node, "", f"not a {kind}; one has the keys {keys}")
         for key, value in node.value:
             if key.value == "version":
                 given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
                 if given != str(current):
                     what = f"{shorten_text(given)} cannot be read"
-                    raise self.fail(
+                    raise self.error_at(
                         value, "version", f"{what}; this release reads version {current}"
                     )
                 return
-        raise self.fail(node, "version", f"missing; add 'version: {current}'")
+        raise self.error_at(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
         if kind in _SCALARS:
@@ -111,7 +112,9 @@ class Reader:
             return self.read(node, kind, where)
         if origin is typing.Literal:
             allowed = [str(a) for a in typing.get_args(kind)]
-            return self.choice(node, where, dict(zip(allowed, typing.get_args(kind), strict=True)))
+            return self.read_choice(
+                node, where, dict(zip(allowed, typing.get_args(kind), strict=True))
+            )
         if origin in (list, tuple):
             return self.read_sequence(node, kind, origin, where)
         if origin in (dict, Mapping):
@@ -120,25 +123,25 @@ class Reader:
             return self.read_dataclass(node, typing.cast(type, kind), where)
         if isinstance(kind, type) and issubclass(kind, enum.Enum):
             members = {str(m.value): m for m in kind}
-            return self.choice(node, where, members, ordered=True)
+            return self.read_choice(node, where, members, ordered=True)
         raise TypeError(f"schema type {kind} is not supported")
 
-    def choice(
+    def read_choice(
         self, node: yaml.Node, where: str, options: dict[str, Any], *, ordered: bool = False
     ) -> Any:
         if not isinstance(node, yaml.ScalarNode) or node.value not in options:
             given = node.value if isinstance(node, yaml.ScalarNode) else "a structure"
             known = suggest_names(str(given), options, ordered=ordered)
-            raise self.fail(node, where, f"{quote_value(given)} is not valid; {known}")
+            raise self.error_at(node, where, f"{quote_value(given)} is not valid; {known}")
         return options[node.value]
 
     def read_sequence(self, node: yaml.Node, kind: Any, origin: Any, where: str) -> Any:
         if not isinstance(node, yaml.SequenceNode):
-            raise self.fail(node, where, "expected a list such as [a, b, c]")
+            raise self.error_at(node, where, "expected a list such as [a, b, c]")
         arguments = typing.get_args(kind)
         if origin is tuple and Ellipsis not in arguments:
             if len(node.value) != len(arguments):
-                raise self.fail(
+                raise self.error_at(
                     node, where, f"has {len(node.value)} entries; expected {len(arguments)}"
                 )
             kinds = list(arguments)
@@ -147,15 +150,15 @@ class Reader:
         pairs = enumerate(zip(node.value, kinds, strict=True))
         return origin(self.read(item, k, f"{where}[{i}]") for i, (item, k) in pairs)
 
-    def entries(self, node: yaml.Node, where: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+    def read_entries(self, node: yaml.Node, where: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
         if not isinstance(node, yaml.MappingNode):
-            raise self.fail(node, where, "expected keys with values ('key: value' lines)")
+            raise self.error_at(node, where, "expected keys with values ('key: value' lines)")
         found: dict[str, tuple[yaml.Node, yaml.Node]] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise self.fail(key, where, "a key must be a text, not a list or a mapping")
+                raise self.error_at(key, where, "a key must be a text, not a list or a mapping")
             if key.value in found:
-                raise self.fail(key, where, f"key {quote_value(key.value)} is given twice")
+                raise self.error_at(key, where, f"key {quote_value(key.value)} is given twice")
             found[key.value] = (key, value)
         return found
 
@@ -163,22 +166,22 @@ class Reader:
         prefix = f"{where}." if where else ""
         return {
             name: self.read(value, kind, f"{prefix}{name}")
-            for name, (_, value) in self.entries(node, where).items()
+            for name, (_, value) in self.read_entries(node, where).items()
         }
 
     def read_dataclass(self, node: yaml.Node, kind: type, where: str) -> Any:
-        entries = self.entries(node, where)
+        entries = self.read_entries(node, where)
         hints = _field_types(kind)
         fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
         prefix = f"{where}." if where else ""
         for name, (key, _) in entries.items():
             if name not in fields:
-                raise self.fail(
+                raise self.error_at(
                     key, where, f"unknown key {quote_value(name)}; {suggest_names(name, fields)}"
                 )
         for name, field in fields.items():
             if name not in entries and field.default is field.default_factory:
-                raise self.fail(node, where, f"key {name!r} is missing")
+                raise self.error_at(node, where, f"key {name!r} is missing")
         values = {
             name: self.read(value, hints[name], f"{prefix}{name}")
             for name, (_, value) in entries.items()
@@ -188,18 +191,18 @@ class Reader:
         except DocumentError:
             raise
         except FieldError as error:
-            raise self.fail(_node_at(node, error.place), where, str(error)) from error
+            raise self.error_at(_node_at(node, error.place), where, str(error)) from error
         except InvalidInputError as error:
             if not where:  # key unknown
                 raise DocumentError(f"{self.name}: {error}") from error
-            raise self.fail(node, where, str(error)) from error
+            raise self.error_at(node, where, str(error)) from error
 
     def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
         if not isinstance(node, yaml.ScalarNode) or node.tag == "tag:yaml.org,2002:null":
-            raise self.fail(node, where, f"expected {_SCALARS[kind]}")
+            raise self.error_at(node, where, f"expected {_SCALARS[kind]}")
         if kind is str:
             if "\0" in node.value:  # invalid in paths and names
-                raise self.fail(node, where, f"{quote_value(node.value)} has a NUL character")
+                raise self.error_at(node, where, f"{quote_value(node.value)} has a NUL character")
             return node.value
         if kind is bool and node.value.lower() in ("true", "false"):
             return node.value.lower() == "true"
@@ -211,8 +214,8 @@ class Reader:
         if abs(value) < (1 << 64 if kind is int else 1e30):
             return value
         if abs(value) < math.inf:
-            raise self.fail(node, where, f"{quote_value(node.value)} is too large a number")
-        raise self.fail(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
+            raise self.error_at(node, where, f"{quote_value(node.value)} is too large a number")
+        raise self.error_at(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
 
     def read_plain(self, node: yaml.Node, where: str) -> Any:
         """A node of any structure as dicts, lists and scalars."""
@@ -358,7 +361,7 @@ class _PlainReader(Reader):
     def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
         is_text = node.tag == _TAGS[str]
         if isinstance(node, yaml.ScalarNode) and is_text != (kind is str):
-            raise self.fail(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
+            raise self.error_at(node, where, f"{quote_value(node.value)} is not {_SCALARS[kind]}")
         return super().read_scalar(node, kind, where)
 
 

@@ -1,4 +1,4 @@
-"""The error tree: every error that a user can cause derives from `BurgError`.
+"""Exception hierarchy: every error that a user can cause derives from `BurgError`.
 
 A grasp that slips and a pose out of reach are outcomes, not errors; see `core.outcomes`.
 """
@@ -38,7 +38,7 @@ class FieldError(InvalidInputError):
     """An invalid value of a dataclass.
 
     Attributes:
-        place: its position, from the dataclass inwards: names of fields and indices of lists.
+        place: path to the value, from the dataclass inwards: names of fields, indices of lists.
     """
 
     def __init__(self, message: str, *place: str | int) -> None:
@@ -72,7 +72,7 @@ class MissingDependencyError(BurgError, ImportError):
 
 
 class SimulationError(BurgError, RuntimeError):
-    """Drake could not step or evaluate a diagram that seemed valid."""
+    """A simulation, renderer or worker process failed."""
 
 
 class WorkerDied(SimulationError):
@@ -147,7 +147,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def list_names(names: Sequence[str]) -> str:
-    """Names for a message: the first few, and the number of further ones."""
-    if len(names) <= 24:
+    """Names for a message: all, or the first few and the number of the others."""
+    max_complete, shown = 24, 9  # names of a complete list; names of a shortened one
+    if len(names) <= max_complete:
         return ", ".join(names) or "(none)"
-    return f"{', '.join(names[:9])} and {len(names) - 9} others"
+    return f"{', '.join(names[:shown])} and {len(names) - shown} others"

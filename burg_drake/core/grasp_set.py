@@ -83,15 +83,15 @@ def _check_header(path: Path, header: dict[str, Any]) -> None:
 
 
 def _read_columns(
-    array: Callable[[str], StoredArray], further: dict[str, str]
+    array: Callable[[str], StoredArray], additional: dict[str, str]
 ) -> tuple[SetColumns, SetColumns]:
     """Reads the columns that every set has, and additional ones.
 
     Args:
         array: returns the array of a name in the file.
-        further: names of the arrays of additional columns, by column.
+        additional: names of the arrays of additional columns, by column.
     """
-    for name in {*FIXED_COLUMNS, ""} & set(further):
+    for name in {*FIXED_COLUMNS, ""} & set(additional):
         raise ValueError(f"it has a further column {name!r}, which must not be called that")
     poses = array("X_OG")
     n = poses.require_rows(4, 4)
@@ -100,15 +100,15 @@ def _read_columns(
         is_text = name in ("id", "object")
         values = array(name).read("U" if is_text else "f", (n,))
         fixed[name] = values if is_text else values.astype(float, copy=False)
-    columns = {name: array(key).read(NUMBER_KINDS + "U", (n,)) for name, key in further.items()}
+    columns = {name: array(key).read(NUMBER_KINDS + "U", (n,)) for name, key in additional.items()}
     return fixed, columns
 
 
 def _write_npz(
     stream: BinaryIO, header: dict[str, Any], fixed: SetColumns, columns: SetColumns
 ) -> None:
-    further = {COLUMN_PREFIX + name: values for name, values in columns.items()}
-    arrays: dict[str, Any] = {"header": np.array(json.dumps(header)), **fixed, **further}
+    additional = {COLUMN_PREFIX + name: values for name, values in columns.items()}
+    arrays: dict[str, Any] = {"header": np.array(json.dumps(header)), **fixed, **additional}
     np.savez_compressed(stream, **arrays)
 
 
@@ -127,8 +127,8 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
         header = parse_json(str(stored.read("U", ())), f"{path}: header")
         _check_header(path, header)
         names = [name for name in file.names if name.startswith(COLUMN_PREFIX)]
-        further = {name.removeprefix(COLUMN_PREFIX): name for name in names}
-        return header, *_read_columns(file.array, further)
+        additional = {name.removeprefix(COLUMN_PREFIX): name for name in names}
+        return header, *_read_columns(file.array, additional)
 
 
 def _hdf5_bytes(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> bytes:
@@ -140,13 +140,13 @@ def _hdf5_bytes(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) 
         file.attrs["provenance"] = json.dumps(header["provenance"])
         for name, values in fixed.items():
             _write_dataset(file, name, values)
-        further = file.create_group("columns", track_order=True)
+        additional = file.create_group("columns", track_order=True)
         for name, values in columns.items():
             if "/" in name or name in (".", ""):
                 raise InvalidInputError(
                     f"HDF5 cannot have a column called {name!r}; rename it, or write .npz"
                 )
-            _write_dataset(further, name, values)
+            _write_dataset(additional, name, values)
     return buffer.getvalue()
 
 
@@ -173,8 +173,8 @@ def _read_hdf5(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
         _check_header(path, header)
         provenance = str(file.attribute("provenance"))
         header["provenance"] = parse_json(provenance, f"{path}: provenance")
-        further = {name: f"columns/{name}" for name in file.names("columns")}
-        return header, *_read_columns(file.array, further)
+        additional = {name: f"columns/{name}" for name in file.names("columns")}
+        return header, *_read_columns(file.array, additional)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,8 @@ import math
 
 MISSING_NUMBER = "-"
 """Stands for an unknown number."""
+NO_VALUE = "·"
+"""Stands for zero, or for a value that does not exist, in tables of counts and figures."""
 
 
 def format_number(value: float | None, decimals: int | None = None) -> str:

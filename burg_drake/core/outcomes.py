@@ -12,22 +12,22 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 """Evaluation modes; each requires more than the one before."""
 
 
-Least = Mode | Literal["approach"]
+FirstMode = Mode | Literal["approach"]
 """The first mode that determines a value; `approach`: the whole arm, or the hand alone if its
 approach is simulated."""
 
 
-def mode_includes(mode: Mode, least: Least, *, approach: bool = False) -> bool:
-    """Whether a mode includes another one.
+def mode_includes(mode: Mode, first: FirstMode, *, approach: bool = False) -> bool:
+    """Whether a mode determines a value whose first mode is `first`.
 
     Args:
         mode: the mode.
-        least: the mode that it may include.
+        first: the first mode that determines the value.
         approach: whether the approach of the hand alone is simulated.
     """
-    if least == "approach":
+    if first == "approach":
         return approach or mode == "arm"
-    return MODES.index(mode) >= MODES.index(least)
+    return MODES.index(mode) >= MODES.index(first)
 
 
 class Stage(StrEnum):
@@ -40,8 +40,8 @@ class Stage(StrEnum):
 
 
 Among = Literal["all", "clear", "reachable", "executed"]
-"""Subsets of judged grasps: all, those at which the hand is clear, those of them that the arm can
-reach, or those executed in simulation."""
+"""Subsets of judged grasps: all, the ones with a clear hand, the ones that the arm can reach as
+well, or the ones executed in simulation."""
 DECIDED_STAGES: dict[Among, tuple[Stage, ...]] = {
     "all": tuple(Stage),
     "clear": (Stage.REACHABLE, Stage.PLANNED, Stage.EXECUTED),
@@ -167,7 +167,7 @@ UNTRIED_OUTCOMES = ("", Outcome.REACHABLE.value)
 class RealOutcome(StrEnum):
     """How a trial on the robot ended.
 
-    The values are those of simulated outcomes that a person or a robot can observe, and those that
+    The values are the simulated outcomes that a person or a robot can observe, and outcomes that
     exist only in reality. Outcomes that an operator distinguishes at a glance come first: messages
     begin with them.
     """

@@ -83,9 +83,9 @@ class Packages:
     """Search for ROS packages.
 
     Attributes:
-        stated: package folders by name, from a document.
-        document: that document, for messages; None if there is none.
-        key: the document's key with the folders.
+        stated: package folders by name that a document states.
+        document: the document, for messages; None if there is none.
+        key: key of the folders in the document.
     """
 
     stated: Mapping[str, Path] = field(default_factory=dict)
@@ -107,9 +107,9 @@ class Packages:
         near = (near or Path()).resolve()
         for folder in _package_folders(name, near):
             return folder
-        raise UnknownNameError(self._not_found(name, near))
+        raise UnknownNameError(self._not_found_message(name, near))
 
-    def _not_found(self, name: str, near: Path) -> str:
+    def _not_found_message(self, name: str, near: Path) -> str:
         places = [f"{near} and the folders above it"]
         for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
             paths = _folders_in_variable(variable)
@@ -183,10 +183,10 @@ def _package_folders(name: str, near: Path) -> Iterator[Path]:
     for path in _folders_in_variable("AMENT_PREFIX_PATH"):
         if os.path.isdir(path / "share" / name):
             yield path / "share" / name
-    find_own = {"drake": _drake_share_folder, "drake_models": drake_models_folder}.get(name)
-    own = find_own() if find_own is not None else None
-    if own is not None and own.is_dir():
-        yield own
+    find_folder = {"drake": _drake_share_folder, "drake_models": drake_models_folder}.get(name)
+    of_drake = find_folder() if find_folder is not None else None
+    if of_drake is not None and of_drake.is_dir():
+        yield of_drake
 
 
 def _search_tree(name: str, folder: Path, seen: set[str]) -> Iterator[Path]:
@@ -283,7 +283,7 @@ def resolve_reference(
             kind, or the searched places.
         InvalidInputError: it is a pipe.
     """
-    words = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
+    nouns = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
     text = str(reference)
     if text.startswith(PACKAGE_URI):
         path = data_root() / text.removeprefix(PACKAGE_URI)
@@ -304,7 +304,7 @@ def resolve_reference(
         return located.resolve()
     where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
     known = f"; {suggest_names(path.stem, builtin_names(kind))}" if kind else ""
-    what = f"{words[kind]} " if kind and base is None else ""  # documents name the key
+    what = f"{nouns[kind]} " if kind and base is None else ""  # documents name the key
     raise UnknownNameError(f"{what}{text} does not exist{where}{known}")
 
 
@@ -340,6 +340,19 @@ def portable_reference(path: Path, folder: Path) -> str:
         if path.is_relative_to(shipped):
             return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
     return os.path.relpath(path, folder.resolve())
+
+
+def name_or_reference(given: str | Path, kind: str, path: Path, folder: Path) -> str:
+    """Reference for a document in `folder`: the given name if it is built in, else
+    `portable_reference`.
+
+    Args:
+        given: name or path that a user has given.
+        kind: kind of built-in names, see `builtin_names`.
+        path: the file or folder that was found.
+        folder: folder of the document.
+    """
+    return str(given) if str(given) in builtin_names(kind) else portable_reference(path, folder)
 
 
 def shareable_reference(path: Path, folder: Path) -> str:
@@ -387,7 +400,7 @@ def is_resolved(reference: str, *kinds: str) -> bool:
     are relative to the file's former folder, not to the working directory.
 
     Args:
-        reference: from a provenance.
+        reference: reference from a provenance.
         kinds: kinds of built-in names, see `builtin_names`.
     """
     if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):

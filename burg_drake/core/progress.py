@@ -204,26 +204,30 @@ class _LogLines:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._begun = self._last = clock()
+        self._start_time = self._last_time = clock()
         self._phase = ""
-        self._forecast = self._any_shown = False
+        self._forecast_shown = self._any_shown = False
 
     def show(self, event: Progress) -> None:
         min_elapsed = 5.0  # Seconds after which the remaining time is shown.
         now = self._clock()
-        known = event.remaining is not None and (
+        has_forecast = event.remaining is not None and (
             event.left is not None or event.elapsed >= min_elapsed
         )
-        new = event.phase != self._phase
-        starting = new and event.phase == STARTING_PHASE and event.done < event.total
-        if not (self._any_shown or known or starting or now - self._begun >= min_elapsed):
+        new_phase = event.phase != self._phase
+        starting = new_phase and event.phase == STARTING_PHASE and event.done < event.total
+        if (
+            not (self._any_shown or has_forecast or starting)
+            and now - self._start_time < min_elapsed
+        ):
             return
-        shown_forecast = self._forecast and not new
+        forecast_shown = self._forecast_shown and not new_phase
         finished = 0 < event.total == event.done
-        if new or finished or (known and not shown_forecast) or now - self._last >= 30.0:
-            self._phase, self._last = event.phase, now
+        due = new_phase or finished or now - self._last_time >= 30.0
+        if due or (has_forecast and not forecast_shown):
+            self._phase, self._last_time = event.phase, now
             self._any_shown = self._any_shown or not starting
-            self._forecast = shown_forecast or known
+            self._forecast_shown = forecast_shown or has_forecast
             parts = (event.phase, _count_text(event), _rate_text(event), _outcome_text(event))
             print("  ".join(part for part in parts if part), file=sys.stderr, flush=True)
 

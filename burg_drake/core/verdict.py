@@ -196,7 +196,8 @@ class TrialFindings:
         ).metadata,
     )
     margins: Margins | Mapping[str, float] = field(
-        default_factory=dict, metadata=MarginsField("", "continuous slack", of=Margins).metadata
+        default_factory=dict,
+        metadata=MarginsField("", "continuous slack", margins=Margins).metadata,
     )
     confidence: float | None = field(
         default=None,
@@ -261,7 +262,8 @@ class Findings(TrialFindings):
     """
 
     margins: Mapping[str, float] = field(
-        default_factory=dict, metadata=MarginsField("", "continuous slack", of=Margins).metadata
+        default_factory=dict,
+        metadata=MarginsField("", "continuous slack", margins=Margins).metadata,
     )
     q_grasp: tuple[float, ...] = field(
         default=(),
@@ -309,10 +311,12 @@ class Verdict(Findings):
             retry may succeed.
     """
 
-    outcome: Outcome = field(metadata=TextField("", "how the grasp ended", of=Outcome).metadata)
+    outcome: Outcome = field(
+        metadata=TextField("", "how the grasp ended", value_type=Outcome).metadata
+    )
     stage: Stage = field(
         metadata=TextField(
-            "", "the stage that decided the outcome", of=Stage, replayed=False
+            "", "the stage that decided the outcome", value_type=Stage, replayed=False
         ).metadata
     )
     judged_again: str = field(
@@ -395,7 +399,7 @@ MOVED_PREFIX, TURNED_PREFIX, PUSHED_PREFIX = (
 
 def fields_of_part(shape: TableShape, part: VerdictPart) -> list[VerdictField]:
     """The fields in a part of a row, for tables of a shape."""
-    return [one for one in RecordedFields.verdict if one.part == part and shape.has(one.mode)]
+    return [one for one in RecordedFields.verdict if one.part == part and shape.includes(one.mode)]
 
 
 def display_order(

@@ -210,11 +210,11 @@ class SessionOpened:
 
     Attributes:
         error: why it cannot be built.
-        where: the error's traceback.
+        traceback_text: the error's traceback.
     """
 
     error: BaseException | None = None
-    where: str = ""
+    traceback_text: str = ""
 
 
 @dataclass(frozen=True)
@@ -233,13 +233,13 @@ class TaskDone:
         number: number of the task.
         result: its return value.
         error: its error.
-        where: the error's traceback.
+        traceback_text: the error's traceback.
     """
 
     number: int
     result: Any
     error: BaseException | None = None
-    where: str = ""
+    traceback_text: str = ""
 
 
 @dataclass(frozen=True)
@@ -355,9 +355,9 @@ _loop: _WorkerLoop | None = None
 
 def _picklable_error(error: Exception) -> tuple[Exception, str]:
     """A picklable form of an error, and its traceback."""
-    where = "".join(traceback.format_exception(error))
+    text = "".join(traceback.format_exception(error))
     try:
         sent: Exception = pickle.loads(pickle.dumps(error))
     except Exception:  # its class cannot be found, or needs other arguments
         sent = SimulationError(one_line(error))
-    return sent, where
+    return sent, text

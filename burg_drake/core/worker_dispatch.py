@@ -112,10 +112,10 @@ class Worker:
         """Whether the worker has work."""
         return bool(self.tasks)
 
-    def started(self) -> list[PendingTask]:
+    def assigned_tasks(self) -> list[PendingTask]:
         """Tasks of this worker, in order of execution."""
-        suspect = [] if self.retry_task is None else [self.retry_task]
-        return [*self.tasks, *suspect, *itertools.chain.from_iterable(self.own_batches)]
+        retried = [] if self.retry_task is None else [self.retry_task]
+        return [*self.tasks, *retried, *itertools.chain.from_iterable(self.own_batches)]
 
     def start(self) -> None:
         """Starts the process if there is none.
@@ -125,7 +125,7 @@ class Worker:
         if self.process is None:
             self.process, self.connection = start_worker("burg_drake.core.worker", self.own_group)
 
-    def give(self, batch: Batch, calls: tuple[TaskCall, ...]) -> bool:
+    def send_tasks(self, batch: Batch, calls: tuple[TaskCall, ...]) -> bool:
         """Sends tasks to the started and idle process.
 
         Returns:
@@ -137,7 +137,7 @@ class Worker:
             if session.key in self.sessions:
                 self.sessions[session.key] = self.sessions.pop(session.key)
             else:
-                self.opening, opening = session, self._opening(session)
+                self.opening, opening = session, self._open_session(session)
         self.tasks = batch
         try:
             self.connection.send(TaskCalls(calls, opening))
@@ -147,7 +147,8 @@ class Worker:
             self.is_fresh = False
         return True
 
-    def _opening(self, session: Session) -> OpenSession:
+    def _open_session(self, session: Session) -> OpenSession:
+        """The message that builds a session; drops the least recently used ones."""
         drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - MAX_SESSIONS)]
         for key in drop:
             del self.sessions[key]
@@ -171,14 +172,14 @@ class Worker:
     def exit_error(self) -> tuple[WorkerDied, bool]:
         """The cause of the process's end, and whether a time limit ended it; waits for the end."""
         assert self.process is not None
-        overdue = -self.process.wait() in TIME_LIMIT_SIGNALS
+        timed_out = -self.process.wait() in TIME_LIMIT_SIGNALS
         cause = exit_cause(self.process, self.reason)
         limit = (
             self.opening.limit if self.opening else self.tasks[0].task.limit if self.tasks else None
         )
-        if overdue and limit is not None:
+        if timed_out and limit is not None:
             cause = _time_limit_message(limit, -self.process.wait())
-        return WorkerDied(cause, was_ended_from_outside(self.process)), overdue
+        return WorkerDied(cause, was_ended_from_outside(self.process)), timed_out
 
     def clear_process(self) -> Batch:
         """Clears the state of the ended process; returns its unfinished tasks."""
@@ -224,7 +225,7 @@ class Dispatcher:
         self._thread = threading.Thread(target=self._run, name="worker-pool", daemon=True)
         self._thread.start()
 
-    def put(self, batch: Batch, worker: int | None) -> None:
+    def add_batch(self, batch: Batch, worker: int | None) -> None:
         """Adds work, for one worker or, if None, for any."""
         with self._lock:
             if self._ended:
@@ -295,13 +296,13 @@ class Dispatcher:
             with self._lock:
                 self._wake_receiver.recv_bytes()
                 self._signalled = False
-                asked, self._requests = self._requests, deque()
-            for request in asked:
+                requests, self._requests = self._requests, deque()
+            for request in requests:
                 request()
 
     def _has_work(self) -> bool:
         with self._lock:
-            return bool(self._shared) or any(worker.started() for worker in self.workers)
+            return bool(self._shared) or any(worker.assigned_tasks() for worker in self.workers)
 
     def _assign_tasks(self) -> None:
         """Gives work to idle workers: first their own, then the oldest."""
@@ -312,8 +313,8 @@ class Dispatcher:
 
     def _next_own_batch(self, worker: Worker) -> Batch | None:
         if worker.retry_task is not None:
-            suspect, worker.retry_task = worker.retry_task, None
-            return deque([suspect])
+            task, worker.retry_task = worker.retry_task, None
+            return deque([task])
         with self._lock:
             return worker.own_batches.popleft() if worker.own_batches else None
 
@@ -328,7 +329,7 @@ class Dispatcher:
         tasks: Batch = deque(task for task, _ in calls)
         try:
             worker.start()
-            while not worker.give(tasks, tuple(call for _, call in calls)):
+            while not worker.send_tasks(tasks, tuple(call for _, call in calls)):
                 worker.kill()
                 worker.clear_process()
                 worker.start()
@@ -368,7 +369,7 @@ class Dispatcher:
             session.failed_builds = 0
             worker.sessions[session.key] = None
             return
-        session.error = _with_worker_traceback(message.error, message.where)
+        session.error = _with_worker_traceback(message.error, message.traceback_text)
         tasks, worker.tasks = worker.tasks, deque()
         for task in tasks:
             task.future.set_exception(session.error)
@@ -377,29 +378,29 @@ class Dispatcher:
         """Handles a worker's end: its running task is retried alone, its other work is kept."""
         if self._killed:  # cleaned up at the end
             return
-        (error, overdue), session = worker.exit_error(), worker.opening
+        (error, timed_out), session = worker.exit_error(), worker.opening
         tasks = worker.clear_process()
         cancelled = bool(tasks) and tasks[0].cancelled
         if session is not None and not cancelled:
             session.failed_builds += 1
             if session.failed_builds >= session.attempts:
                 session.error = error
-        suspect = tasks.popleft() if tasks and (session is None or cancelled) else None
+        running = tasks.popleft() if tasks and (session is None or cancelled) else None
         if tasks:
             worker.own_batches.appendleft(tasks)
-        if suspect is None:
+        if running is None:
             return
-        if suspect.cancelled:
-            suspect.future.set_exception(TaskCancelled("this task was cancelled"))
-        elif suspect.tries > 1 and not overdue:
-            suspect.tries -= 1
-            worker.retry_task = suspect
+        if running.cancelled:
+            running.future.set_exception(TaskCancelled("this task was cancelled"))
+        elif running.tries > 1 and not timed_out:
+            running.tries -= 1
+            worker.retry_task = running
         else:
-            suspect.future.set_exception(error)
+            running.future.set_exception(error)
 
     def _end_task(self, future: object, force: bool) -> None:
         for worker in self.workers:
-            for task in worker.started():
+            for task in worker.assigned_tasks():
                 if task.future is not future:
                     continue
                 task.cancelled = True
@@ -412,13 +413,13 @@ class Dispatcher:
 
     def _shut_down(self) -> None:
         """Lets idle workers exit, ends the others, and cancels the remaining work."""
-        left: list[PendingTask] = []
+        remaining: list[PendingTask] = []
         for worker in self.workers:
             if worker.process is not None and not (worker.busy or self._killed):
                 worker.send(None)
             else:
                 worker.kill()
-            left += worker.started()
+            remaining += worker.assigned_tasks()
             worker.tasks, worker.retry_task, worker.own_batches = deque(), None, deque()
         for worker in self.workers:
             if worker.process is not None:
@@ -427,19 +428,19 @@ class Dispatcher:
                 worker.kill()
                 worker.clear_process()
         with self._lock:
-            left += itertools.chain.from_iterable(self._shared)
+            remaining += itertools.chain.from_iterable(self._shared)
             self._shared.clear()
             self._ended = True
             self._wake_receiver.close()
             self._wake_sender.close()
-        for task in left:
+        for task in remaining:
             if task.started or task.future.set_running_or_notify_cancel():
                 task.future.set_exception(TaskCancelled("the worker processes were stopped"))
 
 
 def _begin_task(task: PendingTask) -> Any:
-    """The message to a worker for a task; None if the task is cancelled or cannot be sent, which
-    its future then says."""
+    """Marks a task as started; returns its message to a worker, or None if the task is cancelled or
+    cannot be sent, as its future then tells."""
     if not task.started and not task.future.set_running_or_notify_cancel():
         return None
     task.started = True
@@ -468,9 +469,9 @@ def _set_task_result(task: PendingTask, message: TaskDone) -> None:
     if message.error is None:
         task.future.set_result(message.result)
     else:
-        task.future.set_exception(_with_worker_traceback(message.error, message.where))
+        task.future.set_exception(_with_worker_traceback(message.error, message.traceback_text))
 
 
-def _with_worker_traceback(error: BaseException, where: str) -> BaseException:
-    error.__cause__ = WorkerTraceback(f"in a worker process:\n{where}")
+def _with_worker_traceback(error: BaseException, traceback_text: str) -> BaseException:
+    error.__cause__ = WorkerTraceback(f"in a worker process:\n{traceback_text}")
     return error

@@ -79,7 +79,7 @@ class WorkerPool(Executor):
         """
         self.workers = worker_count(workers)
         self._retries = retries
-        self._places = [Worker(k, own_group) for k in range(self.workers)]
+        self._workers = [Worker(k, own_group) for k in range(self.workers)]
         self._numbers = itertools.count()
         self._lock = threading.Lock()
         self._dispatcher: Dispatcher | None = None
@@ -120,21 +120,21 @@ class WorkerPool(Executor):
             if self._closed:
                 raise RuntimeError("cannot schedule new futures after shutdown")
             if self._dispatcher is None:
-                self._dispatcher = Dispatcher(self._places)
+                self._dispatcher = Dispatcher(self._workers)
             dispatcher = self._dispatcher
-            pending = deque(self._pending(task, dispatcher) for task in tasks)
+            pending = deque(self._make_pending(task, dispatcher) for task in tasks)
             if pending:
-                dispatcher.put(pending, worker)
+                dispatcher.add_batch(pending, worker)
         return [task.future for task in pending]
 
     def sessions(self, worker: int) -> tuple[str, ...]:
         """Keys of the sessions that a worker has built; most recently used last."""
-        return tuple(self._places[worker].sessions.copy())
+        return tuple(self._workers[worker].sessions.copy())
 
     @property
     def processes(self) -> list[int]:
         """Identifiers of the running processes."""
-        found = [place.process for place in self._places]
+        found = [worker.process for worker in self._workers]
         return [process.pid for process in found if process is not None]
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -174,7 +174,7 @@ class WorkerPool(Executor):
         else:
             self.kill_workers()
 
-    def _pending(self, task: Task[T], dispatcher: Dispatcher) -> PendingTask:
+    def _make_pending(self, task: Task[T], dispatcher: Dispatcher) -> PendingTask:
         retries = self._retries if task.retries is None else task.retries
         future = WorkerFuture[T](dispatcher.end_task)
         return PendingTask(next(self._numbers), task, future, 1 + retries)
@@ -198,30 +198,30 @@ class Prefetcher(Generic[Work, Result]):
         Args:
             pool: pool of the workers; its creator ends it.
             work: pieces of work, consumed as needed.
-            task: returns the task for a piece of work.
+            task: function that makes the task for a piece of work.
         """
         self._pool, self._work, self._task = pool, iter(work), task
-        self._ahead: deque[tuple[Work, WorkerFuture[Result]]] = deque()
+        self._submitted: deque[tuple[Work, WorkerFuture[Result]]] = deque()
 
     def ready(self) -> bool:
         """Whether `take` returns without waiting."""
         self._fill()
-        return not self._ahead or self._ahead[0][1].done()
+        return not self._submitted or self._submitted[0][1].done()
 
     def take(self) -> tuple[Work, Result | BaseException] | None:
         """Waits for the next work and its result or error; None at the end."""
         self._fill()
-        if not self._ahead:
+        if not self._submitted:
             return None
-        work, future = self._ahead.popleft()
+        work, future = self._submitted.popleft()
         error = future.exception()
         self._fill()
         return work, future.result() if error is None else error
 
     def _fill(self) -> None:
-        n_missing = 2 * self._pool.workers - len(self._ahead)
+        n_missing = 2 * self._pool.workers - len(self._submitted)
         for work in itertools.islice(self._work, max(0, n_missing)):
-            self._ahead.append((work, self._pool.submit_task(self._task(work))))
+            self._submitted.append((work, self._pool.submit_task(self._task(work))))
 
 
 def map_unordered(
@@ -249,11 +249,11 @@ def map_unordered(
     try:
         if check is not None:
             failed = set()
-            for place, item, outcome in _completed_work(check, work, pool):
+            for index, item, outcome in _completed_work(check, work, pool):
                 if isinstance(outcome, BaseException):
-                    failed.add(place)
+                    failed.add(index)
                     yield item, outcome
-            work = [item for place, item in enumerate(work) if place not in failed]
+            work = [item for index, item in enumerate(work) if index not in failed]
         for _, item, outcome in _completed_work(function, work, pool):
             yield item, outcome
     finally:
@@ -266,15 +266,15 @@ def _completed_work(
 ) -> Iterator[tuple[int, Work, Result | BaseException]]:
     """Yields index, argument and result of each piece of work in order of completion."""
     if pool is None:
-        for place, item in enumerate(work):
-            yield place, item, _run_item(function, item)
+        for index, item in enumerate(work):
+            yield index, item, _run_item(function, item)
         return
-    places: dict[Future[Result], int] = {
-        pool.submit(function, item): place for place, item in enumerate(work)
+    indices: dict[Future[Result], int] = {
+        pool.submit(function, item): index for index, item in enumerate(work)
     }
-    for future in as_completed(places):
-        error, place = future.exception(), places[future]
-        yield place, work[place], future.result() if error is None else error
+    for future in as_completed(indices):
+        error, index = future.exception(), indices[future]
+        yield index, work[index], future.result() if error is None else error
 
 
 def _run_item(function: Callable[[Work], Result], item: Work) -> Result | BaseException:

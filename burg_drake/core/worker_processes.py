@@ -144,10 +144,10 @@ def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str
         )
     except (OSError, subprocess.TimeoutExpired):
         return False
-    said = os.fsdecode(tried.stdout).strip()
-    if tried.returncode == 0 and not tried.stderr and said == str(path):
+    output = os.fsdecode(tried.stdout).strip()
+    if tried.returncode == 0 and not tried.stderr and output == str(path):
         return True
-    _log.debug("the allocator %s cannot be used: %s", path, os.fsdecode(tried.stderr) or said)
+    _log.debug("the allocator %s cannot be used: %s", path, os.fsdecode(tried.stderr) or output)
     return False
 
 

@@ -241,7 +241,7 @@ def _compared_results(verdict: Verdict) -> dict[str, float | str]:
     found = {
         name: value
         for one in RecordedFields.verdict
-        for name, value in one.compared(getattr(verdict, one.name)).items()
+        for name, value in one.replayed_values(getattr(verdict, one.name)).items()
     }
     if found.get("end_time") == 0.0:  # a trial that never began may lack an end time
         del found["end_time"]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.core import (
     CONTESTED_CONFIDENCE,
+    NO_VALUE,
     Mode,
     Outcome,
     TextTable,
@@ -122,7 +123,9 @@ def _outcome_matrix(summary: Summary) -> TextTable:
     groups = _groups_with_total(summary)
     table = TextTable("Outcomes").texts("outcome").numbers(*(group.name for group in groups))
     for outcome in _occurring_outcomes(summary):
-        counts = [format_count(n) if (n := group.outcomes[outcome]) else "·" for group in groups]
+        counts = [
+            format_count(n) if (n := group.outcomes[outcome]) else NO_VALUE for group in groups
+        ]
         table.row(outcome.value, *counts, bold=outcome is Outcome.LIFTED)
     table.caption = _outcome_meanings(summary)
     return table

@@ -358,9 +358,9 @@ class StoredRows:
 
 
 COLUMN_MEMBERS: Mapping[str, Sequence[str]] = {
-    one.name: [member.value for member in one.of]
+    one.name: [member.value for member in one.value_type]
     for one in RecordedFields.verdict
-    if isinstance(one, TextField) and issubclass(one.of, StrEnum)
+    if isinstance(one, TextField) and issubclass(one.value_type, StrEnum)
 }
 """Allowed texts of columns with a fixed set of values."""
 

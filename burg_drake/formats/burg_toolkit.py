@@ -77,7 +77,7 @@ class BurgReader(Reader):
         known = kind.__dataclass_fields__  # type: ignore[attr-defined]
         if isinstance(node, yaml.MappingNode):
             pairs = []
-            for key, (key_node, value) in self.entries(node, where).items():
+            for key, (key_node, value) in self.read_entries(node, where).items():
                 if key in known:
                     pairs.append((key_node, value))
                     continue
@@ -92,7 +92,7 @@ class BurgReader(Reader):
 
     def item_lines(self, node: yaml.Node, key: str) -> list[int]:
         """Lines on which the items of a list of the document begin."""
-        entries = self.entries(node, "")
+        entries = self.read_entries(node, "")
         items = entries[key][1].value if key in entries else []
         return [item.start_mark.line + 1 for item in items]
 
@@ -109,10 +109,10 @@ class BurgReader(Reader):
         Raises:
             DocumentError: the file has another type or version.
         """
-        entries = self.entries(node, "")
+        entries = self.read_entries(node, "")
         for key, expected in (("yaml_file_type", type), ("yaml_file_version", "1.0")):
             if key not in entries:
-                raise self.fail(
+                raise self.error_at(
                     node,
                     key,
                     f"missing; if this is {title} of an early BURG-Toolkit, which did not write"
@@ -122,7 +122,7 @@ class BurgReader(Reader):
             given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
             if given != expected:
                 what = f"{quote_value(given)} cannot be read; expected {expected!r}"
-                raise self.fail(value, key, f"{what}; {hint}" if given == other else what)
+                raise self.error_at(value, key, f"{what}; {hint}" if given == other else what)
 
 
 def locate_file(given: str | None, folder: Path) -> Path | None:
@@ -452,7 +452,7 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     notes = reader.notes
     ground_area = (document.ground_area_x, document.ground_area_y)
     if document.printout is not None and document.printout.size != ground_area:
-        line = reader.entries(node, "")["printout"][0].start_mark.line + 1
+        line = reader.read_entries(node, "")["printout"][0].start_mark.line + 1
         notes.append(
             f"{path}:{line}: the board gets the size of the printout, "
             f"{_size_from_millimetres(document.printout.size)}; the ground area of "

@@ -196,9 +196,9 @@ class _RecipeReader(Reader):
     """Document reader that also checks the names of the objects."""
 
     def read_dict(self, node: yaml.Node, kind: Any, where: str) -> dict[str, Any]:
-        for name, (key, _) in self.entries(node, where).items():
+        for name, (key, _) in self.read_entries(node, where).items():
             if not OBJECT_NAME_PATTERN.fullmatch(name):
-                raise self.fail(key, where, _invalid_name_message(name))
+                raise self.error_at(key, where, _invalid_name_message(name))
         return super().read_dict(node, kind, where)
 
 

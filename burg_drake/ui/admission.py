@@ -52,9 +52,9 @@ class Uploads:
 
         Args:
             owner: the connection.
-            key: of the transfer, chosen by the browser.
-            name: of the file.
-            size: of the file [bytes].
+            key: key of the transfer, chosen by the browser.
+            name: name of the file.
+            size: size of the file [bytes].
             parts: number of parts.
 
         Raises:
@@ -122,7 +122,7 @@ def initial_page(title: str) -> str:
     own.
 
     Args:
-        title: of the page.
+        title: title of the page.
     """
     no_scripts_text = (
         "This page needs JavaScript, which is switched off in this browser: allow it for this"
@@ -154,8 +154,8 @@ class Admission:
 
     Args:
         host: address that the server listens on.
-        port: that the server listens on.
-        title: of the page.
+        port: port that the server listens on.
+        title: title of the page.
         by_token: whether browsers need a token.
 
     Attributes:

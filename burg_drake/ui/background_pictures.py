@@ -38,7 +38,7 @@ class ObjectPictures:
     """Pictures of the objects of a library.
 
     Args:
-        library: of the objects.
+        library: library of the objects.
         on_ready: called with the key of each finished picture, in a thread of this class.
 
     Attributes:
@@ -127,7 +127,7 @@ def render_picture(root: str, name: str, stable_pose: int | None, size: tuple[in
 
     Args:
         root: folder of the library.
-        name: of the object.
+        name: name of the object.
         stable_pose: number of its stable pose; None for the best view.
         size: width and height [pixel].
 
@@ -146,9 +146,9 @@ class ReachTask:
     """Computes a layer of the arm's reach in a worker process.
 
     Attributes:
-        station: with an arm.
-        board: under the grasps.
-        height: of the grasps above the board [m].
+        station: station with an arm.
+        board: board under the grasps.
+        height: height of the grasps above the board [m].
     """
 
     station: Station

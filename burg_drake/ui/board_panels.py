@@ -32,7 +32,7 @@ class BoardPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
@@ -93,9 +93,9 @@ class LivePicture:
 
     Args:
         camera: argument of `cameras.open_source`.
-        board: in front of the camera.
+        board: board in front of the camera.
         show: called with each picture, or with one line that says why there is none.
-        after: closed live picture that may still hold the camera; waits for its end.
+        previous: closed live picture that may still hold the camera; this one waits for its end.
 
     Attributes:
         camera, board: as given.
@@ -159,8 +159,8 @@ class BackdropPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        layers: of the board.
+        actions: actions of the page.
+        layers: layers of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
@@ -172,7 +172,7 @@ class BackdropPanel(SidePanel):
         with gui.add_folder("Real board"):
             self._text = gui.add_html("")
             upload = upload_button(gui, "Photo of the board", icon=icon.PHOTO, mime_type="image/*")
-            upload.on_upload(self._uploaded)
+            upload.on_upload(self._on_upload)
             self._camera = gui.add_dropdown("Camera", CAMERA_NUMBERS)
             self._button("Take a picture", self._take_picture, icon=icon.CAMERA)
             self._live_checkbox = actions.on_choice(
@@ -202,7 +202,7 @@ class BackdropPanel(SidePanel):
         self._live_checkbox.value = False
         self._show_overlay(None, "")
 
-    async def _uploaded(self, event: Any) -> None:
+    async def _on_upload(self, event: Any) -> None:
         file = event.target.value
         self._actions.submit(lambda: self._use_file(file.content, file.name), event.client)
 
@@ -301,8 +301,8 @@ class DisplayPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        views: of all pages.
+        actions: actions of the page.
+        views: views of all pages.
         on_change: called after each change of a choice.
     """
 

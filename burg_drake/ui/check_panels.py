@@ -16,7 +16,7 @@ from burg_drake.compose import (
     SettlingProposal,
     names_of_moved_instances,
 )
-from burg_drake.core import TaskCancelled, list_names as names_of
+from burg_drake.core import TaskCancelled, list_names
 from burg_drake.scene import Board
 from burg_drake.ui.background_pictures import ReachTask
 from burg_drake.ui.board_view import BoardLayers, BoardOverlay
@@ -70,7 +70,7 @@ def issues_html(view: SessionView) -> list[Child]:
         for issue in view.issues[:max_rows]
     ]
     if unknown:
-        line = f"cannot be checked: {names_of(unknown)}"
+        line = f"cannot be checked: {list_names(unknown)}"
         rows.insert(0, element("span", color_dot(status_style("unknown").hex), line))
     more = len(view.issues) - max_rows
     return [html_list(rows), secondary_text(f"and {more} more" if more > 0 else None)]
@@ -141,7 +141,7 @@ class GraspPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
@@ -184,8 +184,8 @@ class ReachPanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
-        layers: of the board.
+        actions: actions of the page.
+        layers: layers of the board.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:

@@ -46,7 +46,9 @@ class PageCamera:
         X_SC = make_pose(rotation_from_quaternion(camera.wxyz), camera.position)
         return cls(X_SC, float(camera.fov), float(camera.aspect))
 
-    def on_plane(self, p_SQ: ArrayLike, p_SP: ArrayLike, normal_S: ArrayLike) -> Array | None:
+    def intersect_plane(
+        self, p_SQ: ArrayLike, p_SP: ArrayLike, normal_S: ArrayLike
+    ) -> Array | None:
         """Intersection of the ray from the camera through Q with a plane.
 
         Args:
@@ -70,7 +72,7 @@ class PageCamera:
         distance = float((np.asarray(p_SP) - eye) @ np.asarray(normal_S)) / slope
         return eye + distance * ray if 0.0 < distance <= max_distance else None
 
-    def on_screen(self, p_SQ: ArrayLike) -> Array:
+    def project(self, p_SQ: ArrayLike) -> Array:
         """(N, 2) projections of points (N, 3): 0 to 1 from left to right and from top to bottom.
 
         NaN for points behind the camera.
@@ -125,7 +127,7 @@ class Handle:
         """Distance along the ray through Q to the handle [m]; None if the ray misses it.
 
         Args:
-            camera: of the page.
+            camera: camera of the page.
             p_SQ: (3,) a point on the pointer's ray [m].
         """
         half_width = 0.07 * GIZMO_SIZE  # Metres by which a pointer may miss an arrow or a ring.
@@ -144,7 +146,7 @@ class Handle:
             distance = float((p_SA - eye) @ ray)
             near = float(np.linalg.norm(eye + distance * ray - p_SA)) <= half_width
             return distance if near and distance > 0.0 else None
-        p_SP = camera.on_plane(p_SQ, self._origin, self._direction)
+        p_SP = camera.intersect_plane(p_SQ, self._origin, self._direction)
         if p_SP is None:
             return None
         across = np.delete(self.X_SG[:3, :3].T @ (p_SP - self._origin), self.axis)
@@ -159,7 +161,7 @@ class Handle:
         """(4, 4) motion in S of the dragged objects for a movement of the pointer.
 
         Args:
-            camera: of the page.
+            camera: camera of the page.
             p_SQ, p_SQ_now: (3,) points on the pointer's ray at the start and now [m].
 
         Returns:
@@ -170,7 +172,7 @@ class Handle:
             if then is None or now is None:
                 return None
             return make_pose(p_AB=(now - then) * self._direction)
-        ends = [camera.on_plane(p, self._origin, self._direction) for p in (p_SQ, p_SQ_now)]
+        ends = [camera.intersect_plane(p, self._origin, self._direction) for p in (p_SQ, p_SQ_now)]
         if ends[0] is None or ends[1] is None:
             return None
         if self.kind == "square":
@@ -205,7 +207,7 @@ def handle_under(handles: Iterable[Handle], camera: PageCamera, p_SQ: Array) -> 
 
     Args:
         handles: shown handles.
-        camera: of the page.
+        camera: camera of the page.
         p_SQ: (3,) a point on the pointer's ray [m].
     """
     found = [(handle.distance(camera, p_SQ), handle) for handle in handles]
@@ -218,8 +220,8 @@ class _GizmoPart:
     """The arrows or the rings of the gizmo.
 
     Attributes:
-        name: of the node.
-        node: of viser; None until it is first shown.
+        name: name of the node.
+        node: node of viser; None until it is first shown.
         X_SG: (4, 4) shown pose; None while hidden.
     """
 
@@ -233,7 +235,7 @@ class Gizmo:
 
     Args:
         scene: API of viser.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:

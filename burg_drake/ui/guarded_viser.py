@@ -71,7 +71,7 @@ class BoundedConnection(ServerConnection):
     """A connection that limits the rate of messages and is closed after an unexpected one.
 
     Args:
-        uploads: of all connections.
+        uploads: uploads of all connections.
     """
 
     def __init__(self, *arguments: Any, uploads: Uploads, **options: Any) -> None:

@@ -53,8 +53,8 @@ class LibraryPanel(SidePanel):
         """Updates the panel from a view.
 
         Args:
-            view: of the session.
-            pictures: of the view's library.
+            view: view of the session.
+            pictures: pictures of the view's library.
         """
         if pictures is not self._pictures:
             self._library, self._pictures = view.library, pictures

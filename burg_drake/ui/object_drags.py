@@ -26,11 +26,11 @@ class _PageDrag:
     """A drag with the mouse on one page.
 
     Attributes:
-        drag: of the session.
+        drag: drag of the session.
         p_SM: (3,) centre of turns [m].
         p_SG: (3,) grabbed point [m].
         x: horizontal position of the pointer at the start, 0 to 1 on the page.
-        handle: of the gizmo, if one was grabbed.
+        handle: handle of the gizmo, if one was grabbed.
     """
 
     drag: Drag
@@ -44,7 +44,7 @@ class ObjectDrags:
     """Makes handles in the scene draggable.
 
     Args:
-        actions: of the page.
+        actions: actions of the page.
         gizmo: its handles take precedence over objects.
     """
 
@@ -70,7 +70,7 @@ class ObjectDrags:
         reports a drag with Shift as both.
 
         Args:
-            client_id: of the page.
+            client_id: id of the page.
             corners: (2, 2) lower and upper corner of the rectangle, 0 to 1 on the page.
         """
         place_tolerance = 5e-3  # Share of the page's width and height.
@@ -133,7 +133,7 @@ class ObjectDrags:
         elif x is not None:
             turn = 2.0 * np.pi * (x - page_drag.x)  # a full turn over the width of the page
             X = rotation_about_point(page_drag.p_SM, rot_z(turn), np.zeros(3))
-        elif (p_SP := camera.on_plane(p_SQ, page_drag.p_SG, (0.0, 0.0, 1.0))) is not None:
+        elif (p_SP := camera.intersect_plane(p_SQ, page_drag.p_SG, (0.0, 0.0, 1.0))) is not None:
             X = make_pose(p_AB=p_SP - page_drag.p_SG)
         if X is None:
             return
@@ -160,7 +160,7 @@ class Picking:
 
     Args:
         scene: API of viser.
-        actions: of the page.
+        actions: actions of the page.
         drags: tells turns with Shift from selection rectangles.
     """
 
@@ -217,5 +217,5 @@ class Picking:
 
 def _is_center_within(view: Any, name: str, camera: PageCamera, lower: Any, upper: Any) -> bool:
     """Whether an instance's centre is projected into a rectangle."""
-    seen = camera.on_screen(instance_center(view, name))[0]
+    seen = camera.project(instance_center(view, name))[0]
     return bool((seen >= lower).all() and (seen <= upper).all())

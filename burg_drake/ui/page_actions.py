@@ -27,15 +27,15 @@ class _QueuedAction:
     """A queued action.
 
     Attributes:
-        action: to run.
-        who: page that submitted it and is told of errors.
+        action: action to run.
+        client: page that submitted it and is told of errors.
         key: a new action replaces the last queued one if that has the same key.
         due: when it may run if no other action follows [s of the monotonic clock].
         wait_for_typing: whether it may run before delayed actions, without hurrying them.
     """
 
     action: Action
-    who: Any
+    client: Any
     key: str
     due: float
     wait_for_typing: bool
@@ -60,7 +60,7 @@ class ActionQueue:
     def submit(
         self,
         action: Action,
-        who: Any = None,
+        client: Any = None,
         *,
         key: str = "",
         after: float = 0.0,
@@ -69,15 +69,15 @@ class ActionQueue:
         """Appends an action.
 
         Args:
-            action: to run; its result is dropped.
-            who: page that is told of errors.
+            action: action to run; its result is dropped.
+            client: page that is told of errors.
             key: the action replaces the last queued one if that has the same key; of a drag, for
                 example, only the last position counts.
             after: time to wait for a newer action of the same key [s]; a following action ends it.
             wait_for_typing: for actions that only update the display: delayed actions before it
                 keep waiting.
         """
-        queued = _QueuedAction(action, who, key, time.monotonic() + after, wait_for_typing)
+        queued = _QueuedAction(action, client, key, time.monotonic() + after, wait_for_typing)
         with self._condition:
             if self._closed:
                 return
@@ -105,10 +105,10 @@ class ActionQueue:
             try:
                 queued.action()
             except BurgError as error:
-                self._on_error(queued.who, str(error))
+                self._on_error(queued.client, str(error))
             except Exception as error:  # the page goes on after any error of an action
                 _log.exception("an action of the setup page failed")
-                self._on_error(queued.who, f"that failed unexpectedly: {error!r}")
+                self._on_error(queued.client, f"that failed unexpectedly: {error!r}")
 
     def _wait_for_next(self) -> _QueuedAction | None:
         """Waits for the next action that may run; None after `close`."""
@@ -145,13 +145,13 @@ class TypedField:
     """A field for typing.
 
     Args:
-        handle: of viser; it sends the value after each key.
+        handle: handle of viser; it sends the value after each key.
         submit: submits an action; `PageActions.submit`.
         action: called with the typed value.
         after: delay after the last key [s].
 
     Attributes:
-        handle: of viser.
+        handle: handle of viser.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class PageActions:
     """Connects controls of panels with actions on the session, and shows messages.
 
     Args:
-        server: that shows the messages.
+        server: server that shows the messages.
         session: the scene.
 
     Attributes:
@@ -241,7 +241,7 @@ class PageActions:
         """Submits an action for each value that a user sets in a field; returns the field.
 
         Args:
-            field: of viser.
+            field: field of viser.
             action: called with the value.
             key: see `ActionQueue.submit`.
         """

@@ -24,7 +24,7 @@ class ServedPage:
     Attributes:
         server: viser's server, to build the page on.
         host: address that the server listens on.
-        port: that the server listens on.
+        port: port that the server listens on.
         admission: decides which requests are accepted.
     """
 
@@ -76,8 +76,8 @@ def serve_page(
 
     Args:
         host: address to listen on; only this machine can reach the default.
-        port: to listen on; the first free one from 7200 on if None, any if 0.
-        title: of the page.
+        port: port to listen on; the first free one from 7200 on if None, any if 0.
+        title: title of the page.
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
@@ -106,8 +106,8 @@ def require_guarded(address: str, port: int) -> None:
     """Checks that the server refuses requests of foreign web sites.
 
     Args:
-        address: that the server listens on.
-        port: that the server listens on.
+        address: address that the server listens on.
+        port: port that the server listens on.
 
     Raises:
         MissingDependencyError: a foreign request was accepted.

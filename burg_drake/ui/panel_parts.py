@@ -96,7 +96,7 @@ def html_table(heads: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers
     """A table.
 
     Args:
-        heads: of its columns.
+        heads: heads of its columns.
         rows: their cells.
         numbers: count of number columns, from the right.
     """
@@ -128,11 +128,11 @@ def text_button(
 
     Args:
         gui: API of viser.
-        label: on it.
+        label: text on the button.
         width: twelfths of the panel: 2, 3, 4, 6 or 12.
         icon: beside the label, one of `viser.Icon`.
         primary: whether to highlight the button.
-        options: of viser's `add_button`.
+        options: options of viser's `add_button`.
     """
     look = "bd-strong-button" if primary else "bd-quiet-button"
     return _mark_button(gui.add_button(label, **options), icon, width, look)
@@ -155,7 +155,7 @@ def set_button_picture(button: Any, png: bytes | None, *, chosen: bool = False) 
     """Gives a button another picture.
 
     Args:
-        button: of `picture_button`.
+        button: button made by `picture_button`.
         png: a blank if None.
         chosen: whether to draw a frame around it.
     """
@@ -184,11 +184,11 @@ def ask_for_confirmation(
     """Asks on a page for confirmation of an action.
 
     Args:
-        actions: of the page.
+        actions: actions of the page.
         client: the page.
-        title: of the question.
+        title: title of the question.
         text: what would be lost.
-        label: of the button that confirms.
+        label: label of the button that confirms.
         action: run if confirmed.
     """
     gui = client.gui
@@ -211,7 +211,7 @@ class SidePanel:
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:

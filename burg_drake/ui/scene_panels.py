@@ -34,7 +34,7 @@ class SummaryPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
         keys: dialog with mouse actions and shortcuts.
     """
 
@@ -86,7 +86,7 @@ def scene_names(folder: Path) -> tuple[str, ...]:
     """Names of the scene files of a folder, without their suffix, in alphabetical order.
 
     Args:
-        folder: that was opened; unreadable files in it are left out.
+        folder: the folder that was opened; unreadable files in it are left out.
     """
     max_files = 500  # Maximum number of files read.
     head_bytes = 4096  # Bytes from the start of a file that are searched for the library.
@@ -121,10 +121,14 @@ class FilePanel(SidePanel):
             self._page_button("Save scene", self.save, primary=True, icon=icon.DEVICE_FLOPPY)
         with gui.add_folder("Load"):
             self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
-            self._page_button("Load scene", self._load, icon=icon.FOLDER_OPEN)
+            self._page_button("Load scene", self._load_scene, icon=icon.FOLDER_OPEN)
             self._library: Any = gui.add_dropdown("Library", actions.session.libraries())
             self._page_button(
-                "New scene", self._begin, width=6, icon=icon.FILE_PLUS, hint="With this library"
+                "New scene",
+                self._begin_scene,
+                width=6,
+                icon=icon.FILE_PLUS,
+                hint="With this library",
             )
             self._button(
                 "Use library",
@@ -160,8 +164,8 @@ class FilePanel(SidePanel):
         """Saves the scene under the name in the field."""
         session, name = self._actions.session, self._name.value.strip()
         view = session.view
-        own = view.path is not None and name == view.path.stem
-        other_name = None if own else name or None
+        is_own_name = view.path is not None and name == view.path.stem
+        other_name = None if is_own_name else name or None
 
         def overwrite() -> None:
             session.save(other_name, overwrite=True)
@@ -174,11 +178,11 @@ class FilePanel(SidePanel):
         assert view.path is not None
         self._actions.show_message(client, str(view.path), "Saved")
 
-    def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
+    def _open_scene(self, open_scene: Callable[..., Any], name: str, client: Client) -> None:
         """Opens another scene; asks first if changes would be lost."""
-        discard = partial(open, name, discard=True)
+        discard = partial(open_scene, name, discard=True)
         try:
-            open(name)
+            open_scene(name)
         except UnsavedChanges as error:
             self._confirm(client, error, "Discard changes?", "Discard them", discard)
 
@@ -204,9 +208,9 @@ class FilePanel(SidePanel):
                 save_immediately=True,
             )
 
-    def _load(self, client: Client) -> None:
+    def _load_scene(self, client: Client) -> None:
         if self._scene.value != NO_SCENES:
-            self._open(self._actions.session.load, self._scene.value, client)
+            self._open_scene(self._actions.session.load, self._scene.value, client)
 
-    def _begin(self, client: Client) -> None:
-        self._open(self._actions.session.new, self._library.value, client)
+    def _begin_scene(self, client: Client) -> None:
+        self._open_scene(self._actions.session.new, self._library.value, client)

@@ -58,7 +58,7 @@ class ObjectMeshes:
     """Meshes by object name, loaded when first used.
 
     Args:
-        library: of the objects.
+        library: library of the objects.
     """
 
     def __init__(self, library: ObjectLibrary) -> None:
@@ -167,26 +167,26 @@ class SceneView:
 
     Args:
         scene: API of viser, whose world frame is the scene frame.
-        shapes: of the library's objects.
+        meshes: meshes of the library's objects.
         attach: called with each new handle that can be clicked or dragged, and its instance's
             name.
     """
 
     def __init__(
-        self, scene: viser.SceneApi, shapes: ObjectMeshes, attach: Callable[[Any, str], None]
+        self, scene: viser.SceneApi, meshes: ObjectMeshes, attach: Callable[[Any, str], None]
     ) -> None:
         self._scene = scene
-        self._shapes = shapes
+        self._object_meshes = meshes
         self._attach = attach
         self._nodes: dict[str, _InstanceNodes] = {}
         self._coloring: Coloring = "objects"
         self._color_count = 0
 
-    def use_library(self, shapes: ObjectMeshes) -> None:
+    def use_library(self, meshes: ObjectMeshes) -> None:
         """Uses the meshes of another library from now on."""
-        if shapes is not self._shapes:
+        if meshes is not self._object_meshes:
             self.show({}, self._coloring)
-            self._shapes = shapes
+            self._object_meshes = meshes
 
     def show(self, instances: Mapping[str, ShownInstance], coloring: Coloring) -> None:
         """Shows instances in the browser; sends changes only."""
@@ -209,15 +209,15 @@ class SceneView:
         frame = self._scene.add_frame(f"{OBJECTS_NODE}/{name}", show_axes=False)
         mesh: Any
         try:
-            shape = self._shapes[shown.object]
+            object_mesh = self._object_meshes[shown.object]
         except BurgError:  # the issues report the error; the ball shows the position
             mesh = self._scene.add_icosphere(
                 f"{OBJECTS_NODE}/{name}/look", radius=ball_radius, color=(200, 60, 200)
             )
             p_OV = ball_radius * np.vstack([np.eye(3), -np.eye(3)])
         else:
-            mesh = self._scene.add_glb(f"{OBJECTS_NODE}/{name}/look", shape.glb)
-            p_OV = hull_mesh(shape.vertices.astype(float)).vertices
+            mesh = self._scene.add_glb(f"{OBJECTS_NODE}/{name}/look", object_mesh.glb)
+            p_OV = hull_mesh(object_mesh.vertices.astype(float)).vertices
         self._attach(mesh, name)
         outline = self._scene.add_line_segments(
             f"/outlines/{name}",
@@ -261,11 +261,15 @@ class SceneView:
 
     def _add_tinted_mesh(self, name: str, object: str, color: Rgb8) -> viser.MeshHandle | None:
         try:
-            shape = self._shapes[object]
+            object_mesh = self._object_meshes[object]
         except BurgError:
             return None
         tint = self._scene.add_mesh_simple(
-            f"{OBJECTS_NODE}/{name}/tint", shape.vertices, shape.faces, color=color, side="double"
+            f"{OBJECTS_NODE}/{name}/tint",
+            object_mesh.vertices,
+            object_mesh.faces,
+            color=color,
+            side="double",
         )
         self._attach(tint, name)
         return tint
@@ -308,12 +312,12 @@ class ProposalView:
         self._shown: SettlingProposal | None = None
         self._handles: list[Any] = []
 
-    def show(self, proposal: SettlingProposal | None, shapes: ObjectMeshes) -> None:
+    def show(self, proposal: SettlingProposal | None, meshes: ObjectMeshes) -> None:
         """Shows a proposal in the browser.
 
         Args:
-            proposal: of the view; None hides it.
-            shapes: of the library's objects.
+            proposal: proposal of the view; None hides it.
+            meshes: meshes of the library's objects.
         """
         if proposal is self._shown:
             return
@@ -327,18 +331,18 @@ class ProposalView:
         moved = names_of_moved_instances(proposal, distance=2e-3, angle_deg=2.0)
         for instance in proposal.document.instances:
             if instance_name(instance) in moved:
-                self._add(instance_name(instance), instance.object, instance.X_SO.matrix(), shapes)
+                self._add(instance_name(instance), instance.object, instance.X_SO.matrix(), meshes)
 
-    def _add(self, name: str, object: str, X_SO: Any, shapes: ObjectMeshes) -> None:
+    def _add(self, name: str, object: str, X_SO: Any, meshes: ObjectMeshes) -> None:
         try:
-            shape = shapes[object]
+            object_mesh = meshes[object]
         except BurgError:  # the issues report the error
             return
         self._handles.append(
             self._scene.add_mesh_simple(
                 f"/ghosts/{name}",
-                shape.vertices,
-                shape.faces,
+                object_mesh.vertices,
+                object_mesh.faces,
                 color=(245, 159, 0),
                 opacity=0.5,
                 side="double",

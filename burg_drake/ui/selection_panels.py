@@ -50,7 +50,7 @@ class ObjectPanel(SidePanel):
 
     Args:
         gui: API of viser, inside the container for the panel.
-        actions: of the page.
+        actions: actions of the page.
         switch_axes: switches the arrows between the axes of the board and of the object.
     """
 

@@ -39,7 +39,7 @@ class SetupPage:
         session: the scene.
 
     Attributes:
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
@@ -47,15 +47,15 @@ class SetupPage:
         self._server, self._session = server, session
         view = session.view
         self._pictures = self._pictures_of(view.library)
-        self._shapes = ObjectMeshes(view.library)
+        self._meshes = ObjectMeshes(view.library)
         self._configure_scene()
         self._board = BoardView(server.scene, session.station)
         self._layers = BoardLayers(server.scene)
         self._gizmo = Gizmo(server.scene, self.actions)
         self._drags = ObjectDrags(self.actions, self._gizmo)
         self._picking = Picking(server.scene, self.actions, self._drags)
-        self._scene = SceneView(server.scene, self._shapes, self._attach)
-        self._ghosts = ProposalView(server.scene)
+        self._scene = SceneView(server.scene, self._meshes, self._attach)
+        self._proposal = ProposalView(server.scene)
         self._heights = HeightView(server.scene)
         self._build()
         self.actions.on_refused = self._refresh
@@ -140,8 +140,8 @@ class SetupPage:
     def _release_drags(self, client: viser.ClientHandle | None) -> None:
         if client is not None and self._keys.close(client):
             return
-        who = None if client is None else client.client_id
-        if who is None or not (self._drags.cancel_drag(who) or self._gizmo.cancel_drag(who)):
+        id = None if client is None else client.client_id
+        if id is None or not (self._drags.cancel_drag(id) or self._gizmo.cancel_drag(id)):
             self._session.select(())
 
     def _attach(self, handle: Any, name: str) -> None:
@@ -164,15 +164,15 @@ class SetupPage:
     def _refresh(self) -> None:
         """Updates the page from the session's current view."""
         view = self._session.view
-        if view.library is not self._shapes.library:
+        if view.library is not self._meshes.library:
             self._pictures.close()
             self._pictures = self._pictures_of(view.library)
-            self._shapes = ObjectMeshes(view.library)
-            self._scene.use_library(self._shapes)
+            self._meshes = ObjectMeshes(view.library)
+            self._scene.use_library(self._meshes)
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
             self._scene.show(_shown_instances(view), self._display.coloring)
-            self._ghosts.show(view.proposal, self._shapes)
+            self._proposal.show(view.proposal, self._meshes)
             self._heights.show(view)
             self._gizmo.show(view)
             for panel in self._panels:

@@ -93,9 +93,9 @@ class Shortcut:
     """A keyboard shortcut.
 
     Attributes:
-        name: of its action.
+        name: name of its action.
         key: name of the key in viser.
-        modifier: to be held down, or None.
+        modifier: key to be held down, or None.
         label: description of the action.
     """
 
@@ -183,8 +183,8 @@ def register_shortcuts(
 
     Args:
         gui: API of viser.
-        actions: of the page.
-        calls: by the names of `SHORTCUTS`; each takes the page on which the key was pressed.
+        actions: actions of the page.
+        calls: functions by the names of `SHORTCUTS`; each takes the page whose key was pressed.
     """
     for shortcut in SHORTCUTS:
         call = calls[shortcut.name]
@@ -209,7 +209,7 @@ class KeysDialog:
     """Shows the list of mouse actions and shortcuts on pages, with a button to close it.
 
     Args:
-        actions: of the page.
+        actions: actions of the page.
     """
 
     def __init__(self, actions: PageActions) -> None:

@@ -32,7 +32,7 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     """A camera pose that has a board in view.
 
     Args:
-        board: in the scene frame.
+        board: board in the scene frame.
         back: (3,) unit vector in S from the board to the camera.
         fov: vertical angle of view [rad].
         aspect: width over height of the page's scene.
@@ -93,7 +93,7 @@ class PageViews:
     """Keeps the board in view on every page.
 
     Args:
-        server: of viser.
+        server: server of viser.
         board: returns the current board, in any thread.
     """
 

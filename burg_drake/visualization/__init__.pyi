@@ -77,7 +77,6 @@ from .html_page import (
     Html as Html,
     PageTable as PageTable,
     element as element,
-    html_document as html_document,
     join as join,
     page_style as page_style,
     render_page as render_page,

@@ -52,8 +52,8 @@ def interval_mark(share: float, low: float, high: float) -> Html:
 HISTOGRAM_BINS = 20
 
 
-class _Mirrored:
-    """Lengths in a mirrored histogram, in SVG units."""
+class _Layout:
+    """Positions and lengths in a mirrored histogram, in SVG units."""
 
     left = 34  # Start of the axis.
     axis = 262  # Length of the axis.
@@ -102,7 +102,7 @@ class _Axis:
     step: float
 
     def x(self, value: float) -> float:
-        return _Mirrored.left + _Mirrored.axis * value / self.end
+        return _Layout.left + _Layout.axis * value / self.end
 
 
 def mirrored_histogram(
@@ -123,32 +123,33 @@ def mirrored_histogram(
         title, unit: title and unit of the horizontal axis.
         limit: limit to draw as a line; the axis always includes it.
     """
-    size = _Mirrored
     failed = np.concatenate([np.empty(0), *(s.values for s in failures)])
     axis = _fit_axis(success.values if len(success.values) else failed, limit)
-    foot = size.base + (size.half if len(failed) else 0)
+    foot = _Layout.base + (_Layout.half if len(failed) else 0)
     above = _series_text(success.name, success.values, unit)
     shapes = [
         svg_text(f"{title} [{unit}]", 0, 12, "title"),
-        svg_text(above, size.left, size.head - 6, "strong"),
+        svg_text(above, _Layout.left, _Layout.head - 6, "strong"),
     ]
     texts = [above]
-    height = foot + size.line
+    height = foot + _Layout.line
     if len(failed):
         texts.append(_series_text(f"not {success.name}", failed, unit))
-        height += size.line
-        shapes.append(svg_text(texts[1], size.left, height - 3, "strong"))
+        height += _Layout.line
+        shapes.append(svg_text(texts[1], _Layout.left, height - 3, "strong"))
     beyond = any((s.values > axis.end).any() for s in (success, *failures))
     shapes += _axis_ticks(axis, foot, beyond=beyond)
     shapes += [*_half_bars([success], axis, -1), *_median_mark(success.values, axis, -1)]
     shapes += [*_half_bars(failures, axis, 1), *_median_mark(failed, axis, 1)]
-    shapes.append(svg_line(size.left, size.base, size.left + size.axis, size.base, "axis"))
+    shapes.append(
+        svg_line(_Layout.left, _Layout.base, _Layout.left + _Layout.axis, _Layout.base, "axis")
+    )
     if limit:
         x, text = axis.x(limit.value), f"{limit.name} {limit.value:g} {unit}"
-        shapes.append(svg_line(x, size.head - 2, x, foot, "limit"))
-        shapes.append(svg_text(text, x - 4, size.head + 9, "end strong"))
+        shapes.append(svg_line(x, _Layout.head - 2, x, foot, "limit"))
+        shapes.append(svg_text(text, x - 4, _Layout.head + 9, "end strong"))
     label = f"Histogram of {title}: {'; '.join(texts)}"
-    return _chart(size.width, height, label, *shapes, style="histogram")
+    return _chart(_Layout.width, height, label, *shapes, style="histogram")
 
 
 def _fit_axis(focus: Array, limit: Limit | None) -> _Axis:
@@ -173,11 +174,11 @@ def _half_bars(series: Sequence[HistogramSeries], axis: _Axis, sign: int) -> lis
     places = [f"{a:g} to {b:g}" for a, b in itertools.pairwise(edges)]
     bars: list[Html] = []
     for (left, right), place, column in zip(
-        [*ranges, _Mirrored.overflow], [*places, f"above {axis.end:g}"], columns, strict=True
+        [*ranges, _Layout.overflow], [*places, f"above {axis.end:g}"], columns, strict=True
     ):
-        end = _Mirrored.base
+        end = _Layout.base
         for s, count in zip(series, column, strict=True):
-            height = _Mirrored.bar * count / highest
+            height = _Layout.bar * count / highest
             if count:
                 y = end if sign > 0 else end - height
                 tip = element("title", f"{s.name}: {count}, {place}")
@@ -185,8 +186,8 @@ def _half_bars(series: Sequence[HistogramSeries], axis: _Axis, sign: int) -> lis
             end += sign * height
     if overflowed := sum(columns[-1]):  # the number beyond the last bar's end
         y = end + 3 * sign + (8 if sign > 0 else 0)
-        bars.append(svg_text(format_count(overflowed), _Mirrored.overflow[1], y, "end"))
-    x, y = _Mirrored.left - 4, _Mirrored.base + sign * _Mirrored.bar
+        bars.append(svg_text(format_count(overflowed), _Layout.overflow[1], y, "end"))
+    x, y = _Layout.left - 4, _Layout.base + sign * _Layout.bar
     return [*bars, svg_text(format_count(highest), x, y, "end", dy="0.35em")]
 
 
@@ -194,16 +195,16 @@ def _median_mark(values: Array, axis: _Axis, sign: int) -> list[Html]:
     if not len(values):
         return []
     median = float(np.median(values))
-    x = axis.x(median) if median <= axis.end else sum(_Mirrored.overflow) / 2
-    return [svg_line(x, _Mirrored.base, x, _Mirrored.base + sign * _Mirrored.half, "median")]
+    x = axis.x(median) if median <= axis.end else sum(_Layout.overflow) / 2
+    return [svg_line(x, _Layout.base, x, _Layout.base + sign * _Layout.half, "median")]
 
 
 def _axis_ticks(axis: _Axis, foot: float, *, beyond: bool) -> list[Html]:
-    y = foot + _Mirrored.line - 3
-    marks = [svg_text(f">{axis.end:g}", _Mirrored.overflow[1], y, "end")] if beyond else []
+    y = foot + _Layout.line - 3
+    marks = [svg_text(f">{axis.end:g}", _Layout.overflow[1], y, "end")] if beyond else []
     for k in range(round(axis.end / axis.step) + 1):
         x = axis.x(k * axis.step)
-        marks.append(svg_line(x, _Mirrored.base - _Mirrored.half, x, foot, "grid"))
+        marks.append(svg_line(x, _Layout.base - _Layout.half, x, foot, "grid"))
         marks.append(svg_text(f"{k * axis.step:.6g}", x, y, "middle"))
     return marks
 
@@ -270,10 +271,10 @@ def ranked_chart(ranked: Sequence[RankedShare]) -> Html:
         svg_text(f"{format_count(len(ranked))} scenes, worst to best", left, 184, "title")
     )
     shares = [item.share for _, item in tried]
-    found = "nothing was executed"
+    rates = "nothing was executed"
     if shares:
-        found = f"from {format_percent(min(shares))} to {format_percent(max(shares))}"
-    label = f"Success when executed of {len(ranked)} scenes: {found}"
+        rates = f"from {format_percent(min(shares))} to {format_percent(max(shares))}"
+    label = f"Success when executed of {len(ranked)} scenes: {rates}"
     return _chart(480, 190, label, *shapes, style="histogram ranked")
 
 
@@ -330,22 +331,24 @@ def _bar_file(counts: Indices, title: str, unit: str, ticks: list[tuple[float, f
     width, height = 360, 200  # Pixels.
     left, right, top, base = 46, 346, 30, 160  # Edges of the bars [pixel].
     step = (right - left) / len(counts)
-    most = max(1, int(counts.max(initial=0)))
+    max_count = max(1, int(counts.max(initial=0)))
     shapes = [
         svg_rectangle(0, 0, width, height, class_="paper"),
         svg_text(title, left, 18, "title"),
     ]
     for k, count in enumerate(counts.tolist()):
-        high = (base - top) * count / most
+        bar_height = (base - top) * count / max_count
         shapes.append(
-            svg_rectangle(left + step * k + 0.5, base - high, step - 1.0, high, class_="bar")
+            svg_rectangle(
+                left + step * k + 0.5, base - bar_height, step - 1.0, bar_height, class_="bar"
+            )
         )
     shapes.append(svg_line(left, base, right, base, "axis"))
     for share, value in ticks:
         shapes.append(svg_text(f"{value:g}", left + (right - left) * share, base + 15, "middle"))
     shapes.append(svg_text(unit, (left + right) / 2, height - 8, "middle"))
     shapes += [
-        svg_text(f"{most:,}", left - 6, top + 8, "end"),
+        svg_text(f"{max_count:,}", left - 6, top + 8, "end"),
         svg_text("0", left - 6, base, "end"),
     ]
     return element(

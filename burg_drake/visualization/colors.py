@@ -163,7 +163,7 @@ class OutcomeGroup:
     """Outcomes that share a colour.
 
     Attributes:
-        name: for legends.
+        name: name for legends.
         rgba: colour; grasps that ended early are fainter, as they are many.
         outcomes: the members.
     """

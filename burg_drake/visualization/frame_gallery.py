@@ -74,7 +74,7 @@ def show_frames(
         hand: document of the hand.
         model: model file of the hand.
         gripper: the hand as formats describe it.
-        formats: at least one.
+        formats: at least one format.
         meshcat: Meshcat to draw in; anything below `/drake/frames` is replaced.
 
     Returns:

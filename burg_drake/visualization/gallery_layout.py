@@ -40,7 +40,7 @@ class GalleryRow:
 
     Attributes:
         label: width of the text at the row's start [m].
-        columns: items in columns, aligned with those of other rows.
+        columns: items in columns, aligned with the columns of other rows.
         rest: items that follow without alignment.
     """
 
@@ -55,7 +55,7 @@ class PlacedGalleryRow:
 
     Attributes:
         p_WL: (3,) left foot of its label [m].
-        p_WI: (3,) origins of its items, those in columns first [m].
+        p_WI: (3,) origins of its items [m]: the items in columns, then the rest.
         captions: (3,) middle of each item's caption's foot [m].
     """
 
@@ -69,7 +69,7 @@ class GalleryLayout:
     """The gallery.
 
     Attributes:
-        rows: in the order given.
+        rows: rows in the order given.
         banks: (2, 2) corners (lower, upper) in x and y of each bank's floor [m].
         height: height of the highest item [m].
     """
@@ -98,7 +98,7 @@ def layout_gallery(
     """Places rows in the number of banks that lets the camera come nearest.
 
     Args:
-        rows: at least one.
+        rows: at least one row.
         unit: typical size of an object [m].
         line: height of a line of text [m].
         max_banks: largest number of banks, at least 1.

@@ -72,7 +72,7 @@ def label_mesh(
     """Text as a textured quadrangle in the plane z = 0, along +x from the origin, top line first.
 
     Args:
-        lines: of text; the first is bold.
+        lines: lines of text; the first is bold.
         height: line spacing before stretching [m]; the last line's foot is at y = 0.
         stretch: factor for the letters along y.
         color: red, green, blue in [0, 1] (sRGB).

@@ -207,7 +207,7 @@ def grasp_triangles(
     Args:
         X_WG: (N, 4, 4) grasps.
         width: (N,) distance between the fingers [m].
-        radius: of the bars [m].
+        radius: radius of the bars [m].
 
     Returns:
         Vertices (3, V) in the world [m] and triangles (3, F).

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import burg_drake
-from burg_drake.core import format_count, format_duration, format_number, format_percent
+from burg_drake.core import NO_VALUE, format_count, format_duration, format_number, format_percent
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -40,16 +40,17 @@ def element(name: str, /, *children: Child, **attributes: Attribute) -> Html:
         attributes: attributes, whose values are escaped. Underscores stand for hyphens, a trailing
             one is dropped (`class_`); None leaves the attribute out.
     """
-    # HTML elements without an end tag, and SVG elements without content.
-    void_elements = ("br", "hr", "meta", "img", "input", "rect", "line", "path", "circle")
+    html_void_elements = ("br", "hr", "meta", "img", "input")  # without an end tag
+    svg_shapes = ("rect", "line", "path", "circle")
     written = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"'
         for key, value in attributes.items()
         if value is not None
     )
-    if name in void_elements and not children:
-        closing = "/" if name in ("rect", "line", "path", "circle") else ""
-        return Html(f"<{name}{written}{closing}>")
+    if name in html_void_elements and not children:
+        return Html(f"<{name}{written}>")
+    if name in svg_shapes and not children:
+        return Html(f"<{name}{written}/>")
     return Html(f"<{name}{written}>{join(*children)}</{name}>")
 
 
@@ -91,7 +92,7 @@ def join(*children: Child) -> Html:
     return Html("".join(c if isinstance(c, Html) else escape(str(c)) for c in given))
 
 
-def page_style(package: str, name: str) -> str:
+def page_style(package: str, name: str) -> Html:
     """Style sheet of a page, after the rules that all pages share.
 
     Args:
@@ -99,19 +100,8 @@ def page_style(package: str, name: str) -> str:
         name: file name of the style sheet.
     """
     sheets = ("burg_drake.visualization", "page.css"), (package, name)
-    return "".join((files(where) / file).read_text(encoding="utf-8") for where, file in sheets)
-
-
-def html_document(title: str, style: str, *content: Child) -> str:
-    """A whole HTML document.
-
-    Args:
-        title: title of the window.
-        style: style sheet.
-        content: content of the body.
-    """
-    values = {"title": title, "style": Html(style), "content": join(*content)}
-    return render_page("visualization/document.html.jinja", **values)
+    texts = ((files(where) / file).read_text(encoding="utf-8") for where, file in sheets)
+    return Html("".join(texts))
 
 
 @dataclass(frozen=True)
@@ -120,7 +110,7 @@ class PageTable:
 
     Attributes:
         head: names of the columns.
-        rows: cells of each row; the first cell names the row. "·" stands for no value.
+        rows: cells of each row; the first cell names the row.
         numbers: indices of right-aligned columns.
         style: CSS class.
         total: whether the last row is the sum of the others.
@@ -159,6 +149,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
+    environment.globals["NO_VALUE"] = NO_VALUE
     environment.filters |= {
         "count": format_count,
         "degrees": math.degrees,

@@ -49,8 +49,8 @@ def hydroelastic_meshes(
     """The hydroelastic meshes of objects, by name.
 
     Args:
-        library: whose SDFs to load.
-        names: of its objects.
+        library: library whose SDFs to load.
+        names: names of its objects.
 
     Raises:
         InvalidInputError: Drake cannot load an SDF.

@@ -25,7 +25,7 @@ class LegendEntry:
 
     Attributes:
         label: what the colour stands for.
-        color: as CSS has it.
+        color: CSS colour.
         paths: Meshcat paths that the entry shows and hides.
         shown: whether the paths are visible when the page is opened; if not, the caller hides them.
     """

@@ -90,21 +90,23 @@ def show_library(
     meshcat.Delete(GALLERY_PATH)
     unit = _usual_size(map(library.entry, chosen))
     contact = hydroelastic_meshes(library, chosen)
-    objects = {name: _object_things(library, name, contact[name], unit) for name in chosen}
+    objects = {name: _object_exhibits(library, name, contact[name], unit) for name in chosen}
     labels = [_object_label(library, name, unit) for name in chosen]
     rows = [
         GalleryRow(
-            label[1], [t.item for t in things[:MAX_COLUMNS]], [t.item for t in things[MAX_COLUMNS:]]
+            label[1],
+            [exhibit.item for exhibit in exhibits[:MAX_COLUMNS]],
+            [exhibit.item for exhibit in exhibits[MAX_COLUMNS:]],
         )
-        for label, things in zip(labels, objects.values(), strict=True)
+        for label, exhibits in zip(labels, objects.values(), strict=True)
     ]
     layout = layout_gallery(rows, unit, TEXT_STRETCH * LINE_HEIGHT * unit)
     for name, label, row in zip(chosen, labels, layout.rows, strict=True):
         left = row.p_WL + np.array([0.5 * label[1], 0.0, 0.0])
         write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", label, left)
-        for thing, p_WI, p_WL in zip(objects[name], row.p_WI, row.captions, strict=True):
-            _draw_thing(meshcat, thing, p_WI, unit)
-            write_label(meshcat, f"{thing.path}/caption", thing.caption, p_WL)
+        for exhibit, p_WI, p_WL in zip(objects[name], row.p_WI, row.captions, strict=True):
+            _draw_exhibit(meshcat, exhibit, p_WI, unit)
+            write_label(meshcat, f"{exhibit.path}/caption", exhibit.caption, p_WL)
     _show_floor(meshcat, layout)
     return _gallery_legend(any(m.compliant for meshes in contact.values() for m in meshes))
 
@@ -163,7 +165,7 @@ def _gallery_legend(compliant: bool) -> tuple[LegendEntry, ...]:
 
 
 @dataclass(frozen=True)
-class GalleryThing:
+class GalleryExhibit:
     """An exhibit of the gallery: an object in one of its representations.
 
     Attributes:
@@ -183,17 +185,17 @@ class GalleryThing:
     has_tile: bool = False
 
 
-def _object_things(
+def _object_exhibits(
     library: ObjectLibrary, name: str, contact: tuple[HydroelasticMesh, ...], unit: float
-) -> list[GalleryThing]:
+) -> list[GalleryExhibit]:
     """The columns of an object, then its stable poses; `unit` is the size of a usual object [m]."""
     explosion = 0.25  # Share of each piece's distance from the middle by which it is moved outward.
     entry = library.entry(name)
     meshes = [library.mesh(piece) for piece in entry.pieces]
     hulls = [np.asarray(mesh.vertices) for mesh in meshes]
     corners = np.vstack([*hulls, _hull_corners(library, name)])
-    apart = [h + o for h, o in zip(hulls, explosion_offsets(hulls, explosion), strict=True)]
-    pieces = [(v, np.asarray(m.faces)) for v, m in zip(apart, meshes, strict=True)]
+    moved_apart = [h + o for h, o in zip(hulls, explosion_offsets(hulls, explosion), strict=True)]
+    pieces = [(v, np.asarray(m.faces)) for v, m in zip(moved_apart, meshes, strict=True)]
     touching = np.vstack([m.vertices for m in contact]) if contact else corners
     visual = gltf_mesh(library.path(entry.mesh))
 
@@ -207,22 +209,24 @@ def _object_things(
     draw_contact = partial(_draw_contact, meshes=contact, R_WO=R_WO)
     columns = (
         ("visual", "visual", corners, draw_visual),
-        ("pieces", count_with_noun(count, "piece"), np.vstack(apart), draw_pieces),
+        ("pieces", count_with_noun(count, "piece"), np.vstack(moved_apart), draw_pieces),
         ("contact", kind, touching, draw_contact),
     )
-    things = []
+    exhibits = []
     for column, text, points, draw in columns:
         caption = _caption_mesh((text,), unit)
         item = _room_for(points @ R_WO.T, caption)
-        things.append(GalleryThing(f"{GALLERY_PATH}/{column}/{name}", R_WO, item, caption, draw))
+        exhibits.append(
+            GalleryExhibit(f"{GALLERY_PATH}/{column}/{name}", R_WO, item, caption, draw)
+        )
     for k, pose in enumerate(entry.stable_poses):
         path = f"{GALLERY_PATH}/poses/{name}/{k}"
         R_WO = _turn_to_camera(corners, pose.X_SO.matrix()[:3, :3])
         text = percent_text(pose.probability) + (", rolls" if pose.rolls else "")
         caption = _caption_mesh((text,), unit)
         item = _room_for(corners @ R_WO.T, caption)
-        things.append(GalleryThing(path, R_WO, item, caption, draw_visual, has_tile=True))
-    return things
+        exhibits.append(GalleryExhibit(path, R_WO, item, caption, draw_visual, has_tile=True))
+    return exhibits
 
 
 def _hull_corners(library: ObjectLibrary, name: str) -> Array:
@@ -265,20 +269,20 @@ def _contact_caption(entry: ObjectEntry) -> str:
     }.get(entry.contact.kind, entry.contact.kind)
 
 
-def _draw_thing(meshcat: Meshcat, thing: GalleryThing, p_WI: Array, unit: float) -> None:
-    """Draws a thing with its origin at `p_WI` (3,), higher if it stands on a tile [m]."""
+def _draw_exhibit(meshcat: Meshcat, exhibit: GalleryExhibit, p_WI: Array, unit: float) -> None:
+    """Draws an exhibit with its origin at `p_WI` (3,), higher if it stands on a tile [m]."""
     tile_color = Rgba(0.70, 0.75, 0.79, 1.0)
     margin_share = 0.04  # Of the gallery's unit.
-    thing.draw(meshcat, f"{thing.path}/object")
+    exhibit.draw(meshcat, f"{exhibit.path}/object")
     p_WO = p_WI
-    if thing.has_tile:
+    if exhibit.has_tile:
         margin = margin_share * unit
-        lower, upper = thing.item.lower[:2] - margin, thing.item.upper[:2] + margin
+        lower, upper = exhibit.item.lower[:2] - margin, exhibit.item.upper[:2] + margin
         bounds = np.array([lower, upper]) + p_WI[:2]
-        draw_slab(meshcat, f"{thing.path}/ground", bounds, 0.0, tile_color)
+        draw_slab(meshcat, f"{exhibit.path}/ground", bounds, 0.0, tile_color)
         p_WO = p_WI + np.array([0.0, 0.0, SLAB_HEIGHT])
-    X_WO = RigidTransform(make_pose(thing.R_WO, p_WO))
-    meshcat.SetTransform(f"{thing.path}/object", X_WO)
+    X_WO = RigidTransform(make_pose(exhibit.R_WO, p_WO))
+    meshcat.SetTransform(f"{exhibit.path}/object", X_WO)
 
 
 def _draw_pieces(
@@ -358,7 +362,7 @@ def show_objects_for_grasps(
 
     Args:
         library: library of the objects.
-        grasps: at least one.
+        grasps: at least one grasp.
         width: (N,) distance between the fingers of the drawn grasps [m].
         meshcat: Meshcat to draw in; anything below `/drake/library` is replaced.
 
@@ -371,22 +375,22 @@ def show_objects_for_grasps(
     meshcat.Delete(GALLERY_PATH)
     counts = Counter(grasps.object.tolist())
     unit = _usual_size(map(library.entry, counts))
-    things = [_object_with_grasps(library, name, grasps, width, unit) for name in counts]
-    layout, rows = _layout_rows(things, unit)
+    exhibits = [_object_with_grasps(library, name, grasps, width, unit) for name in counts]
+    layout, rows = _layout_rows(exhibits, unit)
     X_WO = {}
     for members, row in zip(rows, layout.rows, strict=True):
-        for (name, thing), p_WI, p_WL in zip(members, row.p_WI, row.captions, strict=True):
-            X_WO[name] = make_pose(thing.R_WO, p_WI)
-            thing.draw(meshcat, thing.path)
-            meshcat.SetTransform(thing.path, RigidTransform(X_WO[name]))
-            write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", thing.caption, p_WL)
+        for (name, exhibit), p_WI, p_WL in zip(members, row.p_WI, row.captions, strict=True):
+            X_WO[name] = make_pose(exhibit.R_WO, p_WI)
+            exhibit.draw(meshcat, exhibit.path)
+            meshcat.SetTransform(exhibit.path, RigidTransform(X_WO[name]))
+            write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", exhibit.caption, p_WL)
     _show_floor(meshcat, layout)
     return np.stack([X_WO[name] for name in grasps.object.tolist()]) @ grasps.X_OG
 
 
 def _object_with_grasps(
     library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float
-) -> tuple[str, GalleryThing]:
+) -> tuple[str, GalleryExhibit]:
     """Name of an object, and the object with space for its grasps."""
     corners = _hull_corners(library, name)
     R_WO = _turn_to_camera(corners, upright_rotation(library.entry(name)))
@@ -397,17 +401,17 @@ def _object_with_grasps(
     item = _room_for(np.vstack([corners, drawn.T]) @ R_WO.T, caption)
     visual = gltf_mesh(library.path(library.entry(name).mesh))
     path = f"{GALLERY_PATH}/visual/{name}"
-    return name, GalleryThing(path, R_WO, item, caption, lambda m, p: m.SetObject(p, visual))
+    return name, GalleryExhibit(path, R_WO, item, caption, lambda m, p: m.SetObject(p, visual))
 
 
 def _layout_rows(
-    things: list[tuple[str, GalleryThing]], unit: float
-) -> tuple[GalleryLayout, list[list[tuple[str, GalleryThing]]]]:
+    exhibits: list[tuple[str, GalleryExhibit]], unit: float
+) -> tuple[GalleryLayout, list[list[tuple[str, GalleryExhibit]]]]:
     """Divides objects into the number of rows that lets the camera come nearest."""
     layouts = []
-    for count in range(1, len(things) + 1):
-        size = -(-len(things) // count)
-        rows = [things[k : k + size] for k in range(0, len(things), size)]
-        items = [GalleryRow(0.0, (), [thing.item for _, thing in row]) for row in rows]
+    for count in range(1, len(exhibits) + 1):
+        size = -(-len(exhibits) // count)
+        rows = [exhibits[k : k + size] for k in range(0, len(exhibits), size)]
+        items = [GalleryRow(0.0, (), [exhibit.item for _, exhibit in row]) for row in rows]
         layouts.append((layout_gallery(items, unit, TEXT_STRETCH * LINE_HEIGHT * unit, 1), rows))
     return min(layouts, key=lambda layout: layout[0].distance())

@@ -28,7 +28,7 @@ def aim_at(
     """Aims the camera from the nearest place with all points in view; it orbits their middle.
 
     Args:
-        meshcat: whose camera to set.
+        meshcat: Meshcat whose camera is set.
         p_WQ: (N, 3) points [m].
         forward: (3,) viewing direction in the world; not vertical.
         field_of_view_deg: vertical angle of view.
@@ -95,8 +95,8 @@ class TriadStyle:
     """How a frame is drawn.
 
     Attributes:
-        length: of an axis, with its head [m].
-        radius: of an axis [m].
+        length: length of an axis, with its head [m].
+        radius: radius of an axis [m].
         head: length of its arrow head [m].
     """
 

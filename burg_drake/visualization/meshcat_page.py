@@ -109,7 +109,7 @@ def save_html(
     Args:
         meshcat: the view.
         path: file to write.
-        title: of the page.
+        title: title of the page.
         caption: lines below the title.
         legend: colours and what they stand for.
         controls: further ones, below the legend.

@@ -127,10 +127,10 @@ def fit_view(
     return FlatView(R_WC, float(scale), corner, (width, height))
 
 
-def path_data(places: Array, *, closed: bool = True, decimals: int = 1) -> str:
-    """A polygon or line through places (N, 2) as the `d` of an SVG path."""
+def path_data(points: Array, *, closed: bool = True, decimals: int = 1) -> str:
+    """A polygon or line through points (N, 2) as the `d` of an SVG path."""
     corners = "L".join(
-        f"{_decimal_text(x, decimals)} {_decimal_text(y, decimals)}" for x, y in places
+        f"{_decimal_text(x, decimals)} {_decimal_text(y, decimals)}" for x, y in points
     )
     return f"M{corners}{'Z' if closed else ''}"
 

@@ -67,7 +67,7 @@ def show_scene(
         scene: scene on the board.
         station: station of the scene.
         meshcat: Meshcat to draw in.
-        robot: as for `build_station_diagram`.
+        robot: robot as for `build_station_diagram`.
         labels: whether to write the instances' names on the board.
 
     Returns:
@@ -124,7 +124,7 @@ def aim_camera(
         scene: scene on the board, all of which will be in view.
         station: station of the scene.
         meshcat: Meshcat whose camera to set.
-        robot: as for `build_station_diagram`.
+        robot: robot as for `build_station_diagram`.
         also: (N, 3) additional points in the world to have in view [m].
 
     Returns:

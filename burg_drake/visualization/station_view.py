@@ -76,7 +76,7 @@ def show_station(
 
 
 def draw_obstacles(station: Station, meshcat: Meshcat) -> LegendEntry:
-    """Draws the station's obstacles transparently, in place of those of a diagram."""
+    """Draws the station's obstacles transparently, in place of the obstacles of a diagram."""
     obstacles_path = "/drake/obstacles"
     opacity = 0.35  # Things behind an obstacle stay visible.
     r, g, b, _ = SurroundingsProperties.obstacle_color
@@ -154,8 +154,8 @@ def _span_radius(span: ArmSpan) -> float:
 def draw_reachability(
     reachability: ReachabilityMap, station: Station, meshcat: Meshcat, condition: str
 ) -> list[LegendEntry | ColorBar]:
-    """Draws a map as tiles: those of the lowest height on the board, smaller ones at the heights
-    above.
+    """Draws a map as tiles: large tiles on the board for the lowest height, small tiles at the
+    heights above.
 
     Args:
         reachability: the map.
@@ -163,16 +163,19 @@ def draw_reachability(
         meshcat: Meshcat to draw in.
         condition: condition of the map, for the legend.
     """
-    tile_shares = (0.94, 0.45)  # Side of a tile over that of a cell: on the board, and above it.
+    tile_shares = (
+        0.94,
+        0.45,
+    )  # Side of a tile over a cell's: on the board, and above it.
     tile_opacity = 0.85
     meshcat.Delete(MAP_PATH)
     X_WS = RigidTransform(station.document.X_WS.matrix())
-    place = np.minimum((reachability.share * REACHABILITY_BINS).astype(int), REACHABILITY_BINS - 1)
+    bins = np.minimum((reachability.share * REACHABILITY_BINS).astype(int), REACHABILITY_BINS - 1)
     colors = map_colors((np.arange(REACHABILITY_BINS) + 0.5) / REACHABILITY_BINS)
     for k, height in enumerate(reachability.heights):
         z = MAP_TILE_LIFT if k == 0 else height
         for b in range(REACHABILITY_BINS):
-            rows, columns = np.nonzero(place[k] == b)
+            rows, columns = np.nonzero(bins[k] == b)
             if not len(rows):
                 continue
             middle = np.stack([reachability.x[columns], reachability.y[rows]], axis=1)
@@ -185,7 +188,7 @@ def draw_reachability(
         title=f"share of {len(reachability.tilt)} hand orientations that the arm reaches,"
         f" {condition}",
         colors=tuple(hex_color(color) for color in colors),
-        counts=tuple(np.bincount(place.ravel(), minlength=REACHABILITY_BINS).tolist()),
+        counts=tuple(np.bincount(bins.ravel(), minlength=REACHABILITY_BINS).tolist()),
         ticks=tuple((share, f"{share:g}") for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)),
         paths=tuple(f"{MAP_PATH}/{b}" for b in range(REACHABILITY_BINS)),
     )

@@ -54,8 +54,8 @@ def record_trial(
     of the approach.
 
     Args:
-        trial: as that to be shown, and in `meshcat`. With `Engine.whole_trial` it is shown to its
-            end, beyond the moment at which its outcome was decided.
+        trial: built like the trial to be shown, and in `meshcat`. With `Engine.whole_trial` it is
+            shown to its end, beyond the moment at which its outcome was decided.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         meshcat: where the trial is shown.
@@ -177,9 +177,9 @@ def record_arm_trial(
     """Executes a plan again and records it in Meshcat, where it plays in a loop.
 
     Args:
-        trial: as that to be shown, and in `meshcat`. With `transfer` the arm is shown from its home
-            posture on; with `Engine.whole_trial` to the end, beyond the moment at which the
-            outcome was decided.
+        trial: built like the trial to be shown, and in `meshcat`. With `transfer` the arm is shown
+            from its home posture on; with `Engine.whole_trial` to the end, beyond the moment at
+            which the outcome was decided.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         plan: plan to the grasp.

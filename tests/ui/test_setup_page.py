@@ -63,7 +63,7 @@ class Setup:
         """Where a point of the scene is on the tab [pixel]."""
         client = list(self.door.server.get_clients().values())[-1]
         box = self.tab.locator("canvas").first.bounding_box()
-        x, y = PageCamera.from_viser(client.camera).on_screen(p_SQ)[0]
+        x, y = PageCamera.from_viser(client.camera).project(p_SQ)[0]
         return float(box["x"] + x * box["width"]), float(box["y"] + y * box["height"])
 
     def middle(self, name: str) -> Any:

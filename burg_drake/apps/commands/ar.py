@@ -108,7 +108,7 @@ def run_ar(arguments: argparse.Namespace) -> int:
 def _run_live_view(
     arguments: argparse.Namespace, live: cameras.LiveSession, actions: cameras.ViewActions
 ) -> int:
-    from burg_drake.apps.live_view import finish_script, placement_exit_code
+    from burg_drake.apps.live_view import finish_script, report_missing_pose
 
     scripted = _is_scripted(arguments)
     interrupted = False
@@ -133,7 +133,7 @@ def _run_live_view(
         finish_script(live, actions, check=arguments.check, snapshot=arguments.snapshot)
     if interrupted and (arguments.frames or arguments.seconds):
         raise KeyboardInterrupt
-    return placement_exit_code(live) if scripted else 0
+    return report_missing_pose(live) if scripted else 0
 
 
 def _print_how_to_stop(arguments: argparse.Namespace, live: cameras.LiveSession) -> None:

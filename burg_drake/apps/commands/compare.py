@@ -22,9 +22,9 @@ def add_rejudge_options(parser: options.Parser) -> None:
         help="evaluate each trial with objects where they were measured, to separate placement"
         " from physics; results are kept in FOLDER (default: beside the trials file)",
     )
-    who = group.add_mutually_exclusive_group()
-    options.add_workers(who, "worker processes (default: one for each core)")
-    options.add_cluster(who)
+    workers_group = group.add_mutually_exclusive_group()
+    options.add_workers(workers_group, "worker processes (default: one for each core)")
+    options.add_cluster(workers_group)
     group.add_argument("--quiet", action="store_true", help="do not show progress")
 
 
@@ -32,7 +32,7 @@ def rejudge_trials(arguments: argparse.Namespace) -> experiment.Rejudging | None
     """Judges trials again as --rejudge requests; None without that option.
 
     Args:
-        arguments: of `compare`.
+        arguments: parsed arguments of `compare`.
 
     Raises:
         InvalidInputError: there are no trials; see also `rejudge`.
@@ -117,7 +117,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
     second, trials = _split_compared_paths(arguments.run_folder, arguments.others)
     if arguments.html is not None:
         core.require_writable(arguments.html)
-    found = experiment.compare(
+    comparison = experiment.compare(
         arguments.run_folder,
         second,
         trials,
@@ -126,32 +126,36 @@ def run_compare(arguments: argparse.Namespace) -> int:
         robustness=arguments.robustness,
         seed=arguments.seed,
     )
-    again = rejudge_trials(arguments)
+    rejudging = rejudge_trials(arguments)
     if arguments.html is not None:
-        more = [] if again is None else [experiment.rejudged_section(again)]
-        page = experiment.comparison_page(found, Path(arguments.html), arguments.command_line, more)
+        additions = [] if rejudging is None else [experiment.rejudged_section(rejudging)]
+        page = experiment.comparison_page(
+            comparison, Path(arguments.html), arguments.command_line, additions
+        )
         core.atomic_write(arguments.html, page)
-    _print_comparison(found, again, arguments)
+    _print_comparison(comparison, rejudging, arguments)
     return 0
 
 
 def _print_comparison(
-    found: experiment.Comparison, again: experiment.Rejudging | None, arguments: argparse.Namespace
+    comparison: experiment.Comparison,
+    rejudging: experiment.Rejudging | None,
+    arguments: argparse.Namespace,
 ) -> None:
     if arguments.json:
-        more = {} if again is None else {"rejudged": experiment.rejudging_json(again)}
-        print(experiment.comparison_json(found, more), end="")
+        additions = {} if rejudging is None else {"rejudged": experiment.rejudging_json(rejudging)}
+        print(experiment.comparison_json(comparison, additions), end="")
         return
     from rich.console import Console
 
     console = Console(markup=False, highlight=False)
-    for part in experiment.comparison_tables(found):
+    for part in experiment.comparison_tables(comparison):
         console.print(part, crop=False)
         if not isinstance(part, str) or not part.startswith(("differs", "note")):
             console.print()
-    if again is not None:
-        experiment.rejudged_view(again).show()
-        print(f"again   {again.path}")
+    if rejudging is not None:
+        experiment.rejudged_view(rejudging).show()
+        print(f"again   {rejudging.path}")
     if arguments.html is not None:
         print(f"page    {arguments.html}")
 

@@ -48,7 +48,7 @@ def complete_line(parser: options.Parser) -> None:
     """Prints completions for a shell, and ends the process.
 
     Args:
-        parser: of the whole command.
+        parser: parser of the whole command.
     """
     import argcomplete
 

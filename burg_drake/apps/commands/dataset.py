@@ -227,9 +227,9 @@ def add_dataset_generate_options(parser: options.Parser) -> None:
     parser.add_argument(
         "--recipe", metavar="FILE", help="YAML file with settings that have no option"
     )
-    who = parser.add_mutually_exclusive_group()
-    options.add_workers(who, "worker processes (default: %(default)d)", default=1)
-    options.add_cluster(who)
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group, "worker processes (default: %(default)d)", default=1)
+    options.add_cluster(workers_group)
     options.add_quiet(parser)
 
 
@@ -254,7 +254,7 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
     recipe = without_unavailable_colors(recipe, Path(arguments.output))
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     with show_progress("rendering", "scenes", count, quiet=arguments.quiet) as pace:
-        found = generate_dataset(
+        generated = generate_dataset(
             scenes,
             station,
             arguments.output,
@@ -264,12 +264,12 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
             cluster=arguments.cluster,
             progress=lambda number, error: pace.step(),
         )
-    for number, error in found.failed.items():
+    for number, error in generated.failed.items():
         print_remark(f"scene {number}: {error}")
-    samples = len(load_dataset(found.folder))
-    old = f", {len(found.known)} were there" if found.known else ""
-    print(f"{found.folder}: {samples} samples of {len(found.new)} new scenes{old}")
-    return 1 if found.failed else 0
+    samples = len(load_dataset(generated.folder))
+    old = f", {len(generated.known)} were there" if generated.known else ""
+    print(f"{generated.folder}: {samples} samples of {len(generated.new)} new scenes{old}")
+    return 1 if generated.failed else 0
 
 
 def _recipe_from_options(arguments: argparse.Namespace) -> DatasetRecipe:
@@ -316,9 +316,8 @@ def _load_scenes(references: list[str]) -> list[Scene]:
 
 
 def _parse_sample_option(
-    arguments: argparse.Namespace, asked: DatasetRecipe, station: Station
+    arguments: argparse.Namespace, requested: DatasetRecipe, station: Station
 ) -> tuple[ObjectLibrary, int, SceneRecipe]:
-    from burg_drake.apps.commands.scene_sampling import library_reference, station_reference
     from burg_drake.objects import load_library
     from burg_drake.scene import SceneRecipe
 
@@ -330,14 +329,14 @@ def _parse_sample_option(
         )
     library = load_library(name)
     folder = Path(arguments.output) / "scenes"
-    reference = library_reference(name, library, folder)
-    sampled = asked.sampled or SceneRecipe(library=reference, seed=asked.seed)
+    reference = core.name_or_reference(name, "models", library.root, folder)
+    sampled = requested.sampled or SceneRecipe(library=reference, seed=requested.seed)
     sampled = replace(
         sampled,
         library=reference,
         count=sampled.count if arguments.objects is None else arguments.objects,
         seed=sampled.seed if arguments.seed is None else arguments.seed,
-        station=station_reference(arguments.station, station, folder),
+        station=core.name_or_reference(arguments.station, "stations", station.path, folder),
     )
     return library, int(count), sampled
 

@@ -48,7 +48,7 @@ def import_error(modules: str) -> str | None:
     """Why modules cannot be imported, in one line; None if they can.
 
     Args:
-        modules: as after `import`.
+        modules: names as after `import`.
     """
     import_timeout = 60.0  # Seconds.
     try:
@@ -172,9 +172,9 @@ class OptionalFeature:
     """An optional feature, installed by an extra of burg_drake.
 
     Attributes:
-        name: of the extra.
+        name: name of the extra.
         feature: its purpose.
-        package: whose version is shown.
+        package: package whose version is shown.
         modules: imported as a test: compiled ones, which fail most often and load fast.
     """
 

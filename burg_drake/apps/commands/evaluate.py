@@ -65,22 +65,22 @@ def second_opinion_line(columns: evaluation.Columns) -> str:
     import numpy as np
 
     engine, before, outcome, confidence = (columns[name] for name in SECOND_OPINION_COLUMNS)
-    again = np.flatnonzero(engine != "")
-    if not len(again):
+    rejudged = np.flatnonzero(engine != "")
+    if not len(rejudged):
         known = np.isfinite(confidence).any()
         return "no verdict is contested" if known else "no verdict has a confidence to go by"
-    engines = ", ".join(sorted(set(engine[again].tolist())))
+    engines = ", ".join(sorted(set(engine[rejudged].tolist())))
     changed = Counter(
         f"{was} to {now}"
-        for was, now in zip(before[again].tolist(), outcome[again].tolist(), strict=True)
+        for was, now in zip(before[rejudged].tolist(), outcome[rejudged].tolist(), strict=True)
         if was != now
     )
-    settled = core.count_with_noun(len(again), "contested grasp")
+    settled = core.count_with_noun(len(rejudged), "contested grasp")
     text = f"settled {settled} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     text += f" ({details})" if details else ""
-    close = int((confidence[again] < core.CONTESTED_CONFIDENCE).sum())
-    return f"{text}; close for it, too: {close}" if close else text
+    still_contested = int((confidence[rejudged] < core.CONTESTED_CONFIDENCE).sum())
+    return f"{text}; close for it, too: {still_contested}" if still_contested else text
 
 
 def print_campaign(campaign: evaluation.Campaign) -> None:
@@ -104,8 +104,8 @@ def print_campaign(campaign: evaluation.Campaign) -> None:
         print(f"report  {campaign.report_path}")
 
 
-def campaign_exit_code(campaign: evaluation.Campaign) -> int:
-    """Prints which scenes could not be judged; returns the exit code."""
+def report_campaign_failures(campaign: evaluation.Campaign) -> int:
+    """Prints which scenes and grasps could not be judged; returns the exit code."""
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
     for name, why in campaign.failed.items():
@@ -172,8 +172,8 @@ class _SceneGraspFile:
     `scene_id`.
 
     Attributes:
-        arguments: of the command.
-        station: with the hand.
+        arguments: parsed arguments of the command.
+        station: station with the hand.
         content: hash of the grasps and of the poses that place them.
         correction: applied when reading.
     """
@@ -240,9 +240,9 @@ def add_evaluate_options(parser: options.Parser) -> None:
     )
     options.add_settings_options(parser, evaluation.EvaluationSettings, "engine")
     add_rejudge_contested(parser)
-    who = parser.add_mutually_exclusive_group()
-    options.add_workers(who)
-    options.add_cluster(who)
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group)
+    options.add_cluster(workers_group)
     options.add_settings_options(parser, evaluation.EvaluationSettings, "table", "mode", "shard")
     options.add_settings_options(
         parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach"
@@ -299,7 +299,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     if rejudged:
         print(second_opinion_line(found.columns(SECOND_OPINION_COLUMNS)))
     _print_motion(motion)
-    return campaign_exit_code(found)
+    return report_campaign_failures(found)
 
 
 def _grasps_of_scene(

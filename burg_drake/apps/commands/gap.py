@@ -6,8 +6,8 @@ import argparse
 import json
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from burg_drake import core, evaluation, experiment
 from burg_drake.apps import options
@@ -51,9 +51,9 @@ def add_gap_options(parser: options.Parser) -> None:
     options.add_settings_options(
         parser, evaluation.EvaluationSettings, "engine", unset=True, shown_default=DEFAULT_ENGINE
     )
-    who = parser.add_mutually_exclusive_group()
-    options.add_workers(who)
-    options.add_cluster(who)
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group)
+    options.add_cluster(workers_group)
     parser.add_argument("--json", action="store_true", help="print JSON")
     options.add_motion_options(parser)
     options.add_quiet(parser)
@@ -71,17 +71,16 @@ def _add_placement_noise_options(parser: options.Parser) -> None:
 def run_gap(arguments: argparse.Namespace) -> int:
     """Judges grasps step by step and reports; returns 1 if some could not be simulated."""
     sheet = None if arguments.trials is None else experiment.load_trials(arguments.trials)
-    of_run = (Path(arguments.source) / evaluation.RUN_FILE).is_file()
+    is_run = (Path(arguments.source) / evaluation.RUN_FILE).is_file()
     if evaluation.is_campaign(arguments.source):
         raise core.InvalidInputError(
             f"{arguments.source} is a run over many scenes; give the run of one of them, such as"
             f" {evaluation.load_runs(arguments.source)[0].path}"
         )
-    run = evaluation.load_run(arguments.source) if of_run else None
+    run = evaluation.load_run(arguments.source) if is_run else None
     if sheet is not None and run is not None:
-        experiment.trials_of_run(
-            sheet, arguments.trials, run
-        )  # refuses unsuitable grasps before any work
+        # refuses unsuitable grasps before any work
+        experiment.trials_of_run(sheet, arguments.trials, run)
     with options.cluster_from_options(arguments) as cluster:
         measured = _measure_gap(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
@@ -91,17 +90,17 @@ def run_gap(arguments: argparse.Namespace) -> int:
     agreement = (
         experiment.agreement_by_step(measured, sheet, tried, success) if sheet and tried else ()
     )
-    found = experiment.gap_changes(measured, success)
+    changes = experiment.gap_changes(measured, success)
     experiment.write_gap_report(measured, success, agreement, arguments.command_line)
-    text = json.dumps(experiment.gap_json(measured, found, agreement, success), indent=1) + "\n"
+    text = json.dumps(experiment.gap_json(measured, changes, agreement, success), indent=1) + "\n"
     core.atomic_write(measured.path / "gap.json", text)
     if arguments.json:
         sys.stdout.write(text)
     else:
-        for sentence in experiment.step_sentences(measured, found, success):
+        for sentence in experiment.step_sentences(measured, changes, success):
             print(sentence)
         print()
-        experiment.steps_view(measured, found).show()
+        experiment.steps_view(measured, changes).show()
         if agreement:
             experiment.reality_table(agreement).text_table().show()
         elif sheet is not None:
@@ -121,19 +120,20 @@ def _measure_gap(
 
     noise = options.settings_from(arguments, experiment.PlacementNoise, seed=arguments.seed)
     tried = () if sheet is None else tuple(dict.fromkeys(t.grasp for t in sheet.trials))
-    shared: dict[str, Any] = {
-        "settings": options.settings_from(
+    measure_gap = partial(
+        experiment.measure_gap,
+        out=arguments.output,
+        settings=options.settings_from(
             arguments, experiment.GapSettings, last=arguments.mode, noise=noise
         ),
-        "tried": tried,
-        "executor": cluster
-        or evaluation.LocalExecutor(arguments.workers or core.default_workers()),
-        "progress": not arguments.quiet,
-    }
+        tried=tried,
+        executor=cluster or evaluation.LocalExecutor(arguments.workers or core.default_workers()),
+        progress=not arguments.quiet,
+    )
     options.require_grasp_file(arguments)
     if run is not None:
         _refuse_scene_options(arguments, run)
-        return experiment.measure_gap(run, arguments.output, **shared)
+        return measure_gap(run)
     options.refuse_sampling_options_with_file(arguments)
     scene = load_scene(arguments.source)
     station = load_station(arguments.station or options.DEFAULT_STATION)
@@ -142,9 +142,8 @@ def _measure_gap(
         given = options.read_grasps_from_options(arguments, scene, station)
         for note in given.notes:
             print(f"note: {note}", file=sys.stderr)
-    return experiment.measure_gap(
+    return measure_gap(
         scene,
-        arguments.output,
         station=station,
         grasps=given.by_instance if given else None,
         evaluation=options.settings_from(
@@ -155,7 +154,6 @@ def _measure_gap(
             motion=options.motion_from_options(arguments, station),
             mode=None,  # each step has its own
         ),
-        **shared,
     )
 
 
@@ -165,24 +163,13 @@ def _refuse_scene_options(arguments: argparse.Namespace, run: evaluation.Run) ->
     Raises:
         InvalidInputError: such an option is given; the message names it.
     """
-    # A run has its own values of these options.
-    scene_options = (
-        "station",
-        "grasps_per_object",
-        "blind",
-        "only",
-        "approach_angle",
-        "engine",
-        "grasps",
-    )
-    given = [n for n in scene_options if getattr(arguments, n) not in (None, False)]
-    flags = [f"--{name.replace('_', '-')}" for name in given]
-    for option in (
-        *flags,
-        *map(options.motion_option, options.motion_fields_from_options(arguments)),
-    ):
+    sampling_options = ("grasps_per_object", "blind", "only", "approach_angle")
+    names = ("station", *sampling_options, "engine", "grasps")
+    given = [arguments.flags[n] for n in names if getattr(arguments, n) not in (None, False)]
+    given += map(options.motion_option, options.motion_fields_from_options(arguments))
+    if given:
         raise core.InvalidInputError(
-            f"{option} is for scenes; {run.path} is a run, which has its own grasps, station,"
+            f"{given[0]} is for scenes; {run.path} is a run, which has its own grasps, station,"
             " engine and motion: leave it out"
         )
 

@@ -130,9 +130,9 @@ class DisplayedGrasps:
     Attributes:
         grasps: all grasps; with the column `instance` if there is a scene.
         source: objects of the grasps.
-        station: of the hand and the scene.
-        ranking: of the grasps.
-        title: of the page.
+        station: station of the hand and the scene.
+        ranking: ranking of the grasps.
+        title: title of the page.
     """
 
     grasps: core.GraspSet
@@ -181,15 +181,15 @@ def run_grasps_show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _finger_widths(grasps: core.GraspSet, widest: float) -> core.Array:
+def _finger_widths(grasps: core.GraspSet, opening: float) -> core.Array:
     """(N,) widths of the drawn hands [m]: at contact if known, else of the pregrasp, else open."""
     import numpy as np
 
     from burg_drake.formats import PREGRASP_WIDTH_COLUMN
 
-    arriving = grasps.columns.get(PREGRASP_WIDTH_COLUMN, np.full(len(grasps), np.nan))
-    width = np.where(np.isfinite(grasps.width), grasps.width, arriving)
-    return np.where(np.isfinite(width), width, widest)
+    pregrasp_width = grasps.columns.get(PREGRASP_WIDTH_COLUMN, np.full(len(grasps), np.nan))
+    width = np.where(np.isfinite(grasps.width), grasps.width, pregrasp_width)
+    return np.where(np.isfinite(width), width, opening)
 
 
 def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
@@ -238,8 +238,8 @@ def _load_content(arguments: argparse.Namespace) -> DisplayedGrasps:
 
 def _print_mistakes(grasps: core.GraspSet, source: options.GraspSource, station: Station) -> None:
     """Prints which common mistake imported grasps show."""
-    named = grasps.object if source.scene is None else grasps.column("instance")
-    by_name = {name: grasps.select(named == name) for name in dict.fromkeys(named.tolist())}
+    names = grasps.object if source.scene is None else grasps.column("instance")
+    by_name = {name: grasps.select(names == name) for name in dict.fromkeys(names.tolist())}
     for note in evaluation.mistake_notes(
         by_name, station, source.scene or source.library, format_option="--from"
     ):

@@ -30,7 +30,7 @@ def add_grasps_convert_options(parser: options.Parser) -> None:
         "output", metavar="OUT", help="file to write, or folder for a file per object"
     )
     parser.add_argument("--formats", action=_ListFormats, nargs=0, help="list the formats and end")
-    options.add_reading_options(parser, in_full=True)
+    options.add_reading_options(parser, all_corrections=True)
     options.add_format_option(parser)
     options.add_hand(parser, default=None)
     _add_selection_options(parser)

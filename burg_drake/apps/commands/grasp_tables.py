@@ -33,10 +33,10 @@ def print_numbers(title: str, rows: NumberRows, frame: str = "object") -> None:
     """Prints figures of columns of grasps; fewer of them on a narrow terminal.
 
     Args:
-        title: of the table.
+        title: title of the table.
         rows: number of known values and figures by name in SI units, by column; the same names in
             every row.
-        frame: of x, y and z.
+        frame: frame of x, y and z.
     """
     optional_heads = ("5%", "95%")  # Columns that are left out on a narrow terminal.
     if not rows:
@@ -79,10 +79,10 @@ def print_summary(
     """Prints the figures of one set: by object, then by column.
 
     Args:
-        title: of the set.
+        title: title of the set.
         summary: figures of the set.
-        notes: on values that were not read.
-        frame: of the poses.
+        notes: notes on values that were not read.
+        frame: frame of the poses.
     """
     summary_table(title, summary).show()
     numbers = {name: values for name, values in summary.numbers.items() if values.count}

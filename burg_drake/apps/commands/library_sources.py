@@ -74,9 +74,9 @@ class NamedValues:
     """Values that the arguments give for single objects.
 
     Attributes:
-        masses: by object name [kg].
-        frictions: by object name.
-        common_friction: of all other objects; None if not given.
+        masses: masses by object name [kg].
+        frictions: frictions by object name.
+        common_friction: friction of all other objects; None if not given.
     """
 
     masses: dict[str, float]
@@ -88,8 +88,8 @@ def named_values(arguments: argparse.Namespace, names: set[str]) -> NamedValues:
     """Masses and friction that the arguments give.
 
     Args:
-        arguments: with `mass`, `masses` and `friction`.
-        names: of all objects.
+        arguments: parsed arguments with `mass`, `masses` and `friction`.
+        names: names of all objects.
 
     Raises:
         UnknownNameError: a value is for an unknown object.

@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 
 
 def print_reach_tables(
-    grasps: core.GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
+    grasps: core.GraspSet, object_names: Iterable[str], motion: GraspMotion, *, given: bool = False
 ) -> None:
     """Prints counts by object and by outcome with the obstacles, objects without a clear or
     reachable grasp, and the speed of the computation.
 
     Args:
-        grasps: judged by `reach`.
-        asked: requested objects, some of which may have no grasp.
-        motion: of the hand.
+        grasps: grasps judged by `reach`.
+        object_names: requested objects, some of which may have no grasp.
+        motion: motion of the hand.
         given: whether the grasps are the user's own.
     """
     outcomes = [core.Outcome(text) for text in grasps.column("outcome").tolist()]
-    by_object: dict[str, Counter[core.Outcome]] = {name: Counter() for name in asked}
+    by_object: dict[str, Counter[core.Outcome]] = {name: Counter() for name in object_names}
     for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
         by_object.setdefault(name, Counter())[outcome] += 1
     total = Counter(outcomes)
@@ -57,13 +57,13 @@ def reach_table(
         if name == "all":
             table.gap()
         clear = sum(n for o, n in counts.items() if o.stage is not core.Stage.CLEAR)
-        good = counts[core.Outcome.REACHABLE]
-        share = core.format_percent(good / clear) if clear else "-"
+        reachable = counts[core.Outcome.REACHABLE]
+        share = core.format_percent(reachable / clear) if clear else "-"
         table.row(
             name,
             core.format_count(counts.total()),
             core.format_count(clear),
-            core.format_count(good),
+            core.format_count(reachable),
             share,
         )
     table.caption = (
@@ -92,7 +92,8 @@ def outcome_table(
         mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(max_blockers)
         counts = [
-            core.format_count(n) if (n := by_object[name][outcome]) else "·" for name in names
+            core.format_count(n) if (n := by_object[name][outcome]) else core.NO_VALUE
+            for name in names
         ]
         share = core.format_percent(total[outcome] / len(grasps))
         in_the_way = ", ".join(f"{name} ({core.format_count(n)})" for name, n in blockers)
@@ -186,7 +187,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
-    _print_answers(judged, scene, motion, arguments)
+    _print_results(judged, scene, motion, arguments)
     print_note_lines(hints)
     reachable = _reachable_mask(judged)
     if arguments.plans is not None:
@@ -217,7 +218,7 @@ def _require_consistent_options(arguments: argparse.Namespace) -> None:
         arguments.after_interrupt = "; run the same command to continue"
 
 
-def _print_answers(
+def _print_results(
     judged: core.GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
 ) -> None:
     """Prints the tables with notes."""
@@ -252,12 +253,12 @@ def _unplanned_mask(judged: core.GraspSet) -> Any:
 
 def _report_failures(judged: core.GraspSet, arguments: argparse.Namespace) -> int:
     """Prints the grasps whose computation has failed; returns 1 if there are any."""
-    answered, unplanned = _judged_mask(judged), _unplanned_mask(judged)
-    failed = judged.select(~answered)
+    was_judged, unplanned = _judged_mask(judged), _unplanned_mask(judged)
+    failed = judged.select(~was_judged)
     retry = f"; {options.retry_advice(0, len(failed))}" if arguments.plans else ""
     _print_failures(failed, "could not be judged", len(judged), retry)
     _print_failures(judged.select(unplanned), "have no plan", int(_reachable_mask(judged).sum()))
-    return 0 if answered.all() and not unplanned.any() else 1
+    return 0 if was_judged.all() and not unplanned.any() else 1
 
 
 def _print_failures(failed: core.GraspSet, what: str, total: int, retry: str = "") -> None:

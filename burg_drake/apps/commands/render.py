@@ -30,8 +30,8 @@ def without_unavailable_colors(
     """The recipe, without colours if they cannot be rendered; a line on stderr says so.
 
     Args:
-        recipe: as requested.
-        folder: of the data set, which may exist.
+        recipe: requested recipe.
+        folder: folder of the data set, which may exist.
 
     Raises:
         MissingDependencyError: the folder has samples with colours, and cannot be continued here.

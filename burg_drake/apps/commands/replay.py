@@ -73,24 +73,24 @@ def run_replay(arguments: argparse.Namespace) -> int:
     for note in source.inputs.notes:
         print_remark(note)
     meshcat = open_view(arguments)
-    verdict, shown, who = _simulate_trial(source, meshcat)
+    verdict, shown, shown_part = _simulate_trial(source, meshcat)
     lines = [
         *visualization.describe_trial(evaluation.as_result(verdict)),
         *evaluation.arm_figures(verdict),
     ]
     lines += evaluation.motion_figures(source.trial, source.origin)
     recorded = source.trial.verdict
-    found = [] if recorded is None else evaluation.differences(recorded, verdict)
-    lines += [] if recorded is None else evaluation.comparison(found, source.origin)
+    differences = [] if recorded is None else evaluation.differences(recorded, verdict)
+    lines += [] if recorded is None else evaluation.comparison(differences, source.origin)
     if shown.outcome is not verdict.outcome:
-        lines += [f"shown is {who}, to the end:", *visualization.describe_trial(shown)]
+        lines += [f"shown is {shown_part}, to the end:", *visualization.describe_trial(shown)]
     for line in lines:
         print(line)
     if arguments.html is None and shown.margins.end_time == 0.0:
         print("nothing moves: the trial ended before its first step", file=sys.stderr)
     title = f"{source.inputs.scene.name}: {source.trial.id}"
     present_view(meshcat, arguments, title=title, caption=lines)
-    return 0 if all(difference.rounding for difference in found) else 1
+    return 0 if all(difference.rounding for difference in differences) else 1
 
 
 def _simulate_trial(

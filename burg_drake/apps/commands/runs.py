@@ -113,13 +113,17 @@ def add_report_options(parser: options.Parser) -> None:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Prints the tables of a run, of one scene or of many, and writes its report."""
-    from burg_drake.apps.commands.evaluate import campaign_exit_code, print_campaign, print_summary
+    from burg_drake.apps.commands.evaluate import (
+        print_campaign,
+        print_summary,
+        report_campaign_failures,
+    )
 
     run = evaluation.open_results(arguments.run_folder)
     if isinstance(run, evaluation.Campaign):
         evaluation.write_campaign_report(run)
         print_campaign(run)
-        return campaign_exit_code(run)
+        return report_campaign_failures(run)
     evaluation.write_report(run)
     print_summary(run)
     if not run.complete:
@@ -140,13 +144,17 @@ def add_merge_options(parser: options.Parser) -> None:
 
 def run_merge(arguments: argparse.Namespace) -> int:
     """Merges runs and prints their tables; returns 1 if grasps could not be simulated."""
-    from burg_drake.apps.commands.evaluate import campaign_exit_code, print_campaign, print_summary
+    from burg_drake.apps.commands.evaluate import (
+        print_campaign,
+        print_summary,
+        report_campaign_failures,
+    )
 
     merged = evaluation.merge_folders(arguments.runs, arguments.output)
     result = merged.result
     if isinstance(result, evaluation.Campaign):
         print_campaign(result)
-        code = campaign_exit_code(result)
+        code = report_campaign_failures(result)
     else:
         print_summary(result)
         print(f"table   {result.table_path}")

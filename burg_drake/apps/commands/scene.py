@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake import core, simulation
 from burg_drake.apps import options
-from burg_drake.apps.commands.scene_sampling import library_reference, require_another_file
+from burg_drake.apps.commands.scene_sampling import require_another_file
 from burg_drake.apps.terminal import print_remark, print_warning, show_progress
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def run_scene_import_burg(arguments: argparse.Namespace) -> int:
         burg,
         library,
         name=arguments.name or core.make_name(output.stem),
-        reference=library_reference(arguments.library, library, output.parent),
+        reference=core.name_or_reference(arguments.library, "models", library.root, output.parent),
     )
     for note in (*burg.notes, *imported.notes):
         print(note)
@@ -266,7 +266,8 @@ def run_scene_settle(arguments: argparse.Namespace) -> int:
     written = arguments.keep or not faults
     if written:
         path, document = Path(arguments.output), settled.scene.document
-        library = library_reference(document.library, settled.scene.library, path.parent)
+        root = settled.scene.library.root
+        library = core.name_or_reference(document.library, "models", root, path.parent)
         save_scene(replace(document, library=library, origin=None), path)
     displacement_table(settled.displacements).show()
     if settled.at_rest:

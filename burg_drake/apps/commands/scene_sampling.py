@@ -29,25 +29,6 @@ def require_another_file(scene: Path, output: str) -> None:
         raise core.InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 
-def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
-    """The reference to a library for a scene file in `folder`: the name of a built-in one, else
-    package:// or the relative path."""
-    return (
-        given
-        if given in core.builtin_names("models")
-        else core.portable_reference(library.root, folder)
-    )
-
-
-def station_reference(given: str, station: Station, folder: Path) -> str:
-    """The reference to a station for a scene file in `folder`; see `library_reference`."""
-    return (
-        given
-        if given in core.builtin_names("stations")
-        else core.portable_reference(station.path, folder)
-    )
-
-
 def add_recipe_options(parser: Any) -> None:
     """Adds the options of a recipe."""
     _add_object_options(parser)
@@ -129,12 +110,12 @@ def recipe_from_options(
     return options.settings_from(
         arguments,
         SceneRecipe,
-        library=library_reference(arguments.library, library, folder),
+        library=core.name_or_reference(arguments.library, "models", library.root, folder),
         count=arguments.objects,
         only=tuple(sorted(set(arguments.only or ()))),
         board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
         layout=layout or "random",
-        station=station_reference(arguments.station, station, folder),
+        station=core.name_or_reference(arguments.station, "stations", station.path, folder),
     )
 
 
@@ -298,9 +279,8 @@ def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
     add_recipe_options(parser)
     for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
-            option = "-n" if name == "objects" else f"--{name.replace('_', '-')}"
             raise core.InvalidInputError(
-                f"--again takes the recipe of its scene: leave out {option}"
+                f"--again takes the recipe of its scene: leave out {arguments.flags[name]}"
             )
 
 
@@ -334,8 +314,8 @@ def _with_references(
 
     document, origin = scene.document, scene.document.origin
     assert origin is not None
-    library = library_reference(document.library, scene.library, folder)
-    station = station_reference(origin.recipe.station, again.station, folder)
+    library = core.name_or_reference(document.library, "models", scene.library.root, folder)
+    station = core.name_or_reference(origin.recipe.station, "stations", again.station.path, folder)
     recipe = replace(origin.recipe, library=library, station=station)
     return replace(document, library=library, origin=replace(origin, recipe=recipe))
 

@@ -42,7 +42,7 @@ def add_show_simulated_option(parser: options.Parser, more: str = "") -> None:
     """Adds the option --show-simulated, for commands whose output operators see.
 
     Args:
-        parser: to add the option to.
+        parser: parser that gets the option.
         more: text after "the simulated outcomes" on what else is hidden.
     """
     parser.add_argument(
@@ -123,24 +123,24 @@ def run_trials_record(arguments: argparse.Namespace) -> int:
     entry = _entry_from_options(arguments)
     book.require_open(trial, entry, correct=arguments.correct, again=arguments.again)
     check = _placement_check(arguments, sheet, trial)
-    found = check is not None and not check.reason
+    problem = "" if check is None else check.reason
+    measured = None if problem else check
     if arguments.photo or check is not None:
-        kept = check if found else None
         photo = experiment.save_photo_and_placement(
-            arguments.trials, trial.number, photo=arguments.photo, check=kept
+            arguments.trials, trial.number, photo=arguments.photo, check=measured
         )
         entry |= {"photo": photo} if photo else {}
-    if check is not None and found:
-        entry["placement"] = experiment.summarize_placements(check)
+    if measured is not None:
+        entry["placement"] = experiment.summarize_placements(measured)
     recorded = _record_trial(book, arguments, trial, entry)
     if arguments.photo and not (arguments.intrinsics or arguments.placement):
         print("no placement was measured: --intrinsics FILE of the camera is missing")
-    _print_recorded(recorded, book.sheet(), check if found else None)
+    _print_recorded(recorded, book.sheet(), measured)
     if arguments.width_mm is not None:
         _warn_of_width(arguments, sheet, recorded)
-    if check is not None and not found:
-        print_remark(f"{arguments.photo}: {check.reason}; recorded without placement")
-    return 0 if check is None or found else 1
+    if problem:
+        print_remark(f"{arguments.photo}: {problem}; recorded without placement")
+    return 1 if problem else 0
 
 
 def _record_trial(
@@ -151,13 +151,13 @@ def _record_trial(
 ) -> experiment.RealTrial:
     """Records a trial. `next` is the trial that is first open when this is called; with a photo or
     placement, it must still be the trial that these belong to."""
-    mode = {"correct": arguments.correct, "again": arguments.again}
+    replacing = {"correct": arguments.correct, "again": arguments.again}
     if arguments.number != "next":
-        return book.record(trial.number, **mode, **entry)
+        return book.record(trial.number, **replacing, **entry)
     if not (arguments.photo or arguments.placement):
-        return book.record("next", **mode, **entry)
+        return book.record("next", **replacing, **entry)
     try:
-        return book.record(trial.number, expected=trial, **mode, **entry)
+        return book.record(trial.number, expected=trial, **replacing, **entry)
     except experiment.TrialChanged as error:
         kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
         raise core.InvalidInputError(
@@ -193,13 +193,13 @@ def _parse_moment(text: str) -> str:
 
 def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
     """Refuses options whose required other option is missing, and calls that record nothing."""
-    # Options about a photo.
     photo_options = ("intrinsics", "depth", "depth_unit", "scene")
     if not arguments.photo:
         for name in photo_options:
             if getattr(arguments, name) is not None:
-                option = name.replace("_", "-")
-                raise core.InvalidInputError(f"--{option} is for photos; add --photo FILE")
+                raise core.InvalidInputError(
+                    f"{arguments.flags[name]} is for photos; add --photo FILE"
+                )
     elif arguments.depth and not arguments.intrinsics:
         raise core.InvalidInputError("--depth needs --intrinsics FILE of its camera")
     if arguments.placement and arguments.intrinsics:

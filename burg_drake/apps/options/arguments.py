@@ -104,7 +104,7 @@ class Parser(argparse.ArgumentParser):
     def _required_usage(self) -> str:
         """The command with its positional arguments and required options."""
         formatter = HelpFormatter(self.prog)
-        either = {
+        required_choices = {
             action: " | ".join(
                 f"{other.option_strings[0]} {formatter.value_text(other)}"
                 for other in group._group_actions
@@ -113,19 +113,19 @@ class Parser(argparse.ArgumentParser):
             if group.required
             for action in group._group_actions[:1]
         }
-        words, more = [self.prog.replace("%", "%%")], ""
+        words, optional = [self.prog.replace("%", "%%")], ""
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
                 return f"{words[0]} VERB ..."
             elif not action.option_strings:
                 words.append(formatter.value_text(action))
-            elif action in either:
-                words.append(f"({either[action]})")
+            elif action in required_choices:
+                words.append(f"({required_choices[action]})")
             elif action.required:
                 words.append(f"{action.option_strings[0]} {formatter.value_text(action)}")
             elif action.help is not argparse.SUPPRESS:
-                more = "[options]"
-        words.append(more)
+                optional = "[options]"
+        words.append(optional)
         indent = " " * len(f"usage: {self.prog} ")
         usage = " ".join(filter(None, words))
         return textwrap.fill(usage, formatter.line_width - len("usage: "), subsequent_indent=indent)
@@ -181,11 +181,11 @@ class CommandGroup:
         self._action: Any = parser.add_subparsers(
             metavar="VERB", required=True, help=argparse.SUPPRESS
         )
-        self._list: Any = None
+        self._heading: Any = None
 
-    def heading(self, title: str) -> None:
+    def begin_heading(self, title: str) -> None:
         """Lists the commands that are added next under this title."""
-        self._list = self._parser.add_argument_group(title)
+        self._heading = self._parser.add_argument_group(title)
 
     def add_parser(self, name: str, summary: str) -> Parser:
         """Adds a command.
@@ -195,10 +195,10 @@ class CommandGroup:
             summary: one sentence, without capital and period.
         """
         name_width = 11  # Characters of the column of command names.
-        if self._list is None:
-            self.heading("verbs")
+        if self._heading is None:
+            self.begin_heading("verbs")
         line = f"{name:<{name_width}}  {summary}"
-        self._list.description = "\n".join(filter(None, [self._list.description, line]))
+        self._heading.description = "\n".join(filter(None, [self._heading.description, line]))
         sentence = f"{summary[0].upper()}{summary[1:]}."
         parser: Parser = self._action.add_parser(name, help=summary, description=sentence)
         return parser
@@ -225,7 +225,7 @@ def add_measured_board(
     """Adds the option --measured-mm, for commands that print a board or see a printed one.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
     """
     parser.add_argument(
@@ -251,7 +251,7 @@ def add_station(
     """Adds the option --station.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         default: None if the station comes from elsewhere or is optional.
     """
@@ -262,7 +262,7 @@ def add_only(parser: Parser, what: str) -> None:
     """Adds the option --only, which chooses objects.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         what: text before "of this object".
     """
     parser.add_argument(
@@ -304,7 +304,7 @@ def add_workers(
     """Adds the option --workers, for commands with worker processes.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         default: None lets the library choose.
     """
@@ -330,7 +330,7 @@ def add_page_options(parser: Any, network: str) -> None:
     """Adds the options of commands that serve a page.
 
     Args:
-        parser: to add the options to.
+        parser: parser, or group of options, that gets the options.
         network: text after "with 0.0.0.0" on what others in the network can do with the page.
     """
     parser.add_argument(
@@ -352,7 +352,7 @@ def add_intrinsics(
     """Adds the option --intrinsics.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         help: text for this command.
         required: whether the command needs the option.
     """
@@ -365,7 +365,7 @@ def add_live_camera(parser: Any, more: str, default: str | None = None) -> None:
     """Adds --camera, --intrinsics, --fps and --measured-mm, for commands with a live camera.
 
     Args:
-        parser: to add the options to.
+        parser: parser, or group of options, that gets the options.
         more: text after the kinds of cameras in the help.
         default: the camera.
     """
@@ -418,7 +418,7 @@ def add_cluster(group: Any) -> None:
     """Adds the option --cluster.
 
     Args:
-        group: of mutually exclusive options, as the cluster has its own workers.
+        group: group of mutually exclusive options, as the cluster has its own workers.
     """
     group.add_argument(
         "--cluster",
@@ -443,7 +443,7 @@ def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
     """Adds the option --retry-failed.
 
     Args:
-        parser: to add the option to.
+        parser: parser, or group of options, that gets the option.
         what: plural noun for the items that are tried again.
     """
     parser.add_argument(

@@ -27,7 +27,7 @@ def add_sampling_options(parser: Parser, default: int, source_group: Any = None)
     """Adds the options for grasp sampling.
 
     Args:
-        parser: to add the options to.
+        parser: parser that gets the options.
         default: number of grasps for each object.
         source_group: mutually exclusive options for the grasps, such as --grasps; None for none.
     """
@@ -59,7 +59,7 @@ def refuse_sampling_options_with_file(arguments: argparse.Namespace) -> None:
     for name in ("blind", "approach_angle", "until_balanced"):
         if getattr(arguments, name, None) and arguments.grasps is not None:
             raise core.InvalidInputError(
-                f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
+                f"{arguments.flags[name]} is for sampled grasps; leave out either it or --grasps"
             )
 
 
@@ -75,7 +75,7 @@ def add_grasp_file_options(parser: Parser, source_group: Any) -> None:
     """Adds the options for grasps from a file.
 
     Args:
-        parser: to add a group of options to.
+        parser: parser that gets a group of options.
         source_group: mutually exclusive options that --grasps belongs to.
     """
     source_group.add_argument(
@@ -103,6 +103,7 @@ def add_grasp_file_options(parser: Parser, source_group: Any) -> None:
         "--grasps-frame", choices=tuple(POSE_FRAMES), help="frame of the poses, if not the format's"
     )
     add_camera_options(group)
+    parser.set_defaults(grasp_file_options=[action.dest for action in group._group_actions])
 
 
 def require_grasp_file(arguments: argparse.Namespace) -> None:
@@ -111,11 +112,10 @@ def require_grasp_file(arguments: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: such an option is given; the message names it.
     """
-    names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
-    for name in (*names, "scene_id", "gripper_link", "correction"):
+    for name in arguments.grasp_file_options:
         if getattr(arguments, name) and arguments.grasps is None:
             raise core.InvalidInputError(
-                f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
+                f"{arguments.flags[name]} is for grasp files; add --grasps FILE"
             )
 
 

@@ -23,18 +23,19 @@ POSE_FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
 """Frames of poses in grasp files: option values, and their names in `formats`."""
 
 
-def add_reading_options(parser: Parser, *, in_full: bool = False) -> None:
-    """Adds the options --from, --gripper-link and --correction, for reading a file."""
+def add_reading_options(parser: Parser, *, all_corrections: bool = False) -> None:
+    """Adds the options --from, --gripper-link and --correction, for reading a file; the help names
+    all corrections, or only an example."""
     parser.add_argument(
         "--from", dest="source", metavar="FORMAT", help="format to read (default: recognised)"
     )
-    add_correction_options(parser, in_full=in_full)
+    add_correction_options(parser, all_corrections=all_corrections)
 
 
-def add_correction_options(parser: Any, *, in_full: bool = False) -> None:
+def add_correction_options(parser: Any, *, all_corrections: bool = False) -> None:
     """Adds the options --gripper-link and --correction."""
     others = " (see burg-drake grasps convert --help)"
-    if in_full:
+    if all_corrections:
         others = (
             " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse,"
             " transposed, wxyz, xyzw, y_up, z_up, millimetres, half_widths"
@@ -165,8 +166,8 @@ class GraspSource:
     """The objects of grasps.
 
     Attributes:
-        library: of the objects.
-        scene: of the objects; None if unknown.
+        library: library of the objects.
+        scene: scene of the objects; None if unknown.
     """
 
     library: ObjectLibrary
@@ -223,9 +224,9 @@ def load_grasp_source(
     """The objects of a grasp file.
 
     Args:
-        arguments: with the options of `add_source_options`.
+        arguments: parsed arguments with the options of `add_source_options`.
         grasps: the grasps; their provenance names the objects if no option does.
-        path: of the file, for messages.
+        path: path of the file, for messages.
 
     Raises:
         InvalidInputError: neither the options nor the file name the objects, or the grasps are far
@@ -239,13 +240,13 @@ def load_grasp_source(
         raise core.InvalidInputError(
             f"{path} does not say where its objects are; give --scene or --library"
         )
+    from_file = reference not in (arguments.scene, arguments.library)
     try:
-        from_file = reference not in (arguments.scene, arguments.library)
         if from_file and not core.is_resolved(str(reference), "scenes", "models"):
             raise core.UnknownNameError(str(reference))
         source = open_grasp_source(str(reference))
     except core.UnknownNameError as error:
-        if reference in (arguments.scene, arguments.library):
+        if not from_file:
             raise
         raise core.UnknownNameError(
             f"{path} says that its objects are in {reference}, which is not there; give --scene or"
@@ -267,7 +268,7 @@ class GraspOutput:
 
     Attributes:
         path: file or folder.
-        format: of the file, or of each file in the folder.
+        format: format of the file, or of each file in the folder.
         is_folder: whether `path` is a folder.
     """
 

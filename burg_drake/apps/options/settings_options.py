@@ -22,7 +22,7 @@ def add_settings_options(
     Args:
         parser: or group of options, to add the options to.
         settings: the dataclass.
-        names: of the fields; all declared fields if empty.
+        names: names of the fields; all declared fields if empty.
         unset: whether the value is None if not given, as the default comes from elsewhere; the
             help then shows no default.
         shown_default: default in the help in spite of `unset`.
@@ -32,7 +32,7 @@ def add_settings_options(
     for name in names or tuple(known):
         field, declaration = known[name]
         options: dict[str, Any] = {"help": declaration.help.format(**options_of)}
-        default = shown_default if unset else default_text(field, declaration)
+        default = shown_default if unset else default_in_unit(field, declaration)
         if field.type == "bool":
             options["action"] = "store_true"
         else:
@@ -55,7 +55,7 @@ def _value_options(field: Field[Any], declaration: core.Setting) -> dict[str, An
     return found
 
 
-def default_text(field: Field[Any], declaration: core.Setting) -> Any:
+def default_in_unit(field: Field[Any], declaration: core.Setting) -> Any:
     """The default of a field in the unit of its option; None if it has none."""
     value = None if field.default is MISSING else field.default
     if declaration.unit is None or value is None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import (
     MOVED_PREFIX,
+    NO_VALUE,
     TURNED_PREFIX,
     Array,
     BurgError,
@@ -168,8 +169,8 @@ def collision_section(columns: ResultRows) -> ReportSection | None:
         cells = [
             name,
             count,
-            own or "·",
-            count - own or "·",
+            own or NO_VALUE,
+            count - own or NO_VALUE,
             f"{np.median(depth):.1f} mm",
             f"{depth.max():.1f} mm",
         ]
@@ -221,11 +222,11 @@ def disturbed_section(columns: ResultRows, disturbance: float) -> ReportSection 
             name,
             int(np.isfinite(far).sum()),
             found[name],
-            int((far > disturbance).sum()) or "·",
+            int((far > disturbance).sum()) or NO_VALUE,
             f"{np.median(far[mask]) * 1e3:.1f} mm",
             f"{far[mask].max() * 1e3:.1f} mm",
             _largest_turn(columns.get(TURNED_PREFIX + name), mask),
-            toppled[name] or "·",
+            toppled[name] or NO_VALUE,
             f"on {by} ({times})",
         ]
         rows.append(cells)
@@ -247,7 +248,7 @@ def _count_toppled(columns: ResultRows) -> Counter[str]:
 def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
     """The largest of the chosen angles [rad] in degrees."""
     known = np.empty(0) if angle is None else angle[mask & np.isfinite(angle)]
-    return f"{math.degrees(known.max()):.1f}°" if len(known) else "·"
+    return f"{math.degrees(known.max()):.1f}°" if len(known) else NO_VALUE
 
 
 def arm_section(summary: Summary, columns: ResultRows) -> ReportSection | None:

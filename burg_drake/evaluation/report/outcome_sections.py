@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import (
+    NO_VALUE,
     Outcome,
     Stage,
     clustered_interval,
@@ -82,7 +83,7 @@ def count_section(summary: Summary) -> ReportSection:
     """Matrix of objects and outcomes."""
     seen = [o for o in Outcome if summary.total.outcomes[o]]
     groups = _add_total(list(summary.objects), summary)
-    rows = [[group.name, *(group.outcomes[o] or "·" for o in seen)] for group in groups]
+    rows = [[group.name, *(group.outcomes[o] or NO_VALUE for o in seen)] for group in groups]
     head = ["object", *(outcome_text(o) for o in seen)]
     matrix = PageTable(head, rows, range(1, len(head)), "matrix", total=len(groups) > 1)
     return ReportSection("Counts", "Every grasp ends with exactly one outcome.", matrix)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Outcome
+from burg_drake.core import NO_VALUE, Outcome
 from burg_drake.evaluation.outcome_counts import member_codes
 from burg_drake.evaluation.results_table import TextValues
 from burg_drake.visualization import (
@@ -18,8 +18,9 @@ from burg_drake.visualization import (
     PageTable,
     contrast_ratio,
     element,
-    html_document,
+    join,
     page_style,
+    render_page,
 )
 
 
@@ -54,9 +55,9 @@ _THEMED_COLOURS = {
 """Colours with different tones on a light and on a dark page."""
 
 
-def style_sheet() -> str:
+def style_sheet() -> Html:
     """Style sheet of the page."""
-    return page_style("burg_drake.evaluation.report", "style.css") + group_style()
+    return join(page_style("burg_drake.evaluation.report", "style.css"), group_style())
 
 
 def group_style() -> Html:
@@ -86,7 +87,12 @@ def html_page(title: str, *content: Child) -> str:
         title: title of the window.
         content: content of the body.
     """
-    return html_document(title, style_sheet(), element("main", *content))
+    return render_page(
+        "visualization/document.html.jinja",
+        title=title,
+        style=style_sheet(),
+        content=element("main", *content),
+    )
 
 
 def header(kind: str, title: str, about: str) -> Html:
@@ -131,8 +137,8 @@ def table(
 
 
 def number_cells(values: Iterable[Child]) -> list[Html]:
-    """Cells of a table, aligned to the right; "·", for no value, is drawn fainter."""
-    return [element("td", v, class_="number zero" if v == "·" else "number") for v in values]
+    """Cells of a table, aligned to the right; `NO_VALUE` is drawn fainter."""
+    return [element("td", v, class_="number zero" if v == NO_VALUE else "number") for v in values]
 
 
 def command(line: str) -> Html:

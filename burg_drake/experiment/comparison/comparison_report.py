@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
-from burg_drake.core import format_count, format_number, outcome_label
+from burg_drake.core import NO_VALUE, format_count, format_number, outcome_label
 from burg_drake.evaluation import command, folded_section, header, html_page, section, table, tiles
 from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
 from burg_drake.experiment.comparison.compared_runs import Side
@@ -331,7 +331,7 @@ def _outcome_section(comparison: Comparison, judgement: Judgement) -> Html:
     """Section that counts grasps by simulated and actual outcome."""
     happened = sorted({name for row in judgement.outcomes.values() for name in row})
     rows = [
-        (outcome_label(simulated), [row.get(name, "·") for name in happened])
+        (outcome_label(simulated), [row.get(name, NO_VALUE) for name in happened])
         for simulated, row in judgement.outcomes.items()
     ]
     head, judge, other = "simulated", "in simulation", "on the robot"
@@ -372,7 +372,7 @@ def _stage_section(agreement: RunAgreement) -> Html:
     def cell(stage: str, other: str) -> Child:
         count = agreement.stages[stage].get(other, 0)
         parted = agreement.apart.get(stage, {}).get(other, 0)
-        return f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
+        return f"{format_count(count)} ({format_count(parted)})" if parted else count or NO_VALUE
 
     rows = [(stage, [cell(stage, other) for other in columns]) for stage in agreement.stages]
     text = (

@@ -30,7 +30,7 @@ from burg_drake.experiment.lab.tried_grasps import (
 )
 from burg_drake.experiment.trials.trial_sheet import RealTrial
 from burg_drake.scene import Scene
-from burg_drake.visualization import Html, element, html_document, join, page_style
+from burg_drake.visualization import Html, element, join, page_style, render_page
 
 
 def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated: bool) -> Html:
@@ -137,12 +137,12 @@ def protocol_page(
     sections = [
         _block_section(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]
-    return html_document(
-        f"Trials on the robot: {runs.path.name}",
-        page_style("burg_drake.experiment.lab", "protocol.css"),
-        _header(runs, blocks),
-        *sections,
-        element("footer", f"Written by burg_drake {burg_drake.__version__}."),
+    footer = element("footer", f"Written by burg_drake {burg_drake.__version__}.")
+    return render_page(
+        "visualization/document.html.jinja",
+        title=f"Trials on the robot: {runs.path.name}",
+        style=page_style("burg_drake.experiment.lab", "protocol.css"),
+        content=join(_header(runs, blocks), *sections, footer),
     )
 
 
