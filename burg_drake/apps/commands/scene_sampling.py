@@ -218,7 +218,7 @@ def _sample_one(
         return 1
     if sampled.missing:
         print_remark(f"no place was found for {', '.join(sampled.missing)}")
-    print(f"wrote {arguments.output}: {_object_count_text(sampled.placed)}")
+    print(f"wrote {arguments.output}: {core.count_with_noun(sampled.placed, 'object')}")
     return 0
 
 
@@ -257,7 +257,7 @@ def _print_folder(found: generation.SampledFolder, arguments: argparse.Namespace
     print(f"{arguments.output}: {accepted} of {arguments.count} scenes accepted{new}")
     if fewer:
         print(
-            f"{fewer} of them have fewer than {_object_count_text(arguments.objects)};"
+            f"{fewer} of them have fewer than {core.count_with_noun(arguments.objects, 'object')};"
             " see scenes.csv"
         )
     if found.failed:
@@ -332,7 +332,3 @@ def _refusal_text(sampled: generation.SampledScene, recipe: SceneRecipe) -> str:
     if sampled.missing:
         text += "; an object found no place (--fewer accepts scenes without it)"
     return f"{text}; give a larger --size, a smaller -n, another --seed or more --attempts"
-
-
-def _object_count_text(count: int) -> str:
-    return f"{count} object" if count == 1 else f"{count} objects"

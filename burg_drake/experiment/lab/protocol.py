@@ -162,7 +162,8 @@ def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Htm
     robots = list(dict.fromkeys(f"{one.station.name} ({one.station.hand.name})" for one in setups))
     scenes = list(dict.fromkeys(one.scene.name for one in setups))
     done = sum(trial.outcome is not None for trial in sheet.trials)
-    about = [f"{len(sheet.trials)} trials in {count_with_noun(len(blocks), 'block')}"]
+    trials_text = count_with_noun(len(sheet.trials), "trial")
+    about = [f"{trials_text} in {count_with_noun(len(blocks), 'block')}"]
     about += [f"seed {sheet.selection.seed}", f"file {runs.path.name}"]
     about += [f"planned {sheet.created[:10]}"] if sheet.created else []
     about += [f"{done} carried out so far"] if done else []
