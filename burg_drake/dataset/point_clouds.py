@@ -62,9 +62,9 @@ def depth_cloud(
     Args:
         depth: (H, W) distance along the optical axis [m]; pixels that are not finite or not
             positive are skipped.
-        intrinsics: of the camera; lens distortion is corrected.
-        color: (H, W, 3) of the same pixels.
-        labels: (H, W) of the same pixels.
+        intrinsics: intrinsics of the camera; lens distortion is corrected.
+        color: (H, W, 3) colours of the same pixels.
+        labels: (H, W) labels of the same pixels.
 
     Raises:
         InvalidInputError: an image has another size than the intrinsics, or the depth has integers.

@@ -62,7 +62,7 @@ class CarrierJoint:
         name: name of the joint and of its position servo.
         axis: (3,) axis in the world at the carrier's start pose.
         speed: name of the velocity servo.
-        inertia: of the drive [kg].
+        inertia: inertia of the drive [kg].
         rate: rate of the critically damped servos [1/s]. As contact is solved before servos are
             made implicit, a held object is ahead of the hand while the hand accelerates, and
             creeps, faster at higher rates: at 50 by 2 mm/s in a usual lift.
@@ -193,7 +193,7 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
         for n in (min(max(6, math.ceil(side / 0.0035 - 1e-9)), 12),)
     )
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    # Of a sphere that touches the plane z = 0 at (x, y), centered at -r: n (x, y, -r) + d <= -r.
+    # A sphere of radius r that touches z = 0 at (x, y) fits if n (x, y, -r) + d <= -r.
     planes = ConvexHull(front.corners).equations
     sides = planes[planes[:, 2] < 1 - 1e-6]
     room = -(grid @ sides[:, :2].T + sides[:, 3]) / (1 - sides[:, 2])

@@ -28,8 +28,8 @@ def run_coacd(
     """Runs CoACD in a child process.
 
     Args:
-        vertices: (N, 3) [m].
-        faces: (F, 3).
+        vertices: (N, 3) vertices [m].
+        faces: (F, 3) triangles.
         options: of `coacd.run_coacd`.
         timeout: CPU time allowed [s].
 

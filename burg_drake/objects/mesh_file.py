@@ -263,7 +263,7 @@ def find_companion_files(path: Path) -> list[Path]:
     file or one of these files names.
 
     Args:
-        path: of the mesh.
+        path: path of the mesh.
 
     Raises:
         MeshError: one of them is too large.
@@ -294,7 +294,7 @@ def missing_textures(path: Path) -> list[str]:
     """A sentence for each missing image or material file of a mesh.
 
     Args:
-        path: of the mesh.
+        path: path of the mesh.
     """
     suffix = path.suffix.lower()
     found: list[tuple[Path, str]] = []

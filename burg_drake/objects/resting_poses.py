@@ -294,7 +294,7 @@ def stable_poses(
     """Finds the stable poses of an object, most probable first.
 
     Args:
-        surface: in O [m]; determines which poses are equal by symmetry.
+        surface: surface in O [m]; determines which poses are equal by symmetry.
         support: (N, 3) points of O whose hull rests on the plane [m].
         p_OOcm: (3,) centre of mass [m].
         search: symmetry search of the surface about `p_OOcm`, if available; made if None.

@@ -67,7 +67,7 @@ class Extent:
     """Bounding box of a placed object, along the axes of the board.
 
     Attributes:
-        low, high: (3,) its corners in the scene frame [m].
+        low, high: (3,) corners of the box in the scene frame [m].
         support: height of the lowest point of its contact geometry, in the scene frame [m].
     """
 
