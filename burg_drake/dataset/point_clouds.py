@@ -73,12 +73,14 @@ def depth_cloud(
     for name, image in (("color", color), ("labels", labels)):
         if image is not None:
             require_image(image, intrinsics, f"the {name} image")
-    there = np.flatnonzero((metres > 0.0) & (metres < np.inf))
-    points = camera_rays(intrinsics).single.reshape(-1, 3)[there] * metres.reshape(-1, 1)[there]
+    measured = np.flatnonzero((metres > 0.0) & (metres < np.inf))
+    points = (
+        camera_rays(intrinsics).single.reshape(-1, 3)[measured] * metres.reshape(-1, 1)[measured]
+    )
     return DepthCloud(
         points,
-        None if color is None else np.asarray(color).reshape(-1, 3)[there],
-        None if labels is None else np.asarray(labels).reshape(-1)[there],
+        None if color is None else np.asarray(color).reshape(-1, 3)[measured],
+        None if labels is None else np.asarray(labels).reshape(-1)[measured],
     )
 
 

@@ -183,7 +183,7 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
     open hand uses the pad itself, and poses that it calls free must be free here.
 
     Returns:
-        Their centers (N, 3) in the pad's frame P and radii (N,) [m].
+        Centers (N, 3) of the spheres in the pad's frame P and radii (N,) [m].
     """
     max_radius = 0.002  # Metres; spheres are smaller where the pad ends.
     min_radius = 1e-5  # Metres.
@@ -210,7 +210,7 @@ def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[fl
     constant impedance MuJoCo divides stiffness and damping by it.
 
     Args:
-        front: the pad's.
+        front: front of the pad.
         mobility: combined inverse mass of finger and object [1/kg].
         step: time step [s].
 

@@ -28,7 +28,7 @@ def collapse_edges(
 
     Args:
         vertices: (N, 3) vertices [m].
-        faces: (F, 3) of a closed manifold.
+        faces: (F, 3) triangles of a closed manifold.
         max_distance: largest root mean square distance of a vertex from the planes of the faces
             that were merged into it [m].
         min_faces: smallest number of faces.

@@ -30,14 +30,14 @@ def run_coacd(
     Args:
         vertices: (N, 3) vertices [m].
         faces: (F, 3) triangles.
-        options: of `coacd.run_coacd`.
+        options: options of `coacd.run_coacd`.
         timeout: CPU time allowed [s].
 
     Returns:
         The vertices (Ni, 3) of each part, and the child's CPU time [s].
 
     Raises:
-        DecompositionFailed: it crashed, failed, or took too long.
+        DecompositionFailed: CoACD crashed, failed, or took too long.
         KeyboardInterrupt: the child was interrupted, as the user interrupts all processes.
     """
     package = io.BytesIO()
