@@ -252,7 +252,7 @@ def read_appearance(data: Mapping[str, Any], name: str = "appearance") -> Appear
     """Reads an appearance from plain data.
 
     Args:
-        data: as `Appearance.plain` returns it.
+        data: data that `Appearance.plain` returned.
         name: source of the data, for messages.
 
     Raises:

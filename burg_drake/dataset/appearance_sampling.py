@@ -68,7 +68,7 @@ class FreeTable:
     def _is_free(self, p: Array, radius: float) -> bool:
         if any(np.linalg.norm(p - np.clip(p, *box)) < radius for box in self.rectangles):
             return False
-        return all(np.hypot(*(p - one[:2])) >= radius + one[2] for one in self.circles)
+        return all(np.hypot(*(p - c[:2])) >= radius + c[2] for c in self.circles)
 
 
 def place_distractors(
@@ -100,8 +100,8 @@ def place_distractors(
     found = []
     for name in (usable[int(k)] for k in rng.integers(len(usable), size=count)):
         entry = library.entry(name)
-        chance = np.array([pose.probability for pose in entry.stable_poses])
-        pose = int(rng.choice(len(chance), p=chance / chance.sum()))
+        probability = np.array([pose.probability for pose in entry.stable_poses])
+        pose = int(rng.choice(len(probability), p=probability / probability.sum()))
         X_SO = make_pose(rot_z(rng.uniform(-np.pi, np.pi))) @ entry.X_SO(pose)
         middle, radius = bounding_circle(entry, X_SO)
         place = table.place(radius, rng)
@@ -111,18 +111,18 @@ def place_distractors(
     return tuple(found)
 
 
-def distractor_boxes(look: Appearance) -> tuple[PlacedBox, ...]:
+def distractor_boxes(appearance: Appearance) -> tuple[PlacedBox, ...]:
     """Bounding boxes of an appearance's distractors, in the scene frame.
 
     Raises:
         UnknownNameError: there is no such library, or no such object in it.
     """
-    if not look.distractors:
+    if not appearance.distractors:
         return ()
-    library = distractor_library(look.library)
+    library = distractor_library(appearance.library)
     return tuple(
         box_around(f"distractor {k}", library.entry(one.object), one.X_SO.matrix())
-        for k, one in enumerate(look.distractors)
+        for k, one in enumerate(appearance.distractors)
     )
 
 
@@ -182,7 +182,7 @@ def draw_appearance(
     objects = len(scene.instances) + len(scene.background)
     room = int(rng.integers(1 << 32)) if rng.random() < settings.room else None
     by_room = room is not None and rng.random() < settings.room_light
-    # irradiance of the table by all lights (at 1 a white surface is white), and the room's share
+    # Irradiance of the table by all lights (at 1 a white surface is white), and the room's share.
     irradiance = float(rng.uniform(0.75, 1.0))
     share = float(rng.uniform(0.3, 0.7)) if by_room else 0.0
     return Appearance(
@@ -199,9 +199,9 @@ def draw_appearance(
 
 
 def _draw_lights(
-    settings: AppearanceSettings, total: float, camera_light: bool, rng: np.random.Generator
+    settings: AppearanceSettings, irradiance: float, camera_light: bool, rng: np.random.Generator
 ) -> tuple[DirectedLight, ...]:
-    """Draws lights with the total irradiance `total` on the table, with one that moves with the
+    """Draws lights with a total `irradiance` of the table, and one that moves with the
     camera if `camera_light`."""
     if settings.lights is None:
         return ()
@@ -210,7 +210,7 @@ def _draw_lights(
     elevation = np.deg2rad(rng.uniform(25.0, 75.0, count))
     elevation[0] = np.deg2rad(rng.uniform(*settings.light_elevation_deg))
     azimuth = rng.uniform(-np.pi, np.pi, count)
-    # of a light at the camera, which replaces scattered light
+    # Share of a light at the camera, which replaces scattered light.
     camera_share = float(rng.uniform(0.12, 0.3)) if camera_light else 0.0
     shares = rng.uniform(0.2, 0.7, count)
     shares[0] = 1.0
@@ -223,7 +223,7 @@ def _draw_lights(
         found.append(
             DirectedLight(
                 direction=(x, y, z),
-                irradiance=float(total * shares[k] / max(up, 0.4)),
+                irradiance=float(irradiance * shares[k] / max(up, 0.4)),
                 color=_draw_light_color(settings, rng),
                 shadows=k == 0 and shadows,
             )
@@ -232,7 +232,7 @@ def _draw_lights(
         return tuple(found)
     x, y = rng.uniform(-0.4, 0.4, 2).tolist()
     fill = DirectedLight(
-        direction=(x, y, 1.0), frame="camera", irradiance=float(total * camera_share)
+        direction=(x, y, 1.0), frame="camera", irradiance=float(irradiance * camera_share)
     )
     return (*found, fill)
 

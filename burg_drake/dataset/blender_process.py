@@ -57,8 +57,10 @@ def blender_command() -> list[str]:
             f"{BLENDER_ENVIRONMENT_VARIABLE} is {given!r}, which is not an executable:"
             f" {BLENDER_INSTALL_ADVICE}"
         )
-    told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
-    if told.stdout.startswith("Blender"):
+    version_output = subprocess.run(
+        [found, "--version"], capture_output=True, text=True, check=False
+    )
+    if version_output.stdout.startswith("Blender"):
         quiet = ["--background", "--factory-startup", "--python-exit-code", "1"]
         return [found, *quiet, "--python", str(worker_program)]
     return [found, "-P", str(worker_program)]
@@ -67,7 +69,7 @@ def blender_command() -> list[str]:
 class Blender:
     """A rendering process, which ends with the process that started it.
 
-    The number of threads is `OMP_NUM_THREADS`, or that of processors; it does not change images.
+    The number of threads, `OMP_NUM_THREADS` or one per processor, does not change images.
 
     Attributes:
         version: version of Blender.
@@ -93,7 +95,7 @@ class Blender:
             env={name: value for name, value in os.environ.items() if name not in foreign},
         )
         self._lock = RLock()
-        self._shown: BlenderScene | None = None
+        self._loaded_scene: BlenderScene | None = None
         self._program = command[0]
         self.version = str(self._read_response("starting")["version"])
 
@@ -115,7 +117,7 @@ class Blender:
         Args:
             scene: the scene; sent to the process only if it is another object than before.
             poses: `X_WB` (4, 4) of the bodies.
-            intrinsics: of the camera.
+            intrinsics: intrinsics of the camera.
             X_WC: (4, 4) pose of the camera's optical frame in the world.
             clip: near and far clipping depth [m].
 
@@ -127,11 +129,11 @@ class Blender:
         """
         with self._lock, tempfile.TemporaryDirectory(prefix="burg_drake-") as name:
             folder = Path(name)
-            if self._shown is not scene:
-                self._shown = None
+            if self._loaded_scene is not scene:
+                self._loaded_scene = None
                 scene.write(folder, _thread_count())
                 self._send_request("loading a scene", do="load", folder=name)
-                self._shown = scene
+                self._loaded_scene = scene
             path = folder / "view.png"
             self._send_request(
                 "rendering",
@@ -189,8 +191,8 @@ class Blender:
     def _last_output(self) -> str:
         self._log.seek(0)
         lines = self._log.read().decode(errors="replace").split("\n")
-        said = [line.strip() for line in lines if line.strip()][-5:]
-        return f"its last lines: {' | '.join(said)}" if said else "it printed nothing"
+        last_lines = [line.strip() for line in lines if line.strip()][-5:]
+        return f"its last lines: {' | '.join(last_lines)}" if last_lines else "it printed nothing"
 
 
 def running_blender() -> Blender:

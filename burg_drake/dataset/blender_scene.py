@@ -49,7 +49,7 @@ class PaintedSurface:
 
     Attributes:
         body: number of the body.
-        vertices: (V, 3) in the body's frame [m].
+        vertices: (V, 3) vertices in the body's frame [m].
         faces: (F, 3) triangles.
         material: material of all triangles.
         normals: (V, 3) vertex normals in the body's frame, if the file has them.
@@ -81,9 +81,9 @@ def painted_surfaces(
     for geometry in sorted(seen, key=lambda one: one.get_value()):
         body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)) or plant.world_body()
         properties = inspector.GetPerceptionProperties(geometry)
-        painted = _Painter(str(int(body.index())), _diffuse_color(properties), linear)
+        painter = _Painter(str(int(body.index())), _diffuse_color(properties), linear)
         X_BG = inspector.GetPoseInFrame(geometry).GetAsMatrix4()
-        found += painted.surfaces(inspector.GetShape(geometry), X_BG)
+        found += painter.surfaces(inspector.GetShape(geometry), X_BG)
     return tuple(found)
 
 
@@ -99,7 +99,7 @@ class _Painter:
     Attributes:
         body: number of the shape's body.
         color: colour of the shape, for files without colours.
-        linear: whether this colour and those of OBJ files are linear.
+        linear: whether the colours of the shape and of OBJ files are linear.
     """
 
     body: str
@@ -128,14 +128,14 @@ class _Painter:
                 getattr(mesh.visual, "uv", None),
             )
 
-    def _material(self, found: Any) -> Material:
+    def _material(self, material: Any) -> Material:
         """Material from a mesh file; without one, from the colour of the shape."""
-        if isinstance(found, trimesh.visual.material.PBRMaterial):
-            return _gltf_material(found)
-        if found is None or found.name is None:
+        if isinstance(material, trimesh.visual.material.PBRMaterial):
+            return _gltf_material(material)
+        if material is None or material.name is None:
             return self._plain(self.color)
-        r, g, b, a = (np.asarray(found.diffuse, float) / 255.0).tolist()
-        return self._plain((r, g, b, a), _encode_texture(found.image))
+        r, g, b, a = (np.asarray(material.diffuse, float) / 255.0).tolist()
+        return self._plain((r, g, b, a), _encode_texture(material.image))
 
     def _plain(self, color: Color, texture: bytes = b"") -> Material:
         if not self.linear:
@@ -144,15 +144,15 @@ class _Painter:
         return Material(color=color, texture=texture)
 
 
-def _gltf_material(found: Any) -> Material:
+def _gltf_material(material: Any) -> Material:
     """Material from a glTF file, whose values are linear and default to 1."""
-    color = (255,) * 4 if found.baseColorFactor is None else found.baseColorFactor
+    color = (255,) * 4 if material.baseColorFactor is None else material.baseColorFactor
     r, g, b, a = (np.asarray(color, float) / 255.0).tolist()
     return Material(
         color=(r, g, b, a),
-        metallic=1.0 if found.metallicFactor is None else float(found.metallicFactor),
-        roughness=1.0 if found.roughnessFactor is None else float(found.roughnessFactor),
-        texture=_encode_texture(found.baseColorTexture),
+        metallic=1.0 if material.metallicFactor is None else float(material.metallicFactor),
+        roughness=1.0 if material.roughnessFactor is None else float(material.roughnessFactor),
+        texture=_encode_texture(material.baseColorTexture),
     )
 
 
@@ -227,7 +227,7 @@ class BlenderScene:
 
         Args:
             folder: existing empty folder.
-            threads: number of rendering threads; that of processors if 0.
+            threads: number of rendering threads; one per processor if 0.
         """
         textures = {one.material.texture for one in self.surfaces} - {b""}
         names = {png: f"texture_{k}.png" for k, png in enumerate(sorted(textures))}

@@ -15,8 +15,8 @@ class LoadedScene:
     """Blender's scene, with bodies and a camera that move.
 
     Args:
-        bpy: the module.
-        folder: folder with the description.
+        bpy: Blender's Python module.
+        folder: folder with the description of the scene.
     """
 
     def __init__(self, bpy: Any, folder: Path) -> None:
@@ -25,19 +25,19 @@ class LoadedScene:
         self._bpy = bpy
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self._scene = bpy.context.scene
-        described = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
-        self._set_renderer(described["samples"], described["threads"])
+        description = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
+        self._set_renderer(description["samples"], description["threads"])
         self._bodies: dict[str, list[Any]] = {}
         with np.load(folder / "meshes.npz", allow_pickle=False) as arrays:
-            for k, part in enumerate(described["parts"]):
-                material = self._material(part["material"], folder)
-                placed = self._mesh(f"part_{k}", arrays, material)
+            for k, part in enumerate(description["parts"]):
+                material = self._make_material(part["material"], folder)
+                placed = self._add_mesh(f"part_{k}", arrays, material)
                 self._bodies.setdefault(part["body"], []).append(placed)
-        self._camera = self._add("camera", bpy.data.cameras.new("camera"))
+        self._camera = self._add_object("camera", bpy.data.cameras.new("camera"))
         self._scene.camera = self._camera
-        for lamp in described["lamps"]:
-            self._lamp(lamp)
-        self._world(described["environment"], folder)
+        for lamp in description["lamps"]:
+            self._add_lamp(lamp)
+        self._set_world(description["environment"], folder)
 
     def render(self, task: dict[str, Any]) -> None:
         """Writes one image."""
@@ -88,12 +88,12 @@ class LoadedScene:
         cycles.denoiser, cycles.denoising_prefilter = "OPENIMAGEDENOISE", "FAST"
         cycles.denoising_use_gpu = False
 
-    def _add(self, name: str, data: Any) -> Any:
+    def _add_object(self, name: str, data: Any) -> Any:
         placed = self._bpy.data.objects.new(name, data)
         self._scene.collection.objects.link(placed)
         return placed
 
-    def _mesh(self, name: str, arrays: Any, material: Any) -> Any:
+    def _add_mesh(self, name: str, arrays: Any, material: Any) -> Any:
         mesh = self._bpy.data.meshes.new(name)
         faces = arrays[f"{name}.faces"]
         mesh.from_pydata(arrays[f"{name}.vertices"], (), faces)
@@ -106,21 +106,21 @@ class LoadedScene:
         else:
             mesh.set_sharp_from_angle(angle=math.radians(30.0))
         mesh.materials.append(material)
-        return self._add(name, mesh)
+        return self._add_object(name, mesh)
 
-    def _material(self, described: dict[str, Any], folder: Path) -> Any:
+    def _make_material(self, description: dict[str, Any], folder: Path) -> Any:
         material = self._bpy.data.materials.new("material")
         material.use_nodes = True
         nodes, links = material.node_tree.nodes, material.node_tree.links
         shader = nodes["Principled BSDF"].inputs
-        *color, opacity = described["color"]
+        *color, opacity = description["color"]
         shader["Base Color"].default_value = (*color, 1.0)
         shader["Alpha"].default_value = opacity
-        shader["Metallic"].default_value = described["metallic"]
-        shader["Roughness"].default_value = described["roughness"]
-        if described["texture"]:
+        shader["Metallic"].default_value = description["metallic"]
+        shader["Roughness"].default_value = description["roughness"]
+        if description["texture"]:
             image = nodes.new("ShaderNodeTexImage")
-            image.image = self._image(folder / described["texture"])
+            image.image = self._load_image(folder / description["texture"])
             tinted = nodes.new("ShaderNodeVectorMath")
             tinted.operation = "MULTIPLY"
             tinted.inputs[1].default_value = color
@@ -128,19 +128,19 @@ class LoadedScene:
             links.new(tinted.outputs[0], shader["Base Color"])
         return material
 
-    def _lamp(self, described: dict[str, Any]) -> None:
+    def _add_lamp(self, description: dict[str, Any]) -> None:
         lamp = self._bpy.data.lights.new("lamp", "SUN")
-        lamp.energy, lamp.color = described["irradiance"], described["color"]
-        lamp.angle, lamp.use_shadow = described["angle"], described["shadows"]
-        placed = self._add("lamp", lamp)
-        x, y, z = described["direction"]
-        if described["frame"] == "camera":
+        lamp.energy, lamp.color = description["irradiance"], description["color"]
+        lamp.angle, lamp.use_shadow = description["angle"], description["shadows"]
+        placed = self._add_object("lamp", lamp)
+        x, y, z = description["direction"]
+        if description["frame"] == "camera":
             placed.parent = self._camera
             y, z = -y, -z
         # It shines along its own -z, which is turned down from the zenith and then around it.
         placed.rotation_euler = (0.0, math.atan2(math.hypot(x, y), -z), math.atan2(-y, -x))
 
-    def _world(self, file: str, folder: Path) -> None:
+    def _set_world(self, file: str, folder: Path) -> None:
         world = self._bpy.data.worlds.new("world")
         self._scene.world = world
         world.use_nodes = True
@@ -150,10 +150,10 @@ class LoadedScene:
         background.inputs["Strength"].default_value = 1.0
         if file:
             environment = tree.nodes.new("ShaderNodeTexEnvironment")
-            environment.image = self._image(folder / file)
+            environment.image = self._load_image(folder / file)
             tree.links.new(environment.outputs["Color"], background.inputs["Color"])
 
-    def _image(self, path: Path) -> Any:
+    def _load_image(self, path: Path) -> Any:
         image = self._bpy.data.images.load(str(path), check_existing=True)
         if not image.packed_file:
             image.pack()

@@ -74,7 +74,9 @@ def write_bop(
     with new_folder(folder) as fresh:
         write_models(samples.library, samples.objects, fresh)
         for number, views in group_by_scene(samples):
-            scene = _Scene(samples.objects, fresh / split / f"{number:06d}", suffix, depth_unit)
+            scene = _SceneFolder(
+                samples.objects, fresh / split / f"{number:06d}", suffix, depth_unit
+            )
             for sample in views:
                 if not (fresh / "camera.json").exists():
                     _write_json(fresh / "camera.json", _camera_values(sample, depth_unit))
@@ -91,7 +93,7 @@ def write_bop(
     return tuple(sorted(lost))
 
 
-class _Scene:
+class _SceneFolder:
     """The folder of a scene while it is written."""
 
     def __init__(
@@ -234,20 +236,20 @@ def write_models(library: ObjectLibrary, objects: Sequence[str], folder: Path) -
         objects: names, in the order of their ids from 1.
         folder: folder of the data set.
     """
-    evaluation_faces = 5000  # Of the models for computing pose errors.
-    looks, evaluation = folder / "models", folder / "models_eval"
-    looks.mkdir()
+    evaluation_faces = 5000  # Faces of the models for computing pose errors.
+    display, evaluation = folder / "models", folder / "models_eval"
+    display.mkdir()
     evaluation.mkdir()
     infos: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(objects, start=1):
         file = f"obj_{number:06d}.ply"
         visual = visual_model(library, name)
-        write_ply(visual, looks / file, unit=BOP_MODEL_UNIT)
+        write_ply(visual, display / file, unit=BOP_MODEL_UNIT)
         surface, _ = decimate(library.surface(name), evaluation_faces)
         write_ply(uncolored_model(surface), evaluation / file, unit=BOP_MODEL_UNIT)
         infos[str(number)] = model_info(visual.vertices)
         infos[str(number)] |= find_symmetries(visual, diameter(visual.vertices))
-    for place in (looks, evaluation):
+    for place in (display, evaluation):
         (place / "models_info.json").write_text(json.dumps(infos, indent=2), encoding="utf-8")
 
 

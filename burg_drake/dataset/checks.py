@@ -219,8 +219,8 @@ class DatasetFinding:
     """An error in a data set.
 
     Attributes:
-        sample: key of the sample; empty if the error is of no sample.
-        file: file in the data set; for a sample, shard and member, separated by a colon.
+        sample: key of the sample; empty if the error belongs to no sample.
+        file: file in the data set; for a sample, the shard and its member, separated by a colon.
         message: description of the error.
     """
 
@@ -237,8 +237,8 @@ def check_dataset(folder: str | Path, redraw: Redraw | None = None) -> list[Data
 
     Args:
         folder: folder of the data set.
-        redraw: renders labels and depth again, to compare those of the samples with; no comparison
-            if None. Needs the library of the scenes.
+        redraw: renders labels and depth again, to compare them with the stored ones; needs the
+            library of the scenes. No comparison if None.
 
     Returns:
         All errors, in the order of the scenes; empty for a sound data set.
@@ -288,15 +288,15 @@ def check_shard(
         message = f"it has {len(shard.keys)} samples, but the index says {entry.nsamples}"
         found.append(DatasetFinding("", name, message))
     found += _find_scattered_samples(shard, name)
-    document, drawn = None, None
+    document, scene_to_draw = None, None
     try:
         document = load_document(folder / scene_name(scene), SceneDocument)
         if redraw is not None:
-            drawn = load_scene(folder / scene_name(scene))
+            scene_to_draw = load_scene(folder / scene_name(scene))
     except BurgError as error:
         found.append(_finding_of_error(folder, scene_name(scene), error))
     for key in shard.keys:
-        for kind, message in _sample_faults(shard, key, document, drawn, redraw):
+        for kind, message in _sample_faults(shard, key, document, scene_to_draw, redraw):
             file = f"{key}.{FILE_SUFFIXES[kind]}"
             found.append(DatasetFinding(key, f"{name}: {file}", message))
     return found

@@ -87,10 +87,10 @@ def count_dataset(samples: Samples) -> DatasetCounts:
             counted.add(samples.read(index, ("grasps",)), samples.parts(index))
         return counted
     for sample in samples:
-        there = {name for name, image in vars(sample.images).items() if image is not None}
+        image_kinds = {name for name, image in vars(sample.images).items() if image is not None}
         if sample.sensor_depth is not None:
-            there.add("sensor_depth")
-        counted.add(sample, there)
+            image_kinds.add("sensor_depth")
+        counted.add(sample, image_kinds)
     return counted
 
 

@@ -42,7 +42,7 @@ from burg_drake.dataset.scene_samples import (
     SceneSamples,
     SceneWork,
     appearance_of,
-    given_scene,
+    load_unchanged_scene,
     make_scene,
     run_sample_task,
 )
@@ -115,7 +115,7 @@ def _make_on_cluster(
     for one in work:
         try:
             if one.path is not None:
-                scenes[one.number] = given_scene(one, lambda *reference: library)
+                scenes[one.scene_number] = load_unchanged_scene(one, lambda *reference: library)
             able.append(one)
         except BurgError as error:
             yield one, error
@@ -124,15 +124,15 @@ def _make_on_cluster(
     world = make_bundle(catalogue_scene(library, scenes.values()), station, looks=True)
     run = open_results(run_folder(recipe, able[0].folder)) if recipe.run else None
     version = running_blender().version if recipe.colors and recipe.renderer == "blender" else ""
-    sent = replace(recipe, given=(), run="")
+    task_recipe = replace(recipe, given=(), run="")
 
     def pack(one: SceneWork) -> SampleTask:
-        scene, grasps = scenes.get(one.number), None
+        scene, grasps = scenes.get(one.scene_number), None
         if scene is not None and run is not None:
             grasps = grasps_of_run(run, scene)
         document, path = (scene.document, scene.path) if scene else (None, one.folder)
         return SampleTask(
-            replace(world, data=b""), sent, one.number, document, path, grasps, version
+            replace(world, data=b""), task_recipe, one.scene_number, document, path, grasps, version
         )
 
     with closing(map_on_cluster(executor, run_sample_task, able, world, pack)) as answers:
@@ -143,7 +143,7 @@ def _make_on_cluster(
             folder = one.folder
             scene = Scene(made.document, library, folder)
             try:
-                entry = write_made_scene(folder, one.number, scene, made.shard, made.entry)
+                entry = write_made_scene(folder, one.scene_number, scene, made.shard, made.entry)
             except BurgError as error:
                 yield one, error
             else:
@@ -256,13 +256,13 @@ def generate_dataset(
                 if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
                     raise outcome  # a full disk makes all other scenes fail, too
                 if isinstance(outcome, BaseException):
-                    failed[one.number] = (
+                    failed[one.scene_number] = (
                         str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
                     )
                 else:
                     writer.add_entry(outcome)
                 if progress is not None:
-                    progress(one.number, failed.get(one.number, ""))
+                    progress(one.scene_number, failed.get(one.scene_number, ""))
         writer.finish()
         if len(failed) < len(missing) or not (folder / CARD_FILE).exists():
             _write_card(folder, recipe)

@@ -70,12 +70,12 @@ class DatasetDocument:
         Compares contents of libraries and stations, not their paths; and only versions of software
         that affects samples. Ignores names."""
         max_shown = 6  # Differences in a message.
-        mine, theirs = _deciding_values(self), _deciding_values(other)
+        there, here = _deciding_values(self), _deciding_values(other)
         found = [
-            f"{name} is {_format_value(mine.get(name))} there,"
-            f" {_format_value(theirs.get(name))} here"
-            for name in dict.fromkeys([*mine, *theirs])
-            if mine.get(name) != theirs.get(name)
+            f"{name} is {_format_value(there.get(name))} there,"
+            f" {_format_value(here.get(name))} here"
+            for name in dict.fromkeys([*there, *here])
+            if there.get(name) != here.get(name)
         ]
         if len(found) > max_shown:
             found[max_shown:] = [f"{len(found) - max_shown} others"]

@@ -79,7 +79,7 @@ def grasp_rectangles(
 
     Args:
         grasps: grasps in the camera's frame.
-        intrinsics: of the camera, with the lens distortion of its images.
+        intrinsics: intrinsics of the camera, with the lens distortion of its images.
         opening: distance between the pads [m]; each grasp's own width if None.
         jaw: size of the jaws along y of G [m].
         most_angle: largest angle between approach and optical axis [rad].
@@ -147,7 +147,7 @@ class VoxelTargets:
     Attributes:
         quality: (n, n, n) success rate of the grasps in the voxel; nan if none was tried.
         rotation: (n, n, n, 4) quaternion wxyz of the voxel's first successful grasp; nan if none.
-        width: (n, n, n) width of that grasp in voxels.
+        width: (n, n, n) width of the first successful grasp in voxels.
     """
 
     quality: Single
@@ -168,7 +168,7 @@ class GraspVolume:
         success: (K,) whether the grasp held: `Outcome.held`, also if another object was moved
             (`lifted_disturbed`), or it turned or slid beyond the limits (`lifted_turned`).
         untried: (L,) indices of the grasps whose outcome leaves success unknown.
-        outside: (M,) indices of the other grasps, with centres outside the volume.
+        outside: (M,) indices of grasps with known success whose centres are outside the volume.
         voxels: number of voxels along each edge of the volume.
     """
 

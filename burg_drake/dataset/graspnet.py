@@ -116,15 +116,17 @@ def write_graspnet(
         for number, views in group_by_scene(samples):
             scene = fresh / "scenes" / f"scene_{number:04d}"
             numbers.add(number)
-            cameras: dict[str, _Camera] = {}
+            camera_folders: dict[str, _CameraFolder] = {}
             for sample in views:
                 name = camera or sample.view.camera
-                if name not in cameras:
-                    cameras[name] = _Camera(samples.objects, scene, name, opening)
-                cameras[name].add(sample, exported_depth(sample, "GraspNet", sensor=sensor_depth))
+                if name not in camera_folders:
+                    camera_folders[name] = _CameraFolder(samples.objects, scene, name, opening)
+                camera_folders[name].add(
+                    sample, exported_depth(sample, "GraspNet", sensor=sensor_depth)
+                )
                 lost |= describe_lost_depth(sample, "GraspNet", sensor=sensor_depth)
-            for one in cameras.values():
-                one.finish()
+            for camera_folder in camera_folders.values():
+                camera_folder.finish()
     if not numbers >= set(range(train_scenes)):
         lost.add(
             "graspnetAPI opens a data set only if a split is complete; 'train' has scenes 0 to"
@@ -133,7 +135,7 @@ def write_graspnet(
     return tuple(sorted(lost))
 
 
-class _Camera:
+class _CameraFolder:
     """The folder of a camera in a scene while it is written."""
 
     def __init__(

@@ -19,7 +19,7 @@ class VisualModel:
     """Visual mesh of an object.
 
     Attributes:
-        vertices: (V, 3) in the object frame O [m].
+        vertices: (V, 3) vertices in the object frame O [m].
         normals: (V, 3) unit vectors, outward.
         faces: (F, 3) vertices of each triangle.
         colors: (V, 3) vertex colours; None with a texture.

@@ -41,15 +41,15 @@ def apply_photometry(
     light = srgb_to_linear(color)
     if appearance.object_gains:
         light *= _pixel_gains(labels, color.shape[:2], appearance)
-    made = appearance.photometry
-    light *= np.float32(2.0**made.exposure) * np.array(made.white_balance, np.float32)
-    if made.blur > 0.0:
-        light = cv2.GaussianBlur(light, (0, 0), made.blur, borderType=cv2.BORDER_REPLICATE)
-    if made.electrons is not None:
-        spread = np.sqrt(light / made.electrons + (read_noise / made.electrons) ** 2)
+    response = appearance.photometry
+    light *= np.float32(2.0**response.exposure) * np.array(response.white_balance, np.float32)
+    if response.blur > 0.0:
+        light = cv2.GaussianBlur(light, (0, 0), response.blur, borderType=cv2.BORDER_REPLICATE)
+    if response.electrons is not None:
+        spread = np.sqrt(light / response.electrons + (read_noise / response.electrons) ** 2)
         light += spread * rng.standard_normal(light.shape, dtype=np.float32)
     steps = np.clip(light * np.float32(LINEAR_LEVELS - 1) + np.float32(0.5), 0, LINEAR_LEVELS - 1)
-    return np.asarray(_srgb_encoding_table(made.gamma)[steps.astype(np.uint16)])
+    return np.asarray(_srgb_encoding_table(response.gamma)[steps.astype(np.uint16)])
 
 
 def _pixel_gains(
@@ -63,9 +63,10 @@ def _pixel_gains(
             f" {given}"
         )
     gains = np.array([(1.0, 1.0, 1.0), *appearance.object_gains], np.float32)
-    if (most := int(labels.max(initial=0))) >= len(gains):
+    if (top_label := int(labels.max(initial=0))) >= len(gains):
         raise InvalidInputError(
-            f"label {most} has no gain; the appearance is for a scene of {len(gains) - 1} objects"
+            f"label {top_label} has no gain; the appearance is for a scene of {len(gains) - 1}"
+            " objects"
         )
     return np.asarray(gains[labels])
 

@@ -62,9 +62,9 @@ def depth_cloud(
     Args:
         depth: (H, W) distance along the optical axis [m]; pixels that are not finite or not
             positive are skipped.
-        intrinsics: of the camera; lens distortion is corrected.
-        color: (H, W, 3) of the same pixels.
-        labels: (H, W) of the same pixels.
+        intrinsics: intrinsics of the camera; lens distortion is corrected.
+        color: (H, W, 3) colours of the same pixels.
+        labels: (H, W) labels of the same pixels.
 
     Raises:
         InvalidInputError: an image has another size than the intrinsics, or the depth has integers.
@@ -73,12 +73,14 @@ def depth_cloud(
     for name, image in (("color", color), ("labels", labels)):
         if image is not None:
             require_image(image, intrinsics, f"the {name} image")
-    there = np.flatnonzero((metres > 0.0) & (metres < np.inf))
-    points = camera_rays(intrinsics).single.reshape(-1, 3)[there] * metres.reshape(-1, 1)[there]
+    measured = np.flatnonzero((metres > 0.0) & (metres < np.inf))
+    points = (
+        camera_rays(intrinsics).single.reshape(-1, 3)[measured] * metres.reshape(-1, 1)[measured]
+    )
     return DepthCloud(
         points,
-        None if color is None else np.asarray(color).reshape(-1, 3)[there],
-        None if labels is None else np.asarray(labels).reshape(-1)[there],
+        None if color is None else np.asarray(color).reshape(-1, 3)[measured],
+        None if labels is None else np.asarray(labels).reshape(-1)[measured],
     )
 
 

@@ -25,20 +25,20 @@ def pixels_around(
     Args:
         p_CQ: (V, 3) vertices of the surface in the camera's frame [m].
         faces: (F, 3) triangles of the surface.
-        intrinsics: of the camera.
-        beyond: whether the rectangle may exceed the image by one image size at each edge. Not
-            with lens distortion, whose model holds only within the image.
+        intrinsics: intrinsics of the camera.
+        beyond: whether the rectangle may exceed the image by one image size at each edge.
+            Ignored with lens distortion, whose model holds only within the image.
 
     Returns:
         The rectangle; None if no pixel can show the surface.
     """
-    before = p_CQ[:, 2] >= NEAR_DISTANCE
-    if not before.all():
-        p_CQ = _clip_at_near_plane(p_CQ, faces, before)
+    in_front = p_CQ[:, 2] >= NEAR_DISTANCE
+    if not in_front.all():
+        p_CQ = _clip_at_near_plane(p_CQ, faces, in_front)
     if not len(p_CQ):
         return None
-    flat = p_CQ[:, :2] / p_CQ[:, 2:]
-    lower, upper = flat.min(axis=0), flat.max(axis=0)
+    slopes = p_CQ[:, :2] / p_CQ[:, 2:]
+    lower, upper = slopes.min(axis=0), slopes.max(axis=0)
     if not intrinsics.is_pinhole:
         return camera_rays(intrinsics).pixel_box(lower, upper)
     size = np.array([intrinsics.width, intrinsics.height])
@@ -50,12 +50,12 @@ def pixels_around(
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Array:
+def _clip_at_near_plane(p_CQ: Array, faces: Indices, in_front: np.ndarray) -> Array:
     """Points in front of the camera, and the points where edges cross its near plane."""
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    a, b = p_CQ[edges[before[edges[:, 0]] != before[edges[:, 1]]].T]
+    a, b = p_CQ[edges[in_front[edges[:, 0]] != in_front[edges[:, 1]]].T]
     share = (NEAR_DISTANCE - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
-    return np.asarray(np.concatenate([p_CQ[before], a + share * (b - a)]))
+    return np.asarray(np.concatenate([p_CQ[in_front], a + share * (b - a)]))
 
 
 BOX_NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
@@ -80,8 +80,8 @@ class RayBox:
         """The box that triangles form, however they divide its faces; None for other shapes.
 
         Args:
-            vertices: (V, 3) [m].
-            faces: (F, 3).
+            vertices: (V, 3) vertices [m].
+            faces: (F, 3) triangles.
         """
         lower, upper = vertices.min(axis=0), vertices.max(axis=0)
         size = upper - lower
@@ -99,16 +99,16 @@ class RayBox:
         """(H, W) inverse depth 1 / z [1/m] at which a camera's rays hit the box, 0 for a miss; None
         if the camera is inside the box or in the plane of a face.
 
-        Of a plane n . p = d, d from the camera, a ray along (x, y, 1) meets 1 / z =
-        n . (x, y, 1) / d, which is linear in x and y. The ray enters where 1 / z is least among
-        the planes that the camera sees from outside, if that is before it leaves by another one.
+        In the camera's frame, a ray along (x, y, 1) meets the plane n . p = d at 1 / z =
+        n . (x, y, 1) / d, which is linear in x and y. The ray enters the box where 1 / z is least
+        among the planes that the camera sees from outside, if it leaves by no other plane before.
         """
         enter: Single | None = None
         leave: Single | None = None
         distances = self._distances(X_CB)
         if (distances >= 0.0).all() or (np.abs(distances) < SURFACE_TOLERANCE).any():
             return None
-        for number, image in self._planes(intrinsics, X_CB):
+        for number, image in self._plane_images(intrinsics, X_CB):
             if distances[number] > 0.0:
                 leave = image if leave is None else np.maximum(leave, image, out=leave)
             else:
@@ -117,12 +117,12 @@ class RayBox:
         enter[enter < np.maximum(leave, 0.0, out=leave)] = 0.0
         return enter
 
-    def planes(self, intrinsics: Intrinsics, X_CB: Array) -> NDArray[np.int16]:
+    def entered_planes(self, intrinsics: Intrinsics, X_CB: Array) -> NDArray[np.int16]:
         """(H, W) index in `BOX_NORMALS` of the face that each ray enters; arbitrary for a miss."""
         enter: Single | None = None
         found = np.zeros((intrinsics.height, intrinsics.width), np.int16)
         distances = self._distances(X_CB)
-        for number, image in self._planes(intrinsics, X_CB):
+        for number, image in self._plane_images(intrinsics, X_CB):
             if distances[number] < 0.0:
                 if enter is None:
                     enter = image
@@ -137,9 +137,9 @@ class RayBox:
         offsets: Array = np.concatenate([-self.lower, self.upper])
         return offsets - BOX_NORMALS @ inverse(X_CB)[:3, 3]
 
-    def _planes(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
-        """Index of each plane, and the (H, W) inverse depth of rays on it, negative behind the
-        camera."""
+    def _plane_images(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
+        """Index of each plane in `BOX_NORMALS`, and the (H, W) inverse depth at which rays meet it,
+        negative behind the camera."""
         x, y = camera_rays(intrinsics).slopes
         planes = BOX_NORMALS @ X_CB[:3, :3].T / self._distances(X_CB)[:, None]
         for number, (a, b, c) in enumerate(planes.astype(np.float32)):
@@ -180,8 +180,8 @@ class RaySurface:
 
         Args:
             label: label of the pixels that show the surface.
-            vertices: (V, 3) in the body's frame [m].
-            faces: (F, 3) with F >= 1.
+            vertices: (V, 3) vertices in the body's frame [m].
+            faces: (F, 3) triangles, F >= 1.
         """
         self.label = label
         self._vertices, self._faces = vertices, faces
@@ -193,7 +193,7 @@ class RaySurface:
         """Hits of a camera's rays; None if no pixel can show the surface.
 
         Args:
-            intrinsics: of the camera.
+            intrinsics: intrinsics of the camera.
             X_CB: (4, 4) pose of the body in the camera's frame.
             beyond: whether to cast rays beyond the image's edges, see `pixels_around`.
         """
@@ -302,24 +302,24 @@ class RayScene:
 
     def images(self, view: View, *, normals: bool = False) -> Images:
         """Depth and labels of a view, and its normals if `normals` is set."""
-        depth, directions, meshes = self._render_boxes(view, normals)
+        depth, unit_normals, ray_surfaces = self._render_boxes(view, normals)
         labels = np.full(depth.shape, SURROUNDINGS_LABEL, np.uint16)
         self._last = view, {}
-        for surface, X_CB in meshes:
+        for surface, X_CB in ray_surfaces:
             hits = surface.cast_rays(view.intrinsics, X_CB)
             self._last[1][surface.label] = hits
             if hits is None:
                 continue
             left, top, right, bottom = hits.pixels
-            part = np.s_[top:bottom, left:right]
-            nearest = hits.depth < depth[part]
-            depth[part][nearest] = hits.depth[nearest]
-            labels[part][nearest] = surface.label
-            if directions is not None:
-                directions[part][nearest] = surface.normals(hits, X_CB)[nearest]
+            area = np.s_[top:bottom, left:right]
+            nearest = hits.depth < depth[area]
+            depth[area][nearest] = hits.depth[nearest]
+            labels[area][nearest] = surface.label
+            if unit_normals is not None:
+                unit_normals[area][nearest] = surface.normals(hits, X_CB)[nearest]
         near, far = view.depth_range
         depth[(depth < near) | (depth > far)] = 0.0
-        return Images(depth=depth, labels=labels, normals=directions)
+        return Images(depth=depth, labels=labels, normals=unit_normals)
 
     def silhouette(self, number: int, view: View) -> Silhouette:
         """See `SceneRenderer.silhouette`."""
@@ -337,25 +337,25 @@ class RayScene:
     ) -> tuple[Single, Single | None, list[tuple[RaySurface, Array]]]:
         """Depth and normals of the surroundings' boxes, and the surfaces that need ray casting."""
         shape = view.intrinsics.height, view.intrinsics.width
-        nearness: Single = np.zeros(shape, np.float32)
-        plane, directions = np.zeros(shape, np.int16), [np.zeros((1, 3))]
+        inverse_depth: Single = np.zeros(shape, np.float32)
+        plane_index, directions = np.zeros(shape, np.int16), [np.zeros((1, 3))]
         meshes, X_CS = [], inverse(view.X_SC)
         for surface, X_SB in self._placed:
-            X_CB, box, seen = X_CS @ X_SB, surface.box, None
+            X_CB, box, box_inverse_depth = X_CS @ X_SB, surface.box, None
             if box is not None and surface.label == SURROUNDINGS_LABEL:
-                seen = box.inverse_depth(view.intrinsics, X_CB)
-            if box is None or seen is None:
+                box_inverse_depth = box.inverse_depth(view.intrinsics, X_CB)
+            if box is None or box_inverse_depth is None:
                 meshes.append((surface, X_CB))
                 continue
             if normals:
-                planes = box.planes(view.intrinsics, X_CB)
-                np.copyto(plane, planes + sum(map(len, directions)), where=seen > nearness)
+                planes = box.entered_planes(view.intrinsics, X_CB) + sum(map(len, directions))
+                np.copyto(plane_index, planes, where=box_inverse_depth > inverse_depth)
                 directions.append(BOX_NORMALS @ X_CB[:3, :3].T)
-            np.maximum(nearness, seen, out=nearness)
-        of_plane = np.concatenate(directions).astype(np.float32)
+            np.maximum(inverse_depth, box_inverse_depth, out=inverse_depth)
+        plane_normals = np.concatenate(directions).astype(np.float32)
         with np.errstate(divide="ignore"):
-            depth = np.divide(1.0, nearness, out=nearness)
-        return depth, np.take(of_plane, plane, axis=0) if normals else None, meshes
+            depth = np.divide(1.0, inverse_depth, out=inverse_depth)
+        return depth, np.take(plane_normals, plane_index, axis=0) if normals else None, meshes
 
     def _cast_whole_surface(self, number: int, view: View) -> SurfaceHits | None:
         """Hits of rays on an object, in the image and beyond it. Reuses the hits of the last image

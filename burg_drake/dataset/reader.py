@@ -89,11 +89,11 @@ class Dataset(Sequence[Sample]):
             InvalidInputError: the shard or a file of the sample is missing or damaged; the message
                 names both.
         """
-        asked = check_part_names(images)
+        requested_parts = check_part_names(images)
         shard, key = self._place(self.index(index) if isinstance(index, str) else index)
         try:
-            return shard.sample(shard.record(key), asked)
-        except DocumentError:  # of another version, or not as samples are: not mended so
+            return shard.sample(shard.record(key), requested_parts)
+        except DocumentError:  # another version, or no sample: making it again does not help
             raise
         except InvalidInputError as error:
             raise InvalidInputError(f"{error}; {REMAKE_SHARD_ADVICE}") from error

@@ -126,7 +126,7 @@ def read_recipe(data: Mapping[str, Any], name: str = "recipe") -> DatasetRecipe:
     """Reads a recipe from plain data.
 
     Args:
-        data: as `DatasetRecipe.plain` returns it.
+        data: data that `DatasetRecipe.plain` returned.
         name: source of the data, for messages.
 
     Raises:

@@ -57,7 +57,8 @@ def environment_map(seed: int) -> Bytes:
         seed: seed of the room.
 
     Returns:
-        (ROWS, 2 ROWS, 3) sRGB; see `environment_directions` for the directions of its pixels.
+        (ENVIRONMENT_ROWS, 2 ENVIRONMENT_ROWS, 3) sRGB; see `environment_directions` for the
+        directions of its pixels.
     """
     rng = rng_from("room", seed)
     d_W = environment_directions()
@@ -67,10 +68,10 @@ def environment_map(seed: int) -> Bytes:
     upper = np.array([*half, height])
     lower = np.array([*-half, 0.0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        away = np.where(d_W > 0.0, upper - p_W, lower - p_W) / d_W
-    away = np.where(np.isfinite(away) & (away >= 0.0), away, np.inf)
-    face, reach = away.argmin(axis=2), away.min(axis=2)
-    p_WQ = p_W + reach[..., None] * d_W
+        distance = np.where(d_W > 0.0, upper - p_W, lower - p_W) / d_W
+    distance = np.where(np.isfinite(distance) & (distance >= 0.0), distance, np.inf)
+    face, hit_distance = distance.argmin(axis=2), distance.min(axis=2)
+    p_WQ = p_W + hit_distance[..., None] * d_W
     image = np.zeros_like(d_W)
     positive = np.take_along_axis(d_W, face[..., None], axis=2)[..., 0] > 0.0
     wall = np.array([rng.uniform(0.62, 0.9)] * 3) + rng.uniform(-0.06, 0.06, 3)
@@ -99,7 +100,7 @@ def room_radiance(seed: int, irradiance: float) -> Single:
         irradiance: irradiance of a table; at 1 a white surface is white in the image.
 
     Returns:
-        (RADIANCE_ROWS, 2 RADIANCE_ROWS, 3) linear radiance, arranged as `environment_map`.
+        (64, 128, 3) linear radiance, arranged as `environment_map`.
     """
     radiance_rows = 64  # Rows of the image that lights the scene.
     seen = environment_map(seed) / 255.0
@@ -231,14 +232,16 @@ NO_APPEARANCE_COLOR = (204, 229, 255)
 """sRGB background without an appearance, as behind the images of simulated cameras."""
 
 
-def fill_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance) -> Bytes:
+def fill_background(
+    color: Bytes, X_WC: Array, intrinsics: Intrinsics, appearance: Appearance
+) -> Bytes:
     """Fills pixels without a surface with the room.
 
     Args:
         color: (H, W, 3) image of the renderer that `apply_appearance` adds.
         X_WC: (4, 4) pose of the camera's optical frame in the world.
-        intrinsics: of the camera.
-        look: appearance with the room.
+        intrinsics: intrinsics of the camera.
+        appearance: appearance with the room.
 
     Returns:
         (H, W, 3) sRGB; the same array if every pixel shows a surface.
@@ -248,22 +251,22 @@ def fill_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
         return color
     edge = cv2.dilate(nothing.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~nothing
     seen_behind = nothing | edge
-    behind = _background_colors(seen_behind, X_WC, intrinsics, look)
+    behind = _background_colors(seen_behind, X_WC, intrinsics, appearance)
     filled = np.where(nothing[..., None], behind, color)
     filled[edge] = _blend_edge_pixels(color, nothing, edge, behind)
     return filled
 
 
 def blend_over_background(
-    color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
+    color: Bytes, X_WC: Array, intrinsics: Intrinsics, appearance: Appearance | None
 ) -> Bytes:
     """Blends an image over the room, in linear light.
 
     Args:
         color: (H, W, 4) sRGB and coverage of each pixel by surfaces, not premultiplied.
         X_WC: (4, 4) pose of the camera's optical frame in the world.
-        intrinsics: of the camera.
-        look: appearance with the room; None for the sky of simulated cameras.
+        intrinsics: intrinsics of the camera.
+        appearance: appearance with the room; None for the sky of simulated cameras.
 
     Returns:
         (H, W, 3) sRGB.
@@ -271,7 +274,7 @@ def blend_over_background(
     found, share = color[..., :3].copy(), color[..., 3]
     mixed = share < 255
     if mixed.any():
-        behind = _background_colors(mixed, X_WC, intrinsics, look)[mixed]
+        behind = _background_colors(mixed, X_WC, intrinsics, appearance)[mixed]
         part = share[mixed, None] / 255.0
         before = linear_light(found[mixed] / 255.0)
         light = part * before + (1.0 - part) * linear_light(behind / 255.0)
@@ -280,14 +283,16 @@ def blend_over_background(
 
 
 def _background_colors(
-    where: Booleans, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
+    where: Booleans, X_WC: Array, intrinsics: Intrinsics, appearance: Appearance | None
 ) -> Bytes:
     """(H, W, 3) background, in pixels of the mask `where`."""
     behind = np.empty((*where.shape, 3), np.uint8)
-    behind[:] = NO_APPEARANCE_COLOR if look is None else BACKGROUND_GREY
-    if look is not None and look.room is not None:
+    behind[:] = NO_APPEARANCE_COLOR if appearance is None else BACKGROUND_GREY
+    if appearance is not None and appearance.room is not None:
         d_W = camera_rays(intrinsics).unit[where] @ X_WC[:3, :3].T
-        behind[where] = _sample_environment_map(environment_map(look.room), environment_pixels(d_W))
+        behind[where] = _sample_environment_map(
+            environment_map(appearance.room), environment_pixels(d_W)
+        )
     return behind
 
 
@@ -299,11 +304,13 @@ def _blend_edge_pixels(color: Bytes, nothing: Booleans, edge: Booleans, behind: 
     """
     solid = (~nothing & ~edge).astype(np.float32)
     excess = color[..., [0, 2]].astype(np.float32).mean(axis=2) - color[..., 1]
-    around = cv2.boxFilter(solid, -1, (5, 5), normalize=False)[edge]
+    solid_count = cv2.boxFilter(solid, -1, (5, 5), normalize=False)[edge]
     total = cv2.boxFilter(excess * solid, -1, (5, 5), normalize=False)[edge]
-    inside = total / np.maximum(around, 1.0)
-    most = 0.5 * (NO_SURFACE_COLOR[0] + NO_SURFACE_COLOR[2]) - NO_SURFACE_COLOR[1]
-    share = np.clip((excess[edge] - inside) / (most - inside), 0.0, 1.0)[:, None]
+    surface_excess = total / np.maximum(solid_count, 1.0)
+    full_excess = 0.5 * (NO_SURFACE_COLOR[0] + NO_SURFACE_COLOR[2]) - NO_SURFACE_COLOR[1]
+    share = np.clip((excess[edge] - surface_excess) / (full_excess - surface_excess), 0.0, 1.0)[
+        :, None
+    ]
     mixed = color[edge] + share * (
         behind[edge].astype(np.float32) - np.array(NO_SURFACE_COLOR, np.float32)
     )
@@ -313,9 +320,11 @@ def _blend_edge_pixels(color: Bytes, nothing: Booleans, edge: Booleans, behind: 
 def _sample_environment_map(room: Bytes, pixels: Array) -> Bytes:
     """(N, 3) colours at columns and rows (N, 2), looked up in batches that OpenCV accepts."""
     at = pixels.astype(np.float32)[None]
-    most = (1 << 15) - 2
+    batch_size = (1 << 15) - 2
     parts = [
-        cv2.remap(room, at[:, k : k + most], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-        for k in range(0, at.shape[1], most)
+        cv2.remap(
+            room, at[:, k : k + batch_size], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP
+        )
+        for k in range(0, at.shape[1], batch_size)
     ]
     return np.asarray(np.concatenate(parts, axis=1)[0])

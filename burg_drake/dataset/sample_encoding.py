@@ -93,7 +93,7 @@ def encode_png(image: NDArray[Any], options: Sequence[int] = ()) -> bytes:
     """Encodes an image as PNG, without loss.
 
     Args:
-        image: (H, W) of uint8 or uint16, or RGB (H, W, 3).
+        image: grey values (H, W) of uint8 or uint16, or RGB (H, W, 3).
         options: OpenCV's options, as pairs of key and value.
     """
     if image.ndim == 3:
@@ -208,7 +208,7 @@ def encode_mask(mask: Booleans) -> str:
     """Encodes a mask as text.
 
     Args:
-        mask: (H, W).
+        mask: (H, W) mask.
     """
     runs = run_lengths(mask)
     steps = runs.copy()
@@ -220,7 +220,7 @@ def decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     """Decodes a mask (H, W) from text.
 
     Args:
-        text: as `encode_mask` writes it.
+        text: text that `encode_mask` wrote.
         height, width: size of the mask; the caller has to limit it.
 
     Raises:
@@ -249,7 +249,7 @@ def run_lengths(mask: Booleans) -> Indices:
     """(N,) lengths of a mask's runs; the first run is of pixels that are off.
 
     Args:
-        mask: (H, W).
+        mask: (H, W) mask.
     """
     height, width = mask.shape
     used = np.flatnonzero(mask.any(axis=0))

@@ -344,13 +344,13 @@ def check_part_names(parts: Iterable[str]) -> frozenset[str]:
     Raises:
         UnknownNameError: there is no part of a name.
     """
-    asked = frozenset([parts] if isinstance(parts, str) else parts)
-    for name in asked:
+    requested_parts = frozenset([parts] if isinstance(parts, str) else parts)
+    for name in requested_parts:
         if name not in READABLE_PARTS:
             raise UnknownNameError(
                 f"samples have no part {name!r}; {suggest_names(name, READABLE_PARTS)}"
             )
-    return asked
+    return requested_parts
 
 
 def _available_images(sample: Sample) -> dict[str, Any]:

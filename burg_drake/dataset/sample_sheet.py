@@ -120,8 +120,8 @@ def depth_colors(depth: Single, limits: tuple[float, float]) -> Bytes:
 
 def depth_limits(depth: Single) -> tuple[float, float]:
     """Nearest and farthest depth of an image [m]; zeros without depth."""
-    there = depth[depth > 0.0]
-    return (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
+    measured = depth[depth > 0.0]
+    return (float(measured.min()), float(measured.max())) if measured.size else (0.0, 0.0)
 
 
 def sample_caption(sample: Sample) -> str:

@@ -58,10 +58,10 @@ def show_sample(
         sample: sample with the images to show.
         scene: scene of the sample.
         station: station of the scene; its arm is shown in the view's posture.
-        meshcat: where to show it.
+        meshcat: Meshcat to show the sample in.
 
     Returns:
-        A legend that switches what is shown.
+        Entries of a legend that switches the parts of the sample on and off.
 
     Raises:
         InvalidInputError: the view's posture is of another arm.
@@ -77,7 +77,7 @@ def show_sample(
         built.diagram.ForcedPublish(context)
     legend = [LegendEntry("models", "#9aa3ad", ("/drake/visualizer", "/drake/labels"))]
     for path in (SamplePaths.cloud, SamplePaths.sensor, SamplePaths.camera, GRASPS_PATH):
-        meshcat.Delete(path)  # of a sample that was shown before
+        meshcat.Delete(path)  # from a sample shown before
     for depth, path in (
         (sample.images.depth, SamplePaths.cloud),
         (sample.sensor_depth, SamplePaths.sensor),
@@ -111,8 +111,8 @@ def _draw_depth(
     max_points = 80_000  # Per cloud (3 MB of a page); larger images are thinned out.
     # Point size by spacing of far points; three.js draws them 2.4 times too small.
     size_factor = 3.5
-    there = np.count_nonzero(depth)
-    step = max(1, int(np.ceil(np.sqrt(there / max_points))))
+    point_count = np.count_nonzero(depth)
+    step = max(1, int(np.ceil(np.sqrt(point_count / max_points))))
     shown = np.zeros_like(depth)
     shown[::step, ::step] = depth[::step, ::step]
     intrinsics = sample.view.intrinsics
@@ -131,7 +131,7 @@ def _draw_depth(
         _draw_points(meshcat, path, cloud.points, colors, side)
         meshcat.SetTransform(path, RigidTransform(X_WC))
         meshcat.SetProperty(path, "visible", exact)
-    return LegendEntry(f"{name} ({there:,} points)", hex_color(rgb), (path,), shown=exact)
+    return LegendEntry(f"{name} ({point_count:,} points)", hex_color(rgb), (path,), shown=exact)
 
 
 def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, side: float) -> None:

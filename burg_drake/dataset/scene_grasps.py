@@ -63,7 +63,7 @@ def label_grasps(grasps: SceneGrasps, scene: SceneLike, X_SC: Array) -> Labelled
 
     Args:
         grasps: grasps on instances of the scene.
-        scene: scene with the placed instances, whose order gives their numbers.
+        scene: scene with the placed instances, whose order gives the instances' numbers.
         X_SC: (4, 4) pose of the camera's optical frame in the scene frame, or of any other target
             frame, such as that of a volume.
 
@@ -77,14 +77,14 @@ def label_grasps(grasps: SceneGrasps, scene: SceneLike, X_SC: Array) -> Labelled
     number = np.empty(len(grasps), np.uint16)
     numbers = instance_numbers(scene)
     for name in np.unique(grasps.instance).tolist():
-        mine = grasps.instance == name
-        X_CG[mine] = X_CS @ scene.X_SO(name) @ grasps.X_OG[mine]
-        number[mine] = numbers[name]
+        on_instance = grasps.instance == name
+        X_CG[on_instance] = X_CS @ scene.X_SO(name) @ grasps.X_OG[on_instance]
+        number[on_instance] = numbers[name]
     return LabelledGrasps(X_CG, grasps.width, number, grasps.outcome, dict(grasps.margins))
 
 
 def grasps_of_run(run: Run | Campaign | str | Path, scene: SceneLike) -> SceneGrasps:
-    """All grasps of a scene in a run, in the order of its candidates.
+    """All grasps of a scene in a run, in the order of the run's candidates.
 
     Args:
         run: run of one scene or of many, complete or not; or its folder.
@@ -101,17 +101,19 @@ def grasps_of_run(run: Run | Campaign | str | Path, scene: SceneLike) -> SceneGr
         DocumentError: a document does not fit the schema.
     """
     scene = as_scene(scene)
-    found = run if isinstance(run, Run | Campaign) else open_results(run)
-    if isinstance(found, Run):
-        judged = found.document.scene
+    results = run if isinstance(run, Run | Campaign) else open_results(run)
+    if isinstance(results, Run):
+        judged = results.document.scene
         if judged.content != scene.content:
             raise InvalidInputError(
-                f"{found.path} is a run of scene {judged.name!r} ({judged.path}, content"
+                f"{results.path} is a run of scene {judged.name!r} ({judged.path}, content"
                 f" {judged.content[:12]}), not of {scene.name!r} ({scene.path}, content"
                 f" {scene.content[:12]}); their objects or poses differ"
             )
-        return _candidates_with_results(found)
-    return _concatenate_grasps([_candidates_with_results(one) for one in _find_runs(found, scene)])
+        return _candidates_with_results(results)
+    return _concatenate_grasps(
+        [_candidates_with_results(one) for one in _find_runs(results, scene)]
+    )
 
 
 def sampled_grasps(
@@ -152,11 +154,11 @@ def sampled_grasps(
     outcome = np.full(len(candidates), "", dtype="<U32")
     margins = {name: np.full(len(candidates), np.nan) for name in screen_margins}
     for name in dict.fromkeys(instance.tolist()):
-        mine = instance == name
-        found = screen.measure(name, diagram.X_WO(name) @ X_OG[mine])
-        outcome[mine] = found.outcome
+        on_instance = instance == name
+        found = screen.measure(name, diagram.X_WO(name) @ X_OG[on_instance])
+        outcome[on_instance] = found.outcome
         for margin in screen_margins:
-            margins[margin][mine] = getattr(found, margin)
+            margins[margin][on_instance] = getattr(found, margin)
     return SceneGrasps(X_OG, instance, candidates.grasps.width, outcome.astype(np.str_), margins)
 
 

@@ -344,14 +344,14 @@ def label_instances(
     if labels is None:
         labels = renderer.images(view, ("labels",)).labels
         assert labels is not None
-    X_CS, height_width = inverse(view.X_SC), labels.shape
+    X_CS, (height, width) = inverse(view.X_SC), labels.shape
     counts = np.bincount(labels.ravel(), minlength=len(renderer.numbers) + 1)
     found = []
     for name, number in renderer.numbers.items():
         silhouette = renderer.silhouette(number, view)
-        amodal = silhouette.mask_in_image(height_width[1], height_width[0])
-        visible = int(counts[number])
-        size = int(np.count_nonzero(silhouette.mask))
+        amodal = silhouette.mask_in_image(width, height)
+        visible_pixels = int(counts[number])
+        silhouette_pixels = int(np.count_nonzero(silhouette.mask))
         rows, columns = silhouette.mask.shape
         found.append(
             InstanceLabel(
@@ -359,10 +359,10 @@ def label_instances(
                 object=renderer.scene.instance(name).object,
                 number=number,
                 X_CO=X_CS @ renderer.scene.X_SO(name),
-                visible_pixels=visible,
-                silhouette_pixels=size,
-                visibility=visible / size if size else 0.0,
-                visible_box=box_of_mask(labels == number) if visible else None,
+                visible_pixels=visible_pixels,
+                silhouette_pixels=silhouette_pixels,
+                visibility=visible_pixels / silhouette_pixels if silhouette_pixels else 0.0,
+                visible_box=box_of_mask(labels == number) if visible_pixels else None,
                 amodal_box=(silhouette.left, silhouette.top, columns, rows) if rows else None,
                 amodal=amodal,
             )

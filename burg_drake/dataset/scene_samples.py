@@ -35,7 +35,7 @@ class SceneSamples:
 
     Args:
         scene: the scene.
-        number: number of the scene in the data set.
+        scene_number: number of the scene in the data set; seeds views, noise and appearance.
         station: station of the scene.
         recipe: recipe of the samples.
         folder: folder of the data set; the recipe's paths are relative to it.
@@ -46,26 +46,27 @@ class SceneSamples:
     def __init__(
         self,
         scene: Scene,
-        number: int,
+        scene_number: int,
         station: Station,
         recipe: DatasetRecipe,
         folder: Path,
         appearance: Appearance | None = None,
         grasps: SceneGrasps | None = None,
     ) -> None:
-        self._scene, self._number, self._folder = scene, number, folder
+        self._scene, self._scene_number, self._folder = scene, scene_number, folder
         self._station, self._recipe, self._grasps = station, recipe, grasps
         looks = recipe.looks
         if appearance is None and looks is not None:
-            rng = rng_from("dataset looks", recipe.seed, number)
-            library = resolve_library_path(looks.distractor_library, folder)
-            settings = replace(looks, distractor_library=library)
+            rng = rng_from("dataset looks", recipe.seed, scene_number)
+            distractor_library = resolve_library_path(looks.distractor_library, folder)
+            settings = replace(looks, distractor_library=distractor_library)
             drawn = draw_appearance(settings, scene, station, rng)
             appearance = replace(drawn, library=looks.distractor_library)
-        self._stored = appearance
+        # Samples record the recipe's reference to the distractors; renderers need the folder.
+        self._recorded_appearance = appearance
         if appearance is not None:
-            library = resolve_library_path(appearance.library, folder)
-            appearance = replace(appearance, library=library)
+            library_folder = resolve_library_path(appearance.library, folder)
+            appearance = replace(appearance, library=library_folder)
         self._appearance = appearance
         self._renderers: dict[tuple[bool, bool], SceneRenderer] = {}
 
@@ -87,41 +88,42 @@ class SceneSamples:
             depth_range=depth_range,
             besides=() if self._appearance is None else distractor_boxes(self._appearance),
         )
-        grasps = self._wanted_grasps() if self._grasps is None else self._grasps
-        for number in range(recipe.views):
-            view = views.sample(rng_from("dataset view", recipe.seed, self._number, number))
-            yield self.sample(number, view, grasps)
+        grasps = self._scene_grasps() if self._grasps is None else self._grasps
+        for view_number in range(recipe.views):
+            rng = rng_from("dataset view", recipe.seed, self._scene_number, view_number)
+            yield self.sample(view_number, views.sample(rng), grasps)
 
-    def sample(self, number: int, view: View, grasps: SceneGrasps | None = None) -> Sample:
-        """The sample of a view.
+    def sample(self, view_number: int, view: View, grasps: SceneGrasps | None = None) -> Sample:
+        """Makes the sample of a view.
 
         Args:
-            number: number of the view; seeds the noise.
-            view: the camera.
+            view_number: number of the view in the scene; seeds the noise.
+            view: pose and intrinsics of the camera.
             grasps: grasps on the scene's objects.
         """
         recipe, renderer = self._recipe, self._renderer(view, self._recipe.colors)
-        rng = rng_from("dataset image", recipe.seed, self._number, number)
+        rng = rng_from("dataset image", recipe.seed, self._scene_number, view_number)
         kinds: list[ImageKind] = ["depth", "labels"]
         if recipe.colors:
             kinds.append("color")
         if recipe.normals or recipe.sensor:
             kinds.append("normals")
         images = renderer.images(view, kinds, rng=rng)
+        appearance = self._recorded_appearance
         return Sample(
-            scene=self._number,
-            number=number,
+            scene=self._scene_number,
+            number=view_number,
             view=view,
             X_WS=self._station.document.X_WS.matrix(),
             images=images if recipe.normals else replace(images, normals=None),
             sensor_depth=self._sensor_depth(view, images, rng) if recipe.sensor else None,
             instances=label_instances(renderer, view, images),
             grasps=None if grasps is None else label_grasps(grasps, self._scene, view.X_SC),
-            appearance={} if self._stored is None else self._stored.plain(),
+            appearance={} if appearance is None else appearance.plain(),
         )
 
     def render_again(self, view: View) -> Images:
-        """Depth and labels of a view, to compare stored ones with."""
+        """Renders depth and labels of a view, to compare them with the stored images."""
         return self._renderer(view, colors=False).images(view, ("depth", "labels"))
 
     def _renderer(self, view: View, colors: bool) -> SceneRenderer:
@@ -148,7 +150,7 @@ class SceneSamples:
             color=images.color,
         )
 
-    def _wanted_grasps(self) -> SceneGrasps | None:
+    def _scene_grasps(self) -> SceneGrasps | None:
         recipe = self._recipe
         if recipe.run:
             return grasps_of_run(run_folder(recipe, self._folder), self._scene)
@@ -170,10 +172,10 @@ def appearance_of(sample: Sample) -> Appearance | None:
 
 @dataclass(frozen=True)
 class SceneWork:
-    """A scene to make samples of.
+    """A scene to make samples of on this machine; scene, station and library are given by path.
 
     Attributes:
-        number: number of the scene.
+        scene_number: number of the scene.
         path: path of the scene's document; None for a sampled scene.
         recipe: recipe of the data set.
         folder: folder of the data set.
@@ -181,7 +183,7 @@ class SceneWork:
         library: library folder for a sampled scene; None for a given one.
     """
 
-    number: int
+    scene_number: int
     path: Path | None
     recipe: DatasetRecipe
     folder: Path
@@ -200,19 +202,19 @@ def make_scene(work: SceneWork) -> ShardEntry:
     with convert_drake_errors():
         station = _load_station(work.station)
         if work.path is not None:
-            scene = given_scene(work)
+            scene = load_unchanged_scene(work)
         else:
             assert recipe.sampled is not None and work.library is not None
             sampler = kept_sampler(recipe.sampled, work.library, work.station)
-            scene = accepted_scene(sampler, work.number, work.folder)
-        samples = SceneSamples(scene, work.number, station, recipe, work.folder)
-        return write_scene(work.folder, work.number, scene, samples)
+            scene = sample_scene(sampler, work.scene_number, work.folder)
+        samples = SceneSamples(scene, work.scene_number, station, recipe, work.folder)
+        return write_scene(work.folder, work.scene_number, scene, samples)
 
 
-def given_scene(
+def load_unchanged_scene(
     work: SceneWork, library: Callable[[str, Path | None], ObjectLibrary] = load_library
 ) -> Scene:
-    """Loads a given scene, which must not have changed since the data set was begun.
+    """Loads a given scene, whose content must match the hash in the recipe.
 
     Args:
         work: the scene, with a path.
@@ -224,25 +226,25 @@ def given_scene(
     """
     assert work.path is not None
     scene = load_scene(work.path, library=library)
-    if scene.content != work.recipe.given[work.number]:
+    if scene.content != work.recipe.given[work.scene_number]:
         raise InvalidInputError(
             f"{work.path} was changed while the data set was made; run the command again"
         )
     return scene
 
 
-def accepted_scene(sampler: SceneSampler, number: int, folder: Path) -> Scene:
-    """Samples the scene of a number.
+def sample_scene(sampler: SceneSampler, scene_number: int, folder: Path) -> Scene:
+    """Samples a scene.
 
     Args:
         sampler: sampler of the recipe.
-        number: number of the scene.
+        scene_number: number of the scene; seeds the sampler.
         folder: folder of the data set.
 
     Raises:
         SimulationError: no attempt was accepted.
     """
-    sampled = sampler.sample(number, folder / "scenes")
+    sampled = sampler.sample(scene_number, folder / "scenes")
     if not sampled.accepted:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in sampled.refused.items())
         raise SimulationError(f"no scene was accepted in {sampled.attempts} attempts ({reasons})")
@@ -256,22 +258,22 @@ def _load_station(path: Path) -> Station:
 
 @dataclass(frozen=True)
 class SampleTask:
-    """A scene to make samples of.
+    """A scene to make samples of on a remote worker; needs no files but the unpacked bundle.
 
     Attributes:
         world: hashes of the bundle with station and library, without file contents.
         recipe: recipe of the data set, without other scenes and without references to files.
-        number: number of the scene.
+        scene_number: number of the scene.
         document: document of the scene; None for a sampled scene.
-        path: for messages: path of the document on the machine of the data set; of the data set for
-            a sampled scene.
+        path: for messages: path of the document, or of the data set for a sampled scene, on the
+            machine that writes the data set.
         grasps: grasps on the scene's objects; sampled by the recipe if None.
         blender: version of Blender, if Blender renders.
     """
 
     world: Bundle
     recipe: DatasetRecipe
-    number: int
+    scene_number: int
     document: SceneDocument | None
     path: Path
     grasps: SceneGrasps | None
@@ -293,33 +295,35 @@ class SampleTaskResult:
     entry: ShardEntry
 
 
-def run_sample_task(sent: SampleTask, folder: Path) -> SampleTaskResult:
-    """Makes the samples of a scene, on any machine.
+def run_sample_task(task: SampleTask, folder: Path) -> SampleTaskResult:
+    """Makes the samples of a scene on a remote worker.
 
     Args:
-        sent: the scene.
+        task: the scene.
         folder: folder of the unpacked bundle.
 
     Raises:
         Exception: as `make_scene`; or the bundle has other content than the task expects.
     """
-    if sent.blender and (version := running_blender().version) != sent.blender:
+    if task.blender and (version := running_blender().version) != task.blender:
         raise InvalidInputError(
-            f"the worker has Blender {version}, but the data set is made with {sent.blender};"
+            f"the worker has Blender {version}, but the data set is made with {task.blender};"
             " install that version"
         )
     with convert_drake_errors():
-        library, station = _load_world(sent.world, folder)
-        if sent.document is not None:
-            scene = Scene(sent.document, library, sent.path)
+        library, station = _load_world(task.world, folder)
+        if task.document is not None:
+            scene = Scene(task.document, library, task.path)
         else:
-            assert sent.recipe.sampled is not None
-            sampler = _bundle_scene_sampler(sent.recipe.sampled, sent.world, folder)
-            scene = accepted_scene(sampler, sent.number, sent.path)
-        samples = SceneSamples(scene, sent.number, station, sent.recipe, folder, grasps=sent.grasps)
+            assert task.recipe.sampled is not None
+            sampler = _bundle_scene_sampler(task.recipe.sampled, task.world, folder)
+            scene = sample_scene(sampler, task.scene_number, task.path)
+        samples = SceneSamples(
+            scene, task.scene_number, station, task.recipe, folder, grasps=task.grasps
+        )
         # beside the bundle, where this machine has disk space and old folders are removed
         with TemporaryDirectory(dir=folder.parent, prefix=".samples.") as place:
-            path = Path(place) / shard_name(sent.number)
+            path = Path(place) / shard_name(task.scene_number)
             entry = write_shard(path, samples)
             return SampleTaskResult(scene.document, path.read_bytes(), entry)
 

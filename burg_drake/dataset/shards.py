@@ -65,22 +65,22 @@ def tar_members(path: Path) -> dict[str, MemberPlace]:
     found: dict[str, MemberPlace] = {}
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
-        at, last = 0, "its beginning"
+        offset, last_name = 0, "its beginning"
         while True:
-            header = os.pread(stream.fileno(), TAR_BLOCK, at)
+            header = os.pread(stream.fileno(), TAR_BLOCK, offset)
             if len(header) < TAR_BLOCK:
-                raise InvalidInputError(f"{path} is truncated after {last}")
+                raise InvalidInputError(f"{path} is truncated after {last_name}")
             if not any(header):
                 return found
-            name, place = _parse_header(header, at, f"{path}, after {last}")
+            name, place = _parse_header(header, offset, f"{path}, after {last_name}")
             if place.start + place.size > size:
                 raise InvalidInputError(f"{path} is truncated within {name}")
             if name in found:
                 raise InvalidInputError(f"{path} contains {name} twice")
             if len(found) == max_members:
                 raise InvalidInputError(f"{path} has more than {max_members:,} members")
-            found[name], last = place, name
-            at = place.start + place.size + -place.size % TAR_BLOCK
+            found[name], last_name = place, name
+            offset = place.start + place.size + -place.size % TAR_BLOCK
 
 
 def read_member(path: Path, place: MemberPlace) -> bytes:
@@ -336,11 +336,12 @@ def _open_unchanged_shard(path: Path, size: int, changed: int) -> SampleShard:
 @contextmanager
 def _write_atomically(path: Path) -> Iterator[BinaryIO]:
     """Opens a temporary file beside `path` and renames it to `path` if the block succeeds."""
-    beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")  # as `UNFINISHED_FILE` has it
+    # `UNFINISHED_FILE` matches this name.
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
     try:
         with _report_write_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            stream = beside.open("xb")
+            stream = temporary.open("xb")
         try:
             copy_permissions(path, stream.fileno())
             yield stream
@@ -348,12 +349,12 @@ def _write_atomically(path: Path) -> Iterator[BinaryIO]:
                 stream.flush()
                 os.fsync(stream.fileno())
         finally:
-            with suppress(OSError):  # what a full disk has not taken has been reported
+            with suppress(OSError):  # a failed write, as to a full disk, has been reported
                 stream.close()
         with _report_write_errors(path):
-            os.replace(beside, path)
+            os.replace(temporary, path)
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 @contextmanager

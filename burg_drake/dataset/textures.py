@@ -153,5 +153,7 @@ def _plain_texture(rng: np.random.Generator) -> Array:
 
 def _random_color(rng: np.random.Generator, saturation: float, value: tuple[float, float]) -> Array:
     """Draws an sRGB colour (3,); half of the colours are nearly grey."""
-    most = saturation if rng.random() < 0.5 else 0.08
-    return np.array(colorsys.hsv_to_rgb(rng.random(), rng.uniform(0.0, most), rng.uniform(*value)))
+    max_saturation = saturation if rng.random() < 0.5 else 0.08
+    return np.array(
+        colorsys.hsv_to_rgb(rng.random(), rng.uniform(0.0, max_saturation), rng.uniform(*value))
+    )

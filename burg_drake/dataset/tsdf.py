@@ -81,7 +81,7 @@ def fuse_tsdf(
 
     Args:
         depths: K depth images (H, W) [m]; 0 for no measurement.
-        intrinsics: of the camera, or of each of the K images. Lens distortion is modelled.
+        intrinsics: intrinsics of the camera, or of each image (K). Lens distortion is modelled.
         X_SC: (K, 4, 4) poses of the camera's optical frame in the scene frame.
         X_SV: (4, 4) pose of the cube's lower corner in the scene frame.
         size: edge of the cube [m].
@@ -169,11 +169,11 @@ def _distances_before_surface(
     column, row = np.rint(camera.project(p_CQ[seen])).T
     inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
     seen = seen[inside]
-    shown = depth[row[inside].astype(np.intp), column[inside].astype(np.intp)].astype(float)
-    there = (shown > 0.0) & (shown < np.inf)
-    seen, shown = seen[there], shown[there]
+    surface_depth = depth[row[inside].astype(np.intp), column[inside].astype(np.intp)].astype(float)
+    measured = (surface_depth > 0.0) & (surface_depth < np.inf)
+    seen, surface_depth = seen[measured], surface_depth[measured]
     z = p_CQ[seen, 2]
-    return seen, (shown - z) * np.linalg.norm(p_CQ[seen], axis=1) / z
+    return seen, (surface_depth - z) * np.linalg.norm(p_CQ[seen], axis=1) / z
 
 
 def exact_tsdf(

@@ -54,7 +54,7 @@ class PlacedBox:
     """A box in the scene.
 
     Attributes:
-        name: name of the body that it is, or bounds.
+        name: name of the body that the box is or bounds.
         X_SB: (4, 4) pose of the box's centre.
         half: (3,) half extents [m].
     """
@@ -127,25 +127,25 @@ class WristCamera:
             X_HC = np.asarray(station.hand.X_HG.matrix() @ make_pose(p_AB=(0.0, -0.07, -0.09)))
         self.X_HC = X_HC
 
-    def posture(self, X_SC: Array) -> Array | str:
-        """Collision-free joint positions (n,) that bring the camera to a pose (4, 4), the nearest
-        to home; or the reason why there are none."""
+    def find_posture(self, X_SC: Array) -> Array | str:
+        """Finds the collision-free joint positions (n,) nearest to home that bring the camera to a
+        pose (4, 4), or the reason why there are none."""
         X_AH = self._X_AS @ X_SC @ inverse(self.X_HC)
         found = [
             self._solutions.solve(X_AH[None], turn)[1] for turn in range(self._solutions.rounds)
         ]
-        near, met = solve_ik(
+        solutions, converged = solve_ik(
             self._kinematics,
             np.broadcast_to(X_AH, (sum(map(len, found)), 4, 4)),
             np.concatenate(found),
             iterations=5,
             tolerance=1e-9,
         )
-        q = self._kinematics.wrapped_near(near[met], self._home)
+        q = self._kinematics.wrapped_near(solutions[converged], self._home)
         if not len(q):
             return "are out of the arm's reach"
-        far = np.abs(q - self._home).max(axis=1)
-        for one in q[np.argsort(far, kind="stable")[:12]]:  # nearest first
+        home_distance = np.abs(q - self._home).max(axis=1)
+        for one in q[np.argsort(home_distance, kind="stable")[:12]]:  # nearest first
             if self._collision.is_free(one):
                 return np.asarray(one)
         return "have the arm collide"
@@ -174,13 +174,12 @@ class ViewSampler:
             scene: scene in view.
             station: station of the scene, with cameras and arm.
             settings: ranges from which views are drawn.
-            intrinsics: of all cameras. If None, cameras of the station have their own; those on
-                the sphere and the wrist have those of the station's first camera.
-            depth_range: nearest and farthest depth [m]. If None, that of the same camera, or
-                `DEFAULT_DEPTH_RANGE` with given intrinsics.
-            besides: boxes in the scene frame around other things. Cameras on the sphere and the
-                wrist are kept out of them, and must see past them; those of the station are not
-                checked.
+            intrinsics: intrinsics of all cameras. If None, cameras of the station have their own;
+                cameras on the sphere and the wrist have those of the station's first camera.
+            depth_range: nearest and farthest depth [m]. If None, the depth range of the camera that
+                gives the intrinsics, or `DEFAULT_DEPTH_RANGE` with given intrinsics.
+            besides: further boxes in the scene frame. Cameras on the sphere and the wrist stay
+                outside these boxes and must see past them; cameras of the station are not checked.
 
         Raises:
             UnknownNameError: the station has no such camera.
@@ -223,10 +222,10 @@ class ViewSampler:
                 f"views cannot be from camera {camera!r}; {suggest_names(camera, cameras)}"
             )
         refused: Counter[str] = Counter()
-        still = camera in self._station.document.cameras and not (
+        is_fixed = camera in self._station.document.cameras and not (
             self.settings.position_jitter or self.settings.angle_jitter_deg
         )
-        for _ in range(1 if still else self.settings.draws):
+        for _ in range(1 if is_fixed else self.settings.draws):
             view = self._draw(camera, rng)
             if isinstance(view, View):
                 return view
@@ -254,7 +253,7 @@ class ViewSampler:
             return broken
         if camera != WRIST_CAMERA:
             return view
-        posture = self._wrist.posture(X_SC)
+        posture = self._wrist.find_posture(X_SC)
         if isinstance(posture, str):
             return posture
         return replace(view, posture=tuple(posture.tolist()))

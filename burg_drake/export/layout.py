@@ -19,9 +19,9 @@ class PlacedObject:
     """A placed instance of a scene.
 
     Attributes:
-        name: of the instance.
+        name: name of the instance.
         object: name of the object in the library.
-        entry: of the library.
+        entry: entry of the object in the library.
         X_WO: (4, 4) pose in the world.
         fixed: whether it is background, which does not move.
     """
@@ -38,11 +38,11 @@ class Layout:
     """A scene, and perhaps a station, in the world W.
 
     Attributes:
-        name: of the scene.
-        library: of its objects.
-        objects: free ones first, in the document's order.
+        name: name of the scene.
+        library: library of the scene's objects.
+        objects: placed objects, free ones first, in the document's order.
         boxes: table and obstacles by name; none without a station.
-        packages: where to look for packages that the objects' models name.
+        packages: packages that the objects' models may name.
     """
 
     name: str

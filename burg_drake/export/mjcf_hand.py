@@ -62,7 +62,7 @@ class CarrierJoint:
         name: name of the joint and of its position servo.
         axis: (3,) axis in the world at the carrier's start pose.
         speed: name of the velocity servo.
-        inertia: of the drive [kg].
+        inertia: inertia of the drive [kg].
         rate: rate of the critically damped servos [1/s]. As contact is solved before servos are
             made implicit, a held object is ahead of the hand while the hand accelerates, and
             creeps, faster at higher rates: at 50 by 2 mm/s in a usual lift.
@@ -183,7 +183,7 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
     open hand uses the pad itself, and poses that it calls free must be free here.
 
     Returns:
-        Their centers (N, 3) in the pad's frame P and radii (N,) [m].
+        Centers (N, 3) of the spheres in the pad's frame P and radii (N,) [m].
     """
     max_radius = 0.002  # Metres; spheres are smaller where the pad ends.
     min_radius = 1e-5  # Metres.
@@ -193,7 +193,7 @@ def pad_spheres(front: PadFront) -> tuple[Array, Array]:
         for n in (min(max(6, math.ceil(side / 0.0035 - 1e-9)), 12),)
     )
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    # Of a sphere that touches the plane z = 0 at (x, y), centered at -r: n (x, y, -r) + d <= -r.
+    # A sphere of radius r that touches z = 0 at (x, y) fits if n (x, y, -r) + d <= -r.
     planes = ConvexHull(front.corners).equations
     sides = planes[planes[:, 2] < 1 - 1e-6]
     room = -(grid @ sides[:, :2].T + sides[:, 3]) / (1 - sides[:, 2])
@@ -210,7 +210,7 @@ def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[fl
     constant impedance MuJoCo divides stiffness and damping by it.
 
     Args:
-        front: the pad's.
+        front: front of the pad.
         mobility: combined inverse mass of finger and object [1/kg].
         step: time step [s].
 

@@ -25,7 +25,7 @@ def add_object(world: Element, name: str, placed: PlacedObject, *, free: bool) -
 
     Args:
         world: element to add the body to.
-        name: of body and joint.
+        name: name of body and joint.
         placed: the object.
         free: whether it can move.
     """

@@ -51,8 +51,8 @@ def write_mjcf(
     """Writes `scene.xml` and the meshes and textures that it names.
 
     Args:
-        layout: what to write.
-        folder: empty.
+        layout: scene and station to write.
+        folder: empty folder.
         hand: hand to add above the scene.
 
     Returns:
@@ -60,7 +60,7 @@ def write_mjcf(
 
     Raises:
         UnknownNameError: a mesh is missing.
-        MeshError: it is damaged.
+        MeshError: the mesh is damaged.
         InvalidInputError: a file cannot be written.
     """
     names = model_names(layout)
@@ -139,7 +139,7 @@ def trial_mjcf(
     """The model of grasp trials as text; meshes are read from the library.
 
     Args:
-        layout: with table and boxes.
+        layout: objects, table and obstacles.
         hand: the hand; it starts at its pose in its diagram.
         step: time step [s].
         on_table: names of objects that stand on the ground plane in place of the table's box.

@@ -21,9 +21,9 @@ class VisualPart:
     """Triangles of one material, in the object frame O.
 
     Attributes:
-        vertices: (V, 3) [m].
-        normals: (V, 3) unit vectors.
-        faces: (F, 3) indices.
+        vertices: (V, 3) vertices [m].
+        normals: (V, 3) unit normals of the vertices.
+        faces: (F, 3) triangles.
         uv: (V, 2) texture coordinates, v up; None without a texture.
         rgba: colour and opacity in [0, 1]; white under a texture.
         image: texture (PIL image), or None.
@@ -42,7 +42,7 @@ def visual_parts(library: ObjectLibrary, entry: ObjectEntry) -> list[VisualPart]
 
     Raises:
         UnknownNameError: the mesh is missing.
-        MeshError: it is damaged.
+        MeshError: the mesh is damaged.
     """
     path = library.path(entry.mesh)
     try:

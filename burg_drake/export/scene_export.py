@@ -38,10 +38,10 @@ class SceneFormat:
         writer: MODULE:NAME, in this room, of a function of a layout and a folder that returns
             notes; imported when needed.
         main: file to open.
-        about: what it is, and for whom.
+        about: description of the format and the programs that read it.
         hydroelastic: whether it has Drake's contact properties.
         with_hand: whether the station's hand can be above the scene.
-        package: that it needs beside those of burg_drake, as pip and as Python know it.
+        package: names in pip and in Python of a package that only this format needs.
     """
 
     writer: str

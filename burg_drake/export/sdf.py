@@ -43,11 +43,11 @@ def write_sdf(layout: Layout, folder: Path) -> tuple[str, ...]:
     """Writes `world.sdf` and the meshes that it names by relative paths.
 
     Args:
-        layout: what to write.
-        folder: empty.
+        layout: scene and station to write.
+        folder: empty folder.
 
     Returns:
-        What became other than it is in the scene, one sentence each.
+        Differences from the scene, one sentence each.
 
     Raises:
         InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written
@@ -90,11 +90,11 @@ def write_directives(layout: Layout, folder: Path) -> tuple[str, ...]:
     """Writes `scene.dmd.yaml`, a `package.xml`, and the models that the directives add.
 
     Args:
-        layout: what to write.
-        folder: empty.
+        layout: scene and station to write.
+        folder: empty folder.
 
     Returns:
-        What became other than it is in the scene, one sentence each.
+        Differences from the scene, one sentence each.
 
     Raises:
         InvalidInputError, UnknownNameError: see `object_sdf_model`; or a place cannot be written
@@ -174,11 +174,11 @@ def object_sdf_model(
     """Makes the self-contained model of an object.
 
     Args:
-        library: has the object.
-        name: of the object.
-        entry: of the object.
+        library: library of the object.
+        name: name of the object.
+        entry: library entry of the object.
         folder: folder for copies of its meshes.
-        packages: where to look for packages that the model names.
+        packages: packages that the model may name.
 
     Returns:
         The element `model`, whose URIs are relative to `folder`.
@@ -267,7 +267,7 @@ def box_sdf_model(name: str, box: FixedBox) -> Element:
     """The element `model` of a box, the same as `station.surroundings` adds in Drake.
 
     Args:
-        name: of the model.
+        name: name of the model.
         box: the box; its pose is not used, as the caller places the model.
     """
     model = Element("model", {"name": name})
@@ -325,7 +325,7 @@ class MeshCopies:
             source: obj, gltf, or a file that names no other files.
 
         Returns:
-            The copy, relative to the folder.
+            Path of the copy, relative to the folder.
 
         Raises:
             InvalidInputError: the mesh names a file that is missing, or is not in its own folder.

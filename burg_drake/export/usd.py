@@ -26,15 +26,15 @@ def write_usd(layout: Layout, folder: Path) -> tuple[str, ...]:
     """Writes `scene.usda` and the files of objects that it refers to.
 
     Args:
-        layout: what to write.
-        folder: empty.
+        layout: scene and station to write.
+        folder: empty folder.
 
     Returns:
         Notes on differences from the scene, one sentence each.
 
     Raises:
         UnknownNameError: a mesh is missing.
-        MeshError: it is damaged.
+        MeshError: the mesh is damaged.
     """
     names = prim_names(layout)
     for name, entry in layout.entries.items():
@@ -89,12 +89,12 @@ def write_usd_object(library: ObjectLibrary, entry: ObjectEntry, file: Path) -> 
 
     Args:
         library: library with the object.
-        entry: of the object.
-        file: to write; textures lie beside it.
+        entry: library entry of the object.
+        file: file to write; textures are written beside it.
 
     Raises:
         UnknownNameError: a mesh is missing.
-        MeshError: it is damaged.
+        MeshError: the mesh is damaged.
     """
     stage = new_stage(file, "/Object")
     for i, part in enumerate(visual_parts(library, entry)):
@@ -206,7 +206,7 @@ def bind_color(path: str, prim: Usd.Prim, rgba: Rgba, texture: str = "") -> None
     """Gives a prim a colour or a texture.
 
     Args:
-        path: of the new material.
+        path: path of the new material.
         prim: prim to colour.
         rgba: sRGB colour, as in images and MTL files, and opacity.
         texture: image file relative to the stage's file; the primvar `st` has its coordinates.

@@ -106,12 +106,12 @@ def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
     if scale <= 0.0:
         raise InvalidInputError(f"{path}: object/scale is {scale:g}; it must be above 0")
     name = object_name(mesh)
-    described: dict[str, Any] = {"file": mesh, "scale": scale}
+    description: dict[str, Any] = {"file": mesh, "scale": scale}
     for key, shapes in ACRONYM_OBJECT_PROPERTIES.items():
         if f"object/{key}" in file:
             values = file.array(f"object/{key}").read(NUMBER_KINDS, *shapes).astype(float)
             if np.isfinite(values).all():
-                described[key] = values.tolist()
+                description[key] = values.tolist()
     if "gripper/type" in file:
         notes = check_gripper_name(
             _read_text(file, "gripper/type"), gripper, f"{path}: gripper/type"
@@ -128,7 +128,7 @@ def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
         width=width,
         score=score,
         columns=columns,
-        provenance=file_provenance(ACRONYM_FORMAT, path, object_files={name: described}),
+        provenance=file_provenance(ACRONYM_FORMAT, path, object_files={name: description}),
     )
     return ImportedGrasps(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
 
@@ -147,12 +147,12 @@ def _read_qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {}
     if QUALITIES not in file:
         return columns
-    for who in file.names(QUALITIES):
-        for name in file.names(f"{QUALITIES}/{who}"):
-            values = file.array(f"{QUALITIES}/{who}/{name}").read(NUMBER_KINDS, (n,))
-            plain = who in ("flex", "burg_drake") and name not in FIXED_COLUMNS
-            plain = plain or (who == "burg_drake" and name in ("score", "width"))
-            columns[name if plain else f"{who}.{name}"] = values.astype(float)
+    for simulator in file.names(QUALITIES):
+        for name in file.names(f"{QUALITIES}/{simulator}"):
+            values = file.array(f"{QUALITIES}/{simulator}/{name}").read(NUMBER_KINDS, (n,))
+            plain = simulator in ("flex", "burg_drake") and name not in FIXED_COLUMNS
+            plain = plain or (simulator == "burg_drake" and name in ("score", "width"))
+            columns[name if plain else f"{simulator}.{name}"] = values.astype(float)
     return columns
 
 
@@ -179,16 +179,16 @@ def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, 
     import h5py
 
     name = require_single_object(grasps, "an ACRONYM file")
-    described = shareable_description(grasps, name, path)
+    description = shareable_description(grasps, name, path)
     success = success_labels(grasps)
-    notes = _notes_on_losses(grasps, name, described, success)
+    notes = _notes_on_losses(grasps, name, description, success)
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
-        file["object/file"] = str(described.get("file", f"{name}.obj"))
-        file["object/scale"] = float(described.get("scale", 1.0))
+        file["object/file"] = str(description.get("file", f"{name}.obj"))
+        file["object/scale"] = float(description.get("scale", 1.0))
         for key in ACRONYM_OBJECT_PROPERTIES:
-            if key in described:
-                file[f"object/{key}"] = np.asarray(described[key], dtype=float)
+            if key in description:
+                file[f"object/{key}"] = np.asarray(description[key], dtype=float)
         foreign = {ours: theirs for theirs, ours in reversed(HAND_ALIASES.items())}
         file["gripper/type"] = foreign.get(gripper.name, gripper.name)
         file["gripper/configuration"] = np.array([gripper.opening[1] / 2.0])
@@ -210,20 +210,20 @@ def _quality_arrays(grasps: GraspSet, success: Array) -> dict[str, NDArray[Any]]
         result["burg_drake/width"] = grasps.width
     for name, values in grasps.columns.items():
         if name != GRASP_SUCCESS_COLUMN and values.dtype.kind in "fiub":
-            who, _, rest = name.partition(".")
+            simulator, _, rest = name.partition(".")
             simulated = re.fullmatch(
                 "object_motion_during_(closing|shaking)_(angular|linear)", name
             )
             own = f"{'flex' if simulated else 'burg_drake'}/{name}"
-            result[f"{who}/{rest}" if who and rest else own] = values
+            result[f"{simulator}/{rest}" if simulator and rest else own] = values
     return result
 
 
 def _notes_on_losses(
-    grasps: GraspSet, name: str, described: dict[str, Any], success: Array
+    grasps: GraspSet, name: str, description: dict[str, Any], success: Array
 ) -> tuple[str, ...]:
     notes = []
-    if "file" not in described:
+    if "file" not in description:
         notes.append(
             f"object/file is {name + '.obj'!r} and object/scale 1, as it is not known"
             f" which mesh {name!r} was made of."

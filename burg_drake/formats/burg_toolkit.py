@@ -104,7 +104,7 @@ class BurgReader(Reader):
             type: expected `yaml_file_type`.
             title: kind of file in words.
             other: the other `yaml_file_type` of BURG-Toolkit.
-            hint: what to do about files of that type.
+            hint: advice on files of that type.
 
         Raises:
             DocumentError: the file has another type or version.
@@ -145,11 +145,11 @@ def locate_file(given: str | None, folder: Path) -> Path | None:
 
 @dataclass(frozen=True, kw_only=True)
 class BurgStablePose:
-    """A resting pose as BURG-Toolkit recorded it.
+    """A stable pose as BURG-Toolkit recorded it.
 
     Attributes:
         probability: estimate of trimesh.
-        X_SO: object in a frame whose xy plane is the support.
+        X_SO: pose of the object in a frame whose xy plane is the support.
     """
 
     probability: float
@@ -161,13 +161,13 @@ class BurgObject:
     """An object type of BURG-Toolkit.
 
     Attributes:
-        identifier: unique in its library.
+        identifier: identifier, unique in the library.
         name: display name.
         mesh: the mesh file; it need not exist.
         scale: factor from the mesh file's unit to metres.
-        mass: [kg]; None for an object that BURG-Toolkit fixes in space (mass 0 or absent).
-        friction: coefficient; None where BURG-Toolkit uses its default of 0.24.
-        stable_poses: most probable first.
+        mass: mass [kg]; None for an object that BURG-Toolkit fixes in space (mass 0 or absent).
+        friction: friction coefficient; None where BURG-Toolkit uses its default of 0.24.
+        stable_poses: stable poses, most probable first.
         line: line on which the object begins in the document.
     """
 
@@ -188,8 +188,8 @@ class BurgLibrary:
     Attributes:
         path: the document.
         name: display name.
-        description: for people.
-        objects: in the document's order.
+        description: text for people.
+        objects: objects in the document's order.
         notes: parts of the document that were not understood and ignored, one sentence each.
     """
 
@@ -331,8 +331,8 @@ class BurgInstance:
 
     Attributes:
         object_type: identifier in the object library.
-        X_SO: pose of its scaled mesh in the scene.
-        line: line on which it begins in the document.
+        X_SO: pose of the object's scaled mesh in the scene.
+        line: line on which the instance begins in the document.
     """
 
     object_type: str
@@ -369,7 +369,7 @@ class BurgPrintout:
 
     Attributes:
         size: extents along x and y [m], from the ground area's origin.
-        marker_info: its markers.
+        marker_info: markers of the printout.
     """
 
     size: tuple[float, float]
@@ -455,8 +455,8 @@ def read_burg_scene(path: str | Path) -> BurgScene:
         line = reader.read_entries(node, "")["printout"][0].start_mark.line + 1
         notes.append(
             f"{path}:{line}: the board gets the size of the printout, "
-            f"{_size_from_millimetres(document.printout.size)}; the ground area of "
-            f"{_size_from_millimetres(ground_area)} was ignored"
+            f"{_size_in_millimetres(document.printout.size)}; the ground area of "
+            f"{_size_in_millimetres(ground_area)} was ignored"
         )
     placed: dict[str, list[BurgInstance]] = {"objects": [], "bg_objects": []}
     for key, instances in placed.items():
@@ -477,5 +477,5 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     )
 
 
-def _size_from_millimetres(size: tuple[float, float]) -> str:
+def _size_in_millimetres(size: tuple[float, float]) -> str:
     return f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm"

@@ -40,7 +40,7 @@ def read_grasp_file(
 
     Args:
         path: the file.
-        format: its format; None to recognise it by the content.
+        format: format of the file; None to recognise it by the content.
         gripper: the hand that the grasps were made for.
 
     Raises:

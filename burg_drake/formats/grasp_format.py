@@ -29,7 +29,7 @@ class GripperJoint:
     """A joint that moves a finger.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         closed: position with the pads at the smallest distance [m].
         open: position with the pads at the largest distance [m].
     """
@@ -131,12 +131,12 @@ class GraspFormat:
         source: definition of the format: repository and file, or paper.
         carries: data of a grasp that it has besides the pose.
         cannot_carry: data that are lost on writing.
-        X_GF: (4, 4) pose of its grasp frame F in our grasp frame G, for a gripper.
+        X_GF: (4, 4) pose of the format's grasp frame F in our grasp frame G, for a gripper.
         recognises: whether a file has this format, by its content; False for unreadable files.
         read: reads the grasps of a file made for a gripper.
         write: writes grasps of a gripper and returns notes on data that the file cannot carry.
         one_object: whether a file holds the grasps of only one object.
-        X_GF_each: (N, 4, 4) the same for each grasp of a set that was read, if they differ.
+        X_GF_each: (N, 4, 4) poses of F in G for each grasp of a set that was read, if they differ.
     """
 
     name: str
@@ -233,8 +233,8 @@ def axis_along(X_GF: Array, direction: tuple[float, float, float]) -> str:
     """The axis of F that is nearest to a direction in G.
 
     Args:
-        X_GF: (4, 4).
-        direction: (3,) of unit length, in G.
+        X_GF: (4, 4) pose of F in G.
+        direction: (3,) unit vector in G.
 
     Returns:
         Axis such as `+z`, or `+z, 12 deg off`.
@@ -252,7 +252,7 @@ def origin_in_words(p_GF: Array, gripper: Gripper) -> str:
     """Describes the position of a point relative to G.
 
     Args:
-        p_GF: (3,) [m].
+        p_GF: (3,) position of the point [m].
         gripper: gripper whose landmarks, H and the finger tips, are named.
     """
     x, y, z = p_GF

@@ -92,18 +92,18 @@ def read_graspgen(path: Path, gripper: Gripper) -> ImportedGrasps:
     X_OF, rounded = nearest_rigid(given if given else np.empty((0, 4, 4)), where)
     score = _read_success(path, grasps, len(X_OF))
     notes, offset = _gripper_offset(path, document, gripper)
-    name, described, scaled = _read_object(path, document)
+    name, description, scale_notes = _read_object(path, document)
     if score is None:
         notes += (f"The file has no {GRASP_SUCCESS_COLUMN}, hence no scores.",)
     set_ = GraspSet.create(
         X_OF @ offset @ inverse(gripper.X_GB),
         object=name,
         score=score,
-        provenance=file_provenance(GRASPGEN_FORMAT, path, object_files={name: described}),
+        provenance=file_provenance(GRASPGEN_FORMAT, path, object_files={name: description}),
     )
     further = sorted(set(grasps) - {"transforms", GRASP_SUCCESS_COLUMN})
-    left = (f"Ignored: grasps.{', grasps.'.join(further)}.",) if further else ()
-    return ImportedGrasps(set_, "object", (*notes, *rounded, *scaled, *left))
+    ignored_notes = (f"Ignored: grasps.{', grasps.'.join(further)}.",) if further else ()
+    return ImportedGrasps(set_, "object", (*notes, *rounded, *scale_notes, *ignored_notes))
 
 
 def _require_mapping(path: Path, document: dict[str, Any], key: str) -> dict[str, Any]:
@@ -189,7 +189,7 @@ def write_graspgen(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str,
             file cannot be written.
     """
     name = require_single_object(grasps, "a GraspGen file")
-    described = shareable_description(grasps, name, path)
+    description = shareable_description(grasps, name, path)
     success = success_labels(grasps)
     unknown = int(np.isnan(success).sum())
     if 0 < unknown < len(grasps):
@@ -198,10 +198,10 @@ def write_graspgen(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str,
             " GraspGen needs that for all grasps or for none: select those for which it"
             " is known"
         )
-    file, scale = str(described.get("file", f"{name}.obj")), float(described.get("scale", 1.0))
+    file, scale = str(description.get("file", f"{name}.obj")), float(description.get("scale", 1.0))
     content: dict[str, Any] = {"transforms": (grasps.X_OG @ gripper.X_GB).tolist()}
     notes = []
-    if "file" not in described:
+    if "file" not in description:
         notes.append(
             f"object.file is {file!r} and object.scale 1, as it is not known which mesh "
             f"{name!r} was made of."

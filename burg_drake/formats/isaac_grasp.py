@@ -88,14 +88,14 @@ def read_isaac_grasp(format: GraspFormat, path: Path, gripper: Gripper) -> Impor
     for name, grasp in grasps.items():
         if not isinstance(grasp, dict):
             raise _value_error(path, f"grasps.{name}", grasp, "position and orientation")
-    object, described = _read_object(path, document)
+    object, description = _read_object(path, document)
     X_FG = inverse(format.X_GF(gripper))
     columns: dict[str, NDArray[Any]] = {"name": np.array(list(grasps), dtype=str)}
-    width, note = _widths_from_joints(path, grasps, CLOSED_JOINTS_KEY, gripper)
+    width, width_notes = _widths_from_joints(path, grasps, CLOSED_JOINTS_KEY, gripper)
     opening, _ = _widths_from_joints(path, grasps, OPEN_JOINTS_KEY, gripper)
     if not np.isnan(opening).all():
         columns[PREGRASP_WIDTH_COLUMN] = opening
-    further, left = _extra_columns(grasps)
+    extra_columns, ignored_notes = _extra_columns(grasps)
     notes: tuple[str, ...] = ()
     if not any(key in document for key in GRIPPER_FRAME_KEYS):
         axis = "xyz"[int(np.argmax(np.abs(X_FG[:3, 0])))]
@@ -104,17 +104,17 @@ def read_isaac_grasp(format: GraspFormat, path: Path, gripper: Gripper) -> Impor
         )
     if not any(document.get(key) for key in OBJECT_KEYS):
         notes += (f"The file names no object; the object is called {object!r}.",)
-    if "scale" in described:
-        notes += (scale_note(object, str(described["file"]), float(described["scale"])),)
+    if "scale" in description:
+        notes += (scale_note(object, str(description["file"]), float(description["scale"])),)
     set_ = GraspSet.create(
         _read_poses(path, grasps) @ X_FG,
         object=object,
         width=width,
         score=_read_confidences(path, grasps),
-        columns={**further, **columns},
-        provenance=file_provenance(format, path, object_files={object: described}),
+        columns={**extra_columns, **columns},
+        provenance=file_provenance(format, path, object_files={object: description}),
     )
-    return ImportedGrasps(set_, "object", (*notes, *note, *left))
+    return ImportedGrasps(set_, "object", (*notes, *width_notes, *ignored_notes))
 
 
 def _check_format_version(path: Path, document: Any) -> None:
@@ -143,13 +143,13 @@ def _check_gripper_link(path: Path, document: Mapping[str, Any], gripper: Grippe
 def _read_object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """The object's name, and its description in the file."""
     file = next((str(document[key]) for key in OBJECT_KEYS if document.get(key)), "")
-    described: dict[str, Any] = {"file": file} if "object_file" in document else {}
+    description: dict[str, Any] = {"file": file} if "object_file" in document else {}
     if "object_file" in document and "object_scale" in document:
         scale = _parse_numbers(path, {"object_scale": document["object_scale"]}, (), "")[0]
         if not scale > 0.0:
             raise DocumentError(f"{path}: object_scale: {scale:g} must be above 0")
-        described["scale"] = float(scale)
-    return object_name(file) or path.stem, described
+        description["scale"] = float(scale)
+    return object_name(file) or path.stem, description
 
 
 def _read_poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
@@ -198,20 +198,20 @@ def _widths_from_joints(
     path: Path, grasps: Mapping[str, Mapping[str, Any]], key: str, gripper: Gripper
 ) -> tuple[Array, tuple[str, ...]]:
     """(N,) distance between the pads, NaN for grasps without a joint of the hand, and notes."""
-    given = {joint.name: np.full(len(grasps), np.nan) for joint in gripper.joints}
+    positions = {joint.name: np.full(len(grasps), np.nan) for joint in gripper.joints}
     unknown: set[str] = set()
     for i, (name, grasp) in enumerate(grasps.items()):
         joints = grasp.get(key, {})
         if not isinstance(joints, dict):
             raise _value_error(path, f"grasps.{name}.{key}", joints, "positions by joint")
         for joint, text in joints.items():
-            if joint in given:
-                given[joint][i] = _parse_number(path, f"grasps.{name}.{key}.{joint}", text)
+            if joint in positions:
+                positions[joint][i] = _parse_number(path, f"grasps.{name}.{key}.{joint}", text)
             else:
                 unknown.add(joint)
     with np.errstate(all="ignore"):
-        of_joints = [gripper.width({joint: q}) for joint, q in given.items()]
-        stacked = np.stack(of_joints) if of_joints else np.empty((0, len(grasps)))
+        joint_widths = [gripper.width({joint: q}) for joint, q in positions.items()]
+        stacked = np.stack(joint_widths) if joint_widths else np.empty((0, len(grasps)))
         count = (~np.isnan(stacked)).sum(axis=0)
         widths = np.where(count > 0, np.nansum(stacked, axis=0) / count, np.nan)
     note = f"{key}: joints that hand {gripper.name!r} does not have were ignored"
@@ -226,17 +226,17 @@ def _extra_columns(
     reserved_columns = (*FIXED_COLUMNS, "name", PREGRASP_WIDTH_COLUMN)
     keys = dict.fromkeys(key for g in grasps.values() for key in g if key not in interpreted)
     columns: dict[str, NDArray[Any]] = {}
-    left = []
+    ignored = []
     for key in keys:
         values = [g.get(key, "") for g in grasps.values()]
         if key in reserved_columns or not all(isinstance(value, str) for value in values):
-            left.append(key)
+            ignored.append(key)
             continue
         try:
             columns[key] = np.array([float(v) if v else np.nan for v in values])
         except ValueError:
             columns[key] = np.array(values, dtype=str)
-    return columns, (f"Ignored: {list_names(left)} of each grasp.",) if left else ()
+    return columns, (f"Ignored: {list_names(ignored)} of each grasp.",) if ignored else ()
 
 
 def _parse_numbers(
@@ -285,8 +285,8 @@ def write_isaac_grasp(
     """Writes the grasps of one object; returns notes on data that the file cannot carry.
 
     Args:
-        format: of the file; GraspGen's has neither frames nor joints.
-        grasps: of one object.
+        format: format of the file; GraspGen's has neither frames nor joints.
+        grasps: grasps of one object.
         path: the file.
         gripper: the hand of the grasps.
 
@@ -332,8 +332,8 @@ def _notes_on_widths(width: Array, opening: Array, gripper: Gripper) -> tuple[st
     """A note if the hand cannot open or close to these widths."""
     low, high = gripper.opening
     tolerance = 1e-6  # metres, for widths in single precision
-    off = [(w < low - tolerance) | (w > high + tolerance) for w in (width, opening)]
-    count = int((off[0] | off[1]).sum())
+    outside = [(w < low - tolerance) | (w > high + tolerance) for w in (width, opening)]
+    count = int((outside[0] | outside[1]).sum())
     limits = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
     return (f"widths of {count} grasps are outside {limits}",) if count else ()
 

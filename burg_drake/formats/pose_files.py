@@ -57,19 +57,22 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     _reject_poses(last > note_threshold, where, "has a last row that is not 0 0 0 1")
     R = poses[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size
-        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        deviation = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
         mirrored = np.linalg.det(R) < 0.0
-    off = np.where(np.isnan(off), np.inf, off)
+    deviation = np.where(np.isnan(deviation), np.inf, deviation)
     _reject_poses(mirrored, where, "is a reflection, not a rotation")
     _reject_poses(
-        off > max_rounding, where, "is not a rotation: it is off from orthonormal by", off
+        deviation > max_rounding,
+        where,
+        "is not a rotation: it is off from orthonormal by",
+        deviation,
     )
     U, _, Vt = np.linalg.svd(R)
     notes: tuple[str, ...] = ()
-    if (off > note_threshold).any():
+    if (deviation > note_threshold).any():
         notes = (
-            f"{where}: {int((off > note_threshold).sum())} rotations were off from orthonormal by"
-            f" up to {off.max():.1g}; the nearest rotations were used",
+            f"{where}: {int((deviation > note_threshold).sum())} rotations were off from"
+            f" orthonormal by up to {deviation.max():.1g}; the nearest rotations were used",
         )
     return make_pose(U @ Vt, poses[:, :3, 3]), notes
 

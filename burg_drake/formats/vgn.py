@@ -117,9 +117,9 @@ def _contact_widths(width: Array, label: NDArray[Any] | None) -> tuple[Array, tu
     """(N,) widths, NaN for failed grasps, and a note if there were some."""
     if label is None or label.dtype.kind != "f":
         return width, ()
-    left = ~np.isnan(width) & (label == 0.0)
-    note = f"the width of {int(left.sum())} failed grasps was ignored: it is the open hand's."
-    return np.where(left, np.nan, width), (note,) if left.any() else ()
+    failed = ~np.isnan(width) & (label == 0.0)
+    note = f"the width of {int(failed.sum())} failed grasps was ignored: it is the open hand's."
+    return np.where(failed, np.nan, width), (note,) if failed.any() else ()
 
 
 def _read_cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:

@@ -51,7 +51,7 @@ def settle_heap(
     Args:
         scene: objects above the board.
         station: station with table and obstacles.
-        check: scene check of that station.
+        check: scene check of the station.
         shapes: shapes of the library's objects.
         rng: random numbers for the positions of objects that are dropped again.
 
@@ -75,11 +75,8 @@ def settle_heap(
             ) from error
         if not faulty or drops == max_drops:
             break
-        scene, falling, margin = (
-            settler.raise_faulty_objects(scene, faulty, rng),
-            faulty,
-            BOARD_EDGE_MARGIN,
-        )
+        scene = settler.raise_faulty_objects(scene, faulty, rng)
+        falling, margin = faulty, BOARD_EDGE_MARGIN
     return SettledHeap(scene, tuple(sorted(faulty)), drops)
 
 
@@ -92,7 +89,7 @@ class _HeapSettler:
     shapes: ObjectShapes
 
     def settle(self, scene: Scene) -> tuple[Scene, Collection[str]]:
-        """The relaxed heap, and its faulty objects."""
+        """Relaxes the heap; also returns its faulty objects."""
         # Factors of friction while objects relax: at first, and when they creep.
         friction_shares = (0.25, 0.15, 0.1)
         faulty = self._misplaced_objects(scene)
@@ -132,7 +129,7 @@ class _HeapSettler:
         return Scene(document, scene.library, scene.path)
 
     def _relax(self, scene: Scene, slack: Mapping[str, float], moving: Collection[str]) -> Scene:
-        """The scene after its objects have come to rest with reduced friction."""
+        """Lets the objects come to rest with reduced friction."""
         built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING_ENGINE)
         reduce_friction_of(built, {built.free[name]: share for name, share in slack.items()})
         # The guard stops objects that slow down.
@@ -141,7 +138,7 @@ class _HeapSettler:
         return _restore_missing(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 
     def _misplaced_objects(self, scene: Scene) -> set[str]:
-        """Objects in places where a scene may have none."""
+        """Objects whose pose breaks a rule of the scene check."""
         return {issue.instance for issue in self.check.issues(scene) if issue.is_error}
 
 

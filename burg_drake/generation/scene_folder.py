@@ -128,11 +128,10 @@ class SceneFolder:
         remove_unfinished(self.path)
         recipe = self.path / "recipe.yaml"
         if recipe.exists():
-            there = load_document(recipe, SamplingProvenance)
-            found = there.differences(provenance)
-            if found:
+            differences = load_document(recipe, SamplingProvenance).differences(provenance)
+            if differences:
                 raise InvalidInputError(
-                    f"{self.path} already holds other scenes ({'; '.join(found)}); choose"
+                    f"{self.path} already holds other scenes ({'; '.join(differences)}); choose"
                     " another folder, or delete it"
                 ).about("folder")
         elif any(self.path.iterdir()):
@@ -291,7 +290,7 @@ def sample_scenes(
 def run_scene_task(
     provenance: SamplingProvenance, library: Path, station: Path, folder: Path, number: int
 ) -> SampledScene:
-    """Samples the scene of a number, in a worker.
+    """Samples a scene in a worker.
 
     Args:
         provenance: recipe, library, station and versions of all scenes.

@@ -81,7 +81,7 @@ def find_broken_rule(scene: Scene, station: Station, recipe: SceneRecipe) -> str
 
     Raises:
         BurgError: the arm collides in its home posture, for example; see
-            `evaluation.grasp_sets.clear_counts`.
+            `evaluation.clear_grasp_counts`.
     """
     if recipe.visible_from:
         seen = visible_from(scene, station, recipe.visible_from)
@@ -107,7 +107,7 @@ ISSUE_REASONS = {
 
 @dataclass(frozen=True)
 class SampledScene:
-    """Result of sampling the scene of a number.
+    """Result of sampling a scene.
 
     Attributes:
         scene: the accepted scene; or else the attempt with the most objects, without origin.
@@ -157,10 +157,10 @@ class SceneSampler:
         *,
         refused: Callable[[], None] | None = None,
     ) -> SampledScene:
-        """Samples the scene of a number.
+        """Samples a scene.
 
         Args:
-            number: number of the scene, from 0.
+            number: number of the scene, from 0; seeds all random choices.
             folder: folder of the scene's file.
             refused: called after each refused attempt.
 
@@ -196,7 +196,8 @@ class SceneSampler:
     def _draw_scene(
         self, number: int, attempt: int, folder: Path
     ) -> tuple[Scene, tuple[str, ...], int]:
-        """An attempt before settling, the names of missing objects, and the number of tries."""
+        """Draws the scene of an attempt, before settling; also returns the names of missing objects
+        and the number of tries."""
         recipe = self.recipe
         first = 1 if attempt <= attempts_with_same_objects(recipe) else attempt
         rng = rng_from("sampled scene", self._content, number, first)

@@ -1,6 +1,6 @@
 """Meshes to sim-ready objects: repair, mass properties, convex pieces, SDF, stable poses.
 
-Read `library` first, which has what is known of an object in the end. `mesh_loading`, `mass`,
+Read `library` first, which defines the entry of a finished object. `mesh_loading`, `mass`,
 `resting_poses`, `convex_decomposition` and `contact` compute it.
 """
 

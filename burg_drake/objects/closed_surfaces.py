@@ -27,8 +27,8 @@ def collapse_edges(
     """Yields ever coarser surfaces, made by edge collapses.
 
     Args:
-        vertices: (N, 3) [m].
-        faces: (F, 3) of a closed manifold.
+        vertices: (N, 3) vertices [m].
+        faces: (F, 3) triangles of a closed manifold.
         max_distance: largest root mean square distance of a vertex from the planes of the faces
             that were merged into it [m].
         min_faces: smallest number of faces.
@@ -218,7 +218,7 @@ def unite_bodies(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     bodies that touch without a common face stay as they are.
 
     Args:
-        surface: closed, wound outward, cavities inward.
+        surface: closed surface, wound outward, cavities inward.
 
     Returns:
         The surface, and a sentence if it changed.
@@ -270,7 +270,7 @@ def decimate(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh,
     """Reduces a surface to `max_faces` faces, or to as few as the largest tolerance allows.
 
     Args:
-        surface: closed, wound outward.
+        surface: closed surface, wound outward.
         max_faces: surfaces with no more faces than this stay as they are.
 
     Returns:
@@ -309,7 +309,7 @@ def coarser_surfaces(surface: trimesh.Trimesh, max_distance: float) -> list[trim
     """The surface and ever coarser versions of it, each made from the previous one.
 
     Args:
-        surface: closed, wound outward.
+        surface: closed surface, wound outward.
         max_distance: approximate mean distance of the coarsest version from the surface [m].
 
     Returns:

@@ -28,16 +28,16 @@ def run_coacd(
     """Runs CoACD in a child process.
 
     Args:
-        vertices: (N, 3) [m].
-        faces: (F, 3).
-        options: of `coacd.run_coacd`.
+        vertices: (N, 3) vertices [m].
+        faces: (F, 3) triangles.
+        options: options of `coacd.run_coacd`.
         timeout: CPU time allowed [s].
 
     Returns:
         The vertices (Ni, 3) of each part, and the child's CPU time [s].
 
     Raises:
-        DecompositionFailed: it crashed, failed, or took too long.
+        DecompositionFailed: CoACD crashed, failed, or took too long.
         KeyboardInterrupt: the child was interrupted, as the user interrupts all processes.
     """
     package = io.BytesIO()

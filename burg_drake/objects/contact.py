@@ -39,8 +39,8 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
     """The coarsest surface within `MAX_CONTACT_DISTANCE` and `MAX_TURNED_SHARE`.
 
     Args:
-        surface: of the object [m].
-        closed: whether it is watertight, wound outward.
+        surface: surface of the object [m].
+        closed: whether the surface is watertight, wound outward.
 
     Returns:
         The surface, closed and wound outward, and its fit.
@@ -74,7 +74,7 @@ class SurfaceNormals:
     """The normals of a surface, local and averaged over the neighbourhood.
 
     Args:
-        surface: [m].
+        surface: surface [m].
     """
 
     def __init__(self, surface: trimesh.Trimesh) -> None:
@@ -169,8 +169,8 @@ def contact_geometry(
     Args:
         kind: the kind that the user asked for. None: a primitive if one fits, else the surface if
             it is closed and can be decimated, else the pieces.
-        surface: of the object [m].
-        closed: whether it is watertight, so that its volume can be trusted.
+        surface: surface of the object [m].
+        closed: whether the surface is watertight, so that its volume can be trusted.
         pieces: the object's convex pieces; at least one for the kind `surface`.
         folder: the object's folder; the mesh of kinds `surface` and `mesh` is written into it.
 
@@ -210,7 +210,7 @@ def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
     """Message for an object whose pads touch pieces although these were not asked for, else empty.
 
     Args:
-        contact: of the object.
+        contact: contact geometry of the object.
         pieces: number of convex pieces.
     """
     if not contact.reason:

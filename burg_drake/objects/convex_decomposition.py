@@ -25,7 +25,7 @@ class ConvexPieces:
     """Convex pieces.
 
     Attributes:
-        meshes: at least one, with outward winding.
+        meshes: meshes of the pieces, at least one, with outward winding.
         seconds: CPU time spent in child processes [s].
     """
 
@@ -39,9 +39,9 @@ def convex_pieces(
     """Convex pieces of a surface.
 
     Args:
-        surface: in metres, wound outward.
+        surface: surface in metres, wound outward.
         closed: whether the surface is watertight, so that its volume can be trusted.
-        parameters: how finely to cut.
+        parameters: parameters of the decomposition.
 
     Raises:
         MeshError: nothing solid is left, or CoACD fails.

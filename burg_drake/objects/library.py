@@ -381,11 +381,11 @@ class ObjectLibrary:
         """The surface of an object, to sample on and measure.
 
         Args:
-            name: of the object.
+            name: name of the object.
 
         Returns:
-            Its mesh in the object frame O [m], without colours. Vertices that the file repeats for
-            different normals or texture coordinates are merged.
+            The object's mesh in the object frame O [m], without colours. Vertices that the file
+            repeats for different normals or texture coordinates are merged.
 
         Raises:
             UnknownNameError: no such object, or its mesh file is missing.
@@ -401,16 +401,15 @@ class ObjectLibrary:
 
         Raises:
             UnknownNameError: the file is missing.
-            MeshError: it is damaged.
+            MeshError: the file is damaged.
         """
         import trimesh
 
         path = self.path(relative)
         try:
             mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-            corners = np.asarray(mesh.vertices)[
-                mesh.faces
-            ]  # fails if faces refer to missing vertices
+            # Fails if faces refer to missing vertices.
+            corners = np.asarray(mesh.vertices)[mesh.faces]
         except Exception as error:  # the reader raises errors of any type
             raise self.damaged(path) from error
         if not len(corners) or not np.isfinite(corners).all():

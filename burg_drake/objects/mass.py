@@ -26,7 +26,7 @@ class Solid:
     """Volume, centroid and second moments of a solid.
 
     Attributes:
-        volume: [m^3].
+        volume: volume [m^3].
         p_OOcm: (3,) centroid in O [m].
         G_OOcm: (3, 3) inertia about the centroid in the axes of O, per unit of mass [m^2].
     """
@@ -40,7 +40,7 @@ def solid_of_surface(surface: trimesh.Trimesh) -> Solid:
     """Exact integrals over the polyhedron inside a closed surface, cavities left out.
 
     Args:
-        surface: watertight, wound outward.
+        surface: watertight surface, wound outward.
 
     Raises:
         InvalidInputError: the surface encloses no positive volume.
@@ -52,7 +52,7 @@ def solid_of_pieces(pieces: Sequence[trimesh.Trimesh]) -> Solid:
     """Sum of the integrals over convex pieces; overlaps count for each piece.
 
     Args:
-        pieces: convex, wound outward.
+        pieces: convex pieces, wound outward.
     """
     volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     origin = np.mean([m.bounds.mean(axis=0) for m in pieces], axis=0)
@@ -81,13 +81,13 @@ def mass_properties(
 
     Args:
         solid: geometry; that of the wall of a hollow body, see `solid_of_shell`.
-        mass: [kg]; has precedence over `density`.
-        density: of the material [kg/m^3]; `DEFAULT_DENSITY` if neither is given.
+        mass: mass [kg]; has precedence over `density`.
+        density: density of the material [kg/m^3]; `DEFAULT_DENSITY` if neither is given.
         center_of_mass: `p_OOcm` in place of the centroid [m]. Without `inertia`, the inertia of
             uniform density about the centroid is used about this centre: correct if a heavy part
             sits near it, otherwise an estimate.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2].
-        wall_thickness: of a hollow body [m]; only copied to the result.
+        wall_thickness: thickness of a hollow body's wall [m]; only copied to the result.
         bounds: (2, 3) corners of the bounding box in O [m]; a given centre of mass must be inside.
 
     Raises:
@@ -136,7 +136,7 @@ def implausible_properties(
     """Mass properties that are implausible for a household object of this size, a sentence each.
 
     Args:
-        properties: in the object frame O.
+        properties: mass properties in the object frame O.
         lower, upper: corners of the bounding box in O [m].
     """
     min_density = 10.0  # kg/m^3; expanded polystyrene has 10 to 50.
@@ -228,7 +228,7 @@ def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
 
     Args:
         surface: outer side [m]; closed, wound outward.
-        thickness: of the wall [m].
+        thickness: thickness of the wall [m].
 
     Raises:
         InvalidInputError: the wall is not above 0, or thicker than the body has room for.

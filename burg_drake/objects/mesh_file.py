@@ -48,7 +48,7 @@ def check_bytes(path: Path) -> None:
     """Refuses a file that is too large to be read.
 
     Raises:
-        MeshError: it has more than 512 MB.
+        MeshError: the file has more than 512 MB.
     """
     max_bytes = 2**29  # 512 MB.
     size = path.stat().st_size
@@ -70,11 +70,11 @@ def check_triangles(count: int, name: str, *, wall: bool = False) -> None:
     Raises:
         MeshError: there are more than `MAX_MESH_TRIANGLES`, or half as many for a wall.
     """
-    most = MAX_MESH_TRIANGLES // 2 if wall else MAX_MESH_TRIANGLES
-    if count > most:
+    max_count = MAX_MESH_TRIANGLES // 2 if wall else MAX_MESH_TRIANGLES
+    if count > max_count:
         what = "an open surface that becomes a wall" if wall else "a mesh"
         raise MeshError(
-            f"{name}: {count:,} triangles; {what} may have {most:,}: reduce the number of"
+            f"{name}: {count:,} triangles; {what} may have {max_count:,}: reduce the number of"
             " faces first (100,000 are enough for contact, mass and stable poses)"
         )
 
@@ -101,10 +101,10 @@ def check_textures(path: Path, companions: Sequence[Path]) -> None:
 
     Args:
         path: the mesh file.
-        companions: files that it refers to.
+        companions: files that the mesh file refers to.
 
     Raises:
-        MeshError: one has more than `MAX_TEXTURE_PIXELS`.
+        MeshError: a texture has more than `MAX_TEXTURE_PIXELS`.
     """
     for file in companions:
         if file.suffix.lower() in IMAGE_FORMATS:
@@ -263,11 +263,11 @@ def find_companion_files(path: Path) -> list[Path]:
     file or one of these files names.
 
     Args:
-        path: of the mesh.
+        path: path of the mesh.
 
     Raises:
-        MeshError: one of them is too large.
-        OSError: one of them cannot be read.
+        MeshError: a file is too large.
+        OSError: a file cannot be read.
     """
     referring_formats = (".obj", ".gltf", ".ply")  # Formats that refer to materials and textures.
     # Suffixes of materials, buffers and images.
@@ -294,7 +294,7 @@ def missing_textures(path: Path) -> list[str]:
     """A sentence for each missing image or material file of a mesh.
 
     Args:
-        path: of the mesh.
+        path: path of the mesh.
     """
     suffix = path.suffix.lower()
     found: list[tuple[Path, str]] = []

@@ -204,10 +204,10 @@ def _close_surface(
     surface, coarser = decimate(surface, preparation.max_faces * (1 if wall is None else 2))
     repaired.mesh = surface
     repaired.sentences += joined + coarser
-    twice = self_overlap(surface)
-    if twice > MAX_SELF_OVERLAP:
+    overlap_share = self_overlap(surface)
+    if overlap_share > MAX_SELF_OVERLAP:
         repaired.sentences.append(
-            f"the surface passes through itself: about {100.0 * twice:.2g} % of its"
+            f"the surface passes through itself: about {100.0 * overlap_share:.2g} % of its"
             " volume counts twice or is inside out, so mass properties may be that far"
             " off"
         )

@@ -277,7 +277,7 @@ def self_overlap(surface: trimesh.Trimesh, seed: int = 0) -> float:
     lengths of random lines, uniform in position and direction.
 
     Args:
-        surface: closed, wound outward.
+        surface: closed surface, wound outward.
         seed: seed of the random lines.
     """
     ray_count = 1000  # Random rays through the surface.
@@ -293,9 +293,8 @@ def self_overlap(surface: trimesh.Trimesh, seed: int = 0) -> float:
     density = np.bincount(ray, 1.0 / np.maximum(np.abs(entering), 1e-9), minlength=ray_count)
     order = np.lexsort([depth, ray])
     ray, depth, entering = ray[order], depth[order], np.sign(entering[order])
-    sound = (
-        np.bincount(ray, entering, minlength=ray_count)[ray] == 0.0
-    )  # otherwise the line met an edge
+    # A line that does not enter as often as it leaves has met an edge.
+    sound = np.bincount(ray, entering, minlength=ray_count)[ray] == 0.0
     ray, depth, entering = ray[sound], depth[sound], entering[sound]
     inside = np.cumsum(entering)[:-1]
     step = np.where(ray[1:] == ray[:-1], np.diff(depth) / density[ray[1:]], 0.0)

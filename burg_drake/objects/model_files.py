@@ -173,7 +173,7 @@ def model_sdf(
 
     Args:
         name: model name.
-        mass_properties: of the object, in O.
+        mass_properties: mass properties of the object, in O.
         friction: coefficient, static and dynamic.
         visual: path of the visual mesh relative to the SDF.
         pieces: paths of the convex pieces relative to the SDF.

@@ -97,7 +97,7 @@ def thicken_sheet(sheet: trimesh.Trimesh, thickness: float) -> trimesh.Trimesh |
 
     Args:
         sheet: open surface [m].
-        thickness: of the wall [m].
+        thickness: thickness of the wall [m].
 
     Returns:
         The wall, wound outward; None if the surface has only one side (a Moebius strip) or is so
@@ -168,7 +168,7 @@ def close_openings(
         result: changed in place, with a sentence on the change; stays open if neither way gives a
             sound solid.
         openings: a `wall` centred on the surface, or `close` for flat caps.
-        thickness: of the wall [m]; `default_wall` if None.
+        thickness: thickness of the wall [m]; `default_wall` if None.
 
     Returns:
         Thickness of the wall [m]; None if the surface did not become one.

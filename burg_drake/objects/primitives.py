@@ -24,7 +24,7 @@ def fit_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitive, F
     """Fits a primitive to a surface.
 
     Args:
-        surface: of the object [m].
+        surface: surface of the object [m].
         volume: volume inside the surface [m^3].
 
     Returns:
@@ -59,7 +59,7 @@ def nearest_primitive(surface: trimesh.Trimesh, volume: float) -> tuple[Primitiv
 
 
 def primitive_volume(primitive: Primitive) -> float:
-    """Volume [m^3]."""
+    """Volume of a primitive [m^3]."""
     if primitive.shape == "sphere":
         return float(4.0 / 3.0 * np.pi * primitive.size[0] ** 3)
     if primitive.shape == "cylinder":
@@ -140,11 +140,11 @@ def _even_directions(count: int) -> Array:
 def _enclosing_sphere(corners: Array, points: Array) -> Primitive:
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     for _ in range(MAX_STEPS):
-        apart = corners - center
-        radius = np.linalg.norm(apart, axis=1)
+        offsets = corners - center
+        radius = np.linalg.norm(offsets, axis=1)
         step = radius.max()
         # minimise r, with |p| - u . c <= r
-        rows = np.hstack([-apart / radius[:, None], -np.ones((len(corners), 1))])
+        rows = np.hstack([-offsets / radius[:, None], -np.ones((len(corners), 1))])
         moved = _solve_linear_program([0, 0, 0, 1], rows, -radius, [step] * 3)
         center = center + moved[:3]
         if np.linalg.norm(moved[:3]) < 1e-9:
@@ -254,7 +254,7 @@ def support_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
 
     Raises:
         UnknownNameError: a file of the library is missing.
-        MeshError: one is damaged.
+        MeshError: a file of the library is damaged.
     """
     if entry.contact.primitive is not None:
         return np.asarray(primitive_mesh(entry.contact.primitive).vertices)
@@ -266,7 +266,7 @@ def hull_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
 
     Raises:
         UnknownNameError: a file of the library is missing.
-        MeshError: one is damaged.
+        MeshError: a file of the library is damaged.
     """
     if entry.contact.primitive is not None:
         return np.asarray(primitive_mesh(entry.contact.primitive).vertices)

@@ -1,4 +1,4 @@
-"""Stable poses on a horizontal plane, and the stable pose that an orientation belongs to.
+"""Finds stable poses on a horizontal plane, and the stable pose that an orientation belongs to.
 
 Both follow from the height of the centre of mass over each facet of the convex hull.
 """
@@ -32,11 +32,11 @@ Index = NDArray[np.signedinteger]
 
 
 @dataclass(frozen=True, eq=False)
-class RestingFacet:
-    """A minimum of the landscape.
+class StableFacet:
+    """A hull facet on which an object rests stably: a minimum of its potential landscape.
 
     Attributes:
-        probability: share of random drops that end here.
+        probability: share of random drops that end on the facet.
         down: (3,) unit vector of O that points down.
         height: centre of mass above the support [m].
     """
@@ -46,8 +46,8 @@ class RestingFacet:
     height: float
 
     def rank(self) -> tuple[float, ...]:
-        """Sort key by probability. Among equally probable facets, such as mirror images, the one
-        that is lowest in the object's frame comes first, independent of the triangulation."""
+        """Sort key: probability, highest first; among equally probable facets, such as mirror
+        images, the lowest in the object's frame first, independent of the triangulation."""
         x, y, z = (float(v) for v in np.round(self.down, 4))
         return (-round(self.probability, 6), z, y, x)
 
@@ -59,8 +59,8 @@ class NeutralEquilibrium:
     Attributes:
         normals: (K, 3) normals of the facets that the object rolls over.
         arcs: (E, 2, 3) pairs of normals of facets that share an edge.
-        corners: (C, 3) hull vertices about the centre of mass [m] all of whose facets are among
-            these.
+        corners: (C, 3) hull vertices about the centre of mass [m] that touch only facets that the
+            object rolls over.
         points: (V, 3) all hull vertices about the centre of mass [m].
     """
 
@@ -75,8 +75,8 @@ class NeutralEquilibrium:
         return float(np.arccos(np.clip(self.normals @ self.normals[0], -1.0, 1.0)).max())
 
     def angle(self, down: Array) -> float:
-        """Angle from direction `down` (3,) of O to the nearest of these directions [rad]; 0
-        inside."""
+        """Smallest angle from direction `down` (3,) of O to a direction that the object can roll
+        to [rad]; 0 if `down` is one."""
         lowest = self.points[(self.points @ down).argmax()]
         if len(self.corners) and (np.linalg.norm(self.corners - lowest, axis=1) < 1e-12).any():
             return 0.0
@@ -105,8 +105,8 @@ class PotentialLandscape:
         p_OOcm: (3,) centre of mass, inside the hull [m].
 
     Attributes:
-        points: (V, 3) of the hull, about the centre of mass [m].
-        normals: (F, 3) outward, of the hull's triangles.
+        points: (V, 3) vertices of the hull, about the centre of mass [m].
+        normals: (F, 3) outward normals of the hull's triangles.
         heights: (F,) heights of the centre of mass above the facets [m].
     """
 
@@ -125,8 +125,8 @@ class PotentialLandscape:
         """Heights (...) of the centre of mass if directions `down` (..., 3) of O point down [m]."""
         return (down @ self.points.T).max(axis=-1)
 
-    def minima(self, tilt_margin: float = TILT_MARGIN) -> list[RestingFacet]:
-        """Minima in which the object can rest, most probable first.
+    def minima(self, tilt_margin: float = TILT_MARGIN) -> list[StableFacet]:
+        """Finds the facets on which the object rests stably, most probable first.
 
         Args:
             tilt_margin: minima separated by a smaller tilt are merged [rad].
@@ -143,9 +143,9 @@ class PotentialLandscape:
         for lowest in np.unique(basin):
             probability = float(share[basin == lowest].sum())
             if probability > 0.0:
-                facet = RestingFacet(probability, self.normals[lowest], float(self.heights[lowest]))
+                facet = StableFacet(probability, self.normals[lowest], float(self.heights[lowest]))
                 found.append(facet)
-        return sorted(found, key=RestingFacet.rank)
+        return sorted(found, key=StableFacet.rank)
 
     def minimum_below(self, down: Array) -> Array:
         """(3,) direction of the minimum that `down` (3,) leads to."""
@@ -153,8 +153,8 @@ class PotentialLandscape:
         return self.normals[self._basins(TILT_MARGIN)[facet]]
 
     def neutral_equilibrium(self, down: Array, margin: float = ROLL_MARGIN) -> NeutralEquilibrium:
-        """Directions that the object can roll to from `down` (3,), with height changes smaller than
-        that of a tilt by `margin`."""
+        """Directions that the object can roll to from `down` (3,) while its height changes less
+        than in a tilt by `margin` [rad]."""
         start = int((self.normals @ down).argmax())
         rows, other, passes = self._edge_passes
         level = self.heights[start]
@@ -291,10 +291,10 @@ def _solid_angles(triangles: Array) -> Array:
 def stable_poses(
     surface: trimesh.Trimesh, support: Array, p_OOcm: Array, search: SymmetrySearch | None = None
 ) -> tuple[StablePose, ...]:
-    """Resting poses, most probable first.
+    """Finds the stable poses of an object, most probable first.
 
     Args:
-        surface: in O [m]; determines which poses are equal by symmetry.
+        surface: surface in O [m]; determines which poses are equal by symmetry.
         support: (N, 3) points of O whose hull rests on the plane [m].
         p_OOcm: (3,) centre of mass [m].
         search: symmetry search of the surface about `p_OOcm`, if available; made if None.
@@ -305,10 +305,10 @@ def stable_poses(
     min_probability = 0.01  # Rarer poses are left out; the others are scaled to a sum of 1.
     landscape = PotentialLandscape(support, p_OOcm)
     classes = _merge_symmetric_poses(landscape, search or SymmetrySearch(surface, p_OOcm))
-    most = max(c.probability for c in classes)
-    kept = [c for c in classes if c.probability >= min(min_probability, most)]
+    highest = max(c.probability for c in classes)
+    kept = [c for c in classes if c.probability >= min(min_probability, highest)]
     total = sum(c.probability for c in kept)
-    kept.sort(key=RestingFacet.rank)
+    kept.sort(key=StableFacet.rank)
     return tuple(
         StablePose(
             probability=round(c.probability / total, 6),
@@ -328,13 +328,13 @@ def resting_pose(down: Array, height: float, p_OOcm: Array) -> Array:
 
 def _merge_symmetric_poses(
     landscape: PotentialLandscape, search: SymmetrySearch
-) -> list[RestingFacet]:
+) -> list[StableFacet]:
     facets = landscape.minima()
     heights = np.sort([facet.height for facet in facets])
     if not (np.diff(heights) <= search.tolerance).any():
         return facets
     symmetries = search.find()
-    classes: list[list[RestingFacet]] = []
+    classes: list[list[StableFacet]] = []
     for facet in facets:
         alike = [
             c
@@ -347,17 +347,16 @@ def _merge_symmetric_poses(
         ]
         classes = [c for c in classes if not any(c is a for a in alike)]
         classes.append(
-            sorted([*(known for c in alike for known in c), facet], key=RestingFacet.rank)
+            sorted([*(known for c in alike for known in c), facet], key=StableFacet.rank)
         )
-    return [RestingFacet(sum(f.probability for f in c), c[0].down, c[0].height) for c in classes]
+    return [StableFacet(sum(f.probability for f in c), c[0].down, c[0].height) for c in classes]
 
 
 def is_symmetric_minimum(
     landscape: PotentialLandscape, symmetries: Symmetries, a: Array, b: Array
 ) -> bool:
-    """Whether a symmetry takes direction a (3,) to the minimum b (3,) of the landscape.
-
-    Several facets can belong to one minimum, of which b is one.
+    """Whether a symmetry takes direction a (3,) to the minimum of the landscape that b (3,) belongs
+    to. Several facets can belong to one minimum; b is the normal of one.
     """
     return any(
         float(landscape.minimum_below(image) @ b) > np.cos(TILT_MARGIN)
@@ -378,14 +377,14 @@ def _shortest_rotation(a: Array, b: Array) -> Array:
 class PoseClasses:
     """Classifies the orientation of an object that has come to rest as one of its stable poses.
 
-    An orientation belongs to a pose if it is near the pose, if it can roll there, or if it is in
-    the basin of the pose and not much higher; and likewise to a pose that is equal by symmetry to
-    one of these.
+    An orientation belongs to a pose if it is near the pose, if the object can roll from it to the
+    pose, if it is in the basin of the pose and not much higher, or if the pose is equal to such a
+    pose by symmetry.
 
     Args:
         poses: the stable poses.
         landscape: potential landscape of the object.
-        search: returns the search for symmetries of the surface about the centre of mass; called
+        search: makes the search for symmetries of the surface about the centre of mass; called
             only if needed.
 
     Attributes:
@@ -418,8 +417,7 @@ class PoseClasses:
         Returns:
             Number of the pose, and the angle from it up to symmetry [rad]; None if no pose matches.
         """
-        # Radians of tilt from a pose within which an orientation belongs to it.
-        near_angle = TILT_MARGIN
+        near_angle = TILT_MARGIN  # Radians; orientations closer to a pose belong to it.
         same_angle = np.deg2rad(0.5)  # Radians between directions that differ by rounding.
         angles = [self.angle(k, down) for k in range(len(self.poses))]
         k = int(np.argmin(angles))
@@ -433,8 +431,8 @@ class PoseClasses:
         for k in np.argsort([angle_between(known, lowest) for known in self.downs]).tolist():
             if angle_between(self.downs[k], lowest) < same_angle:
                 return k, angles[k]
-            near = abs(level - float(self.landscape.height(self.downs[k])))
-            if near > self._search.tolerance:
+            height_difference = abs(level - float(self.landscape.height(self.downs[k])))
+            if height_difference > self._search.tolerance:
                 continue
             if is_symmetric_minimum(self.landscape, self._search.find(), lowest, self.downs[k]):
                 return k, angle_between(lowest, down)

@@ -37,18 +37,22 @@ def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volu
     """Measures the fit of convex parts to a surface.
 
     Args:
-        surface: of the object [m].
-        parts: convex, closed, wound outward; they may touch and overlap.
-        volume: inside the surface [m^3].
+        surface: surface of the object [m].
+        parts: convex closed meshes, wound outward; they may touch and overlap.
+        volume: volume inside the surface [m^3].
 
     Raises:
         MeshError: a part is not closed.
     """
     union = union_mesh(parts)
-    there = _max_distance(_sample_points(surface)[0], union)
+    surface_to_union = _max_distance(_sample_points(surface)[0], union)
     points, normals = _sample_points(union)
-    back = _max_distance(points[_reachable_from_outside(points, normals, parts)], surface)
-    return Fit(volume_ratio=float(union.volume / volume), hausdorff=max(there, back))
+    union_to_surface = _max_distance(
+        points[_reachable_from_outside(points, normals, parts)], surface
+    )
+    return Fit(
+        volume_ratio=float(union.volume / volume), hausdorff=max(surface_to_union, union_to_surface)
+    )
 
 
 def relative_deviation(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
@@ -73,7 +77,7 @@ def deviation_warning(fit: Fit | None, diagonal: float, threshold: float | None)
 
     Args:
         fit: fit of the pieces, if known.
-        diagonal: of the object [m].
+        diagonal: diagonal of the object [m].
         threshold: concavity threshold of the decomposition; None for pieces that came with the
             object.
     """

@@ -69,7 +69,7 @@ def carrying_corners(
     Args:
         corners: (N, 3) corners of the hull in O [m].
         up: (3,) normal of the plane in O.
-        center_of_mass: (3,) of O [m].
+        center_of_mass: (3,) centre of mass in O [m].
         max_height: largest height of a carrying corner above the lowest one [m].
 
     Returns:

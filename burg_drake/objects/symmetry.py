@@ -27,7 +27,8 @@ class Symmetries:
     """Rotations about a point that take an object onto itself.
 
     Attributes:
-        rotations: (N, 3, 3) in O, the identity first; for a body of revolution one of each kind.
+        rotations: (N, 3, 3) rotations in O, the identity first; for a body of revolution one of
+            each kind.
         axis: (3,) unit vector; any rotation about it is a symmetry. None if there is no such axis.
         sphere: any rotation is a symmetry.
     """
@@ -69,7 +70,7 @@ class SymmetrySearch:
     """Finds the rotations that take a surface onto itself.
 
     Args:
-        surface: in O [m].
+        surface: surface in O [m].
         p_OC: (3,) fixed point of all rotations, such as the centre of mass [m].
         tolerance: largest deviation that counts as equal [m]; if None, 0.2 mm, or 0.5 % of the
             diagonal if that is less.
@@ -90,8 +91,8 @@ class SymmetrySearch:
         max_deviation_share = 0.005  # Over the object's diagonal; the smaller limit holds.
         self._triangles = np.asarray(surface.triangles) - p_OC
         self.diagonal = float(np.linalg.norm(np.ptp(self._triangles.reshape(-1, 3), axis=0)))
-        least = min(max_deviation, max_deviation_share * self.diagonal)
-        self.tolerance = least if tolerance is None else tolerance
+        default_tolerance = min(max_deviation, max_deviation_share * self.diagonal)
+        self.tolerance = default_tolerance if tolerance is None else tolerance
         self._covered = covered
         points, face = spread_samples(surface, SURFACE_POINTS)
         self._sample = points - p_OC
@@ -211,7 +212,7 @@ class SymmetrySearch:
                 return
 
     def _area_profile(self, down: Array) -> Array:
-        """(SECTORS, bins) area by azimuth, height and radius, about the direction `down`."""
+        """(FIRST_SEARCH_ANGLES, bins) area by azimuth, and by height and radius, about `down`."""
         p = self._sample @ rotation_from_down(down).T
         azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * FIRST_SEARCH_ANGLES
         radius = np.hypot(p[:, 0], p[:, 1]) / self.diagonal

@@ -47,7 +47,7 @@ def check_extent(extent: float, name: str, scale: float) -> None:
     Args:
         extent: largest extent, scaled [m].
         name: how messages call the mesh.
-        scale: that it was scaled by.
+        scale: factor that the mesh was scaled by.
 
     Raises:
         MeshError: the size tells of a wrong unit; it has those that would do.

@@ -49,10 +49,10 @@ class StageKeys:
     Attributes:
         file: SHA-256 of the mesh file's bytes; of the arrays for a mesh in memory.
         mesh: hash of the mesh and of all files that its file refers to.
-        visual: the visual mesh.
-        pieces: the surface, its convex pieces, and their fit.
-        rest: the contact geometry, the volume, the centre of mass, and the stable poses.
-        build: everything, `ObjectEntry.build`.
+        visual: hash of the inputs of the visual mesh.
+        pieces: hash of the inputs of the surface, its convex pieces, and their fit.
+        rest: hash of the inputs of contact geometry, volume, centre of mass and stable poses.
+        build: hash of all inputs, `ObjectEntry.build`.
     """
 
     file: str
@@ -68,7 +68,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     building.
 
     Args:
-        source: what to build.
+        source: object to build.
         confirm: whether stable poses are simulated.
 
     Raises:
@@ -133,14 +133,14 @@ class ObjectGeometry:
         surface: file of the surface if it differs from the visual mesh; else empty.
         closed: whether the surface is watertight.
         wall: thickness of the wall that an open surface became [m]; None for other surfaces.
-        lower, upper: bounds [m].
+        lower, upper: corners of the bounding box [m].
         volume, p_OOcm, G_OOcm: see `Solid`; the matrix by rows.
-        pieces: file names in the object's folder.
+        pieces: files of the convex pieces in the object's folder.
         threshold: threshold of the decomposition; None for pieces that came with the object.
         cut: note on steps of the decomposition that were not asked for; or empty.
         fit: fit of the pieces to the surface.
         contact: contact geometry; file names are relative to the object's folder.
-        stable_poses: most probable first.
+        stable_poses: stable poses, most probable first.
         notes: remarks on the poses.
     """
 

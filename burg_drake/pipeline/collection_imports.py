@@ -36,12 +36,12 @@ def burg_sources(
     """Makes object sources from an object library of BURG-Toolkit.
 
     Mesh, scale, mass and friction are copied. Objects without mass stay fixed. Convex pieces, URDF,
-    thumbnails and stable poses are not copied; `compare_poses` compares the listed stable poses
-    with the new ones.
+    thumbnails and stable poses are not copied; `compare_poses` compares the stable poses that
+    BURG-Toolkit recorded with the new ones.
 
     Args:
         library: from `read_burg_library`.
-        masses: by identifier or object name [kg]; they replace the document's.
+        masses: by identifier or object name [kg]; they replace the masses of BURG-Toolkit.
         density: for objects that have no mass, which are fixed otherwise [kg/m^3].
         friction: coefficient for objects without one.
         skip: identifiers or object names to leave out.
@@ -54,13 +54,13 @@ def burg_sources(
         InvalidInputError: two objects get the same name, or a number is impossible.
     """
     names = burg_names(library)
-    given = _by_identifier(masses or {}, names, "a mass")
-    left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "skip")
+    given_masses = _resolve_masses(masses or {}, names)
+    skipped = _find_identifiers(skip, names, "skip names")
     sources = []
     for item in library.objects:
-        if item.identifier in left_out:
+        if item.identifier in skipped:
             continue
-        mass = given.get(item.identifier, item.mass)
+        mass = given_masses.get(item.identifier, item.mass)
         source = ObjectSource(
             name=names[item.identifier],
             mesh=item.mesh,
@@ -116,7 +116,7 @@ def ycb_sources(
 
     Args:
         objects: from `find_ycb`.
-        masses: by YCB name or object name [kg]; they replace the published ones.
+        masses: by YCB name or object name [kg]; they replace the published masses.
         density: for objects without a mass [kg/m^3]; the pipeline's default if None.
         friction: coefficient of all objects.
 
@@ -129,17 +129,18 @@ def ycb_sources(
         InvalidInputError: a number is impossible.
     """
     objects = list(objects)
-    given = _by_identifier(masses or {}, {o.name: object_name(o.name) for o in objects}, "a mass")
+    names = {o.name: object_name(o.name) for o in objects}
+    given_masses = _resolve_masses(masses or {}, names)
     sources = []
     for item in objects:
-        mass = given.get(item.name, item.mass)
+        mass = given_masses.get(item.name, item.mass)
         source = ObjectSource(
-            name=object_name(item.name),
+            name=names[item.name],
             mesh=item.mesh,
             mass=mass,
             density=density if mass is None else None,
             friction=friction,
-            description=_ycb_description(item, item.name in given),
+            description=_ycb_description(item, item.name in given_masses),
         )
         check_source(source)
         sources.append(source)
@@ -151,27 +152,27 @@ class PoseComparison:
     """Agreement of recorded stable poses with those of a library.
 
     Attributes:
-        listed: number of recorded poses.
-        distinct: number of recorded poses without near-duplicates, up to the object's symmetry.
-        here: number of the library's poses.
-        unknown: indices of recorded poses that the library does not have.
+        n_recorded: number of recorded poses.
+        n_distinct: number of recorded poses without near-duplicates, up to the object's symmetry.
+        n_library: number of the library's poses.
+        unmatched: indices of recorded poses that the library does not have.
     """
 
-    listed: int
-    distinct: int
-    here: int
-    unknown: tuple[int, ...]
+    n_recorded: int
+    n_distinct: int
+    n_library: int
+    unmatched: tuple[int, ...]
 
     def sentence(self, file: str) -> str:
         """The comparison in words."""
-        listed = f"{file} lists {count_with_noun(self.listed, 'stable pose')}"
-        if self.distinct < self.listed:
-            listed += f" ({self.distinct} different)"
-        unknown = ""
-        if self.unknown:
-            was = "was" if len(self.unknown) == 1 else "were"
-            unknown = f"; {len(self.unknown)} of the listed {was} not found"
-        return f"{listed}, {count_with_noun(self.here, 'pose')} found here{unknown}"
+        sentence = f"{file} lists {count_with_noun(self.n_recorded, 'stable pose')}"
+        if self.n_distinct < self.n_recorded:
+            sentence += f" ({self.n_distinct} different)"
+        sentence += f", {count_with_noun(self.n_library, 'pose')} found here"
+        if self.unmatched:
+            was = "was" if len(self.unmatched) == 1 else "were"
+            sentence += f"; {len(self.unmatched)} of the listed {was} not found"
+        return sentence
 
 
 def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -> PoseComparison:
@@ -186,15 +187,17 @@ def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -
         name: name of the object in `library`.
     """
     entry = library.entry(name)
-    test = _PoseMatcher(library.surface(name), np.array(entry.mass_properties.center_of_mass))
-    listed = [_gravity_direction(X_SO) for X_SO in recorded]
-    here = [_gravity_direction(pose.X_SO) for pose in entry.stable_poses]
+    matcher = _PoseMatcher(library.surface(name), np.array(entry.mass_properties.center_of_mass))
+    recorded_downs = [_gravity_direction(X_SO) for X_SO in recorded]
+    library_downs = [_gravity_direction(pose.X_SO) for pose in entry.stable_poses]
     distinct: list[Array] = []
-    for down in listed:
-        if not test.is_among(down, distinct):
+    for down in recorded_downs:
+        if not matcher.is_among(down, distinct):
             distinct.append(down)
-    unknown = tuple(i for i, down in enumerate(listed) if not test.is_among(down, here))
-    return PoseComparison(len(listed), len(distinct), len(here), unknown)
+    unmatched = tuple(
+        i for i, down in enumerate(recorded_downs) if not matcher.is_among(down, library_downs)
+    )
+    return PoseComparison(len(recorded), len(distinct), len(library_downs), unmatched)
 
 
 def _gravity_direction(X_SO: Pose) -> Array:
@@ -225,18 +228,28 @@ class _PoseMatcher:
         return rise <= self.tolerance and self.symmetries.maps_close(a, b, max_angle)
 
 
-def _by_identifier(
-    values: Mapping[str, float], names: Mapping[str, str], what: str
-) -> dict[str, float]:
-    """The values by identifier, for keys that are identifiers or object names."""
+def _resolve_masses(masses: Mapping[str, float], names: Mapping[str, str]) -> dict[str, float]:
+    """The masses by identifier, for keys that are identifiers or object names."""
+    identifiers = _find_identifiers(masses, names, "a mass is given for")
+    return dict(zip(identifiers, masses.values(), strict=True))
+
+
+def _find_identifiers(keys: Collection[str], names: Mapping[str, str], use: str) -> list[str]:
+    """The identifier of each key, which is an identifier or an object name.
+
+    Args:
+        keys: identifiers and object names.
+        names: object names by identifier.
+        use: begins the error message of an unknown key.
+    """
     identifiers = {name: identifier for identifier, name in names.items()}
     identifiers |= {identifier: identifier for identifier in names}
-    for key in values:
+    for key in keys:
         if key not in identifiers:
             raise UnknownNameError(
-                f"{what} is given for unknown object {key!r}; {suggest_names(key, names.values())}"
+                f"{use} unknown object {key!r}; {suggest_names(key, names.values())}"
             )
-    return {identifiers[key]: value for key, value in values.items()}
+    return [identifiers[key] for key in keys]
 
 
 def _ycb_description(item: YcbObject, weighed: bool) -> str:
@@ -264,12 +277,12 @@ def import_burg_scene(
 ) -> ImportedScene:
     """Converts a scene of BURG-Toolkit to a scene document.
 
-    Objects are those that `burg_sources` makes of the scene's object library, by
-    `object_name(identifier)`. Objects without mass in the library become background, in whichever
-    list the scene has them. Instances have no names in BURG-Toolkit; they get the names of their
-    objects, the second instance of an object `NAME_2` and so on. Names that every station uses,
-    such as `table`, begin with `NAME_1`. The board is the scene's printout with its markers;
-    without one it has the size of the ground area and the markers of this project.
+    Objects are found in `library` by `object_name(identifier)`, the name that `burg_sources` gives
+    them. Objects without mass in `library` become background, even if the scene lists them as free.
+    Instances have no names in BURG-Toolkit; they get the names of their objects, the second
+    instance of an object `NAME_2` and so on. Names that every station uses, such as `table`, begin
+    with `NAME_1`. The board is the scene's printout with its markers; a scene without printout gets
+    a board of the size of the ground area with the markers of this project.
 
     Args:
         scene: from `read_burg_scene`.

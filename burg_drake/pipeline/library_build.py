@@ -121,9 +121,8 @@ def _lock_library(root: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            path.unlink(
-                missing_ok=True
-            )  # while it is locked, so that the next build makes a new one
+            # The file is still locked, so that the next build makes a new one.
+            path.unlink(missing_ok=True)
     finally:
         os.close(file)
 
@@ -133,8 +132,8 @@ class BuildTask:
     """An object to build.
 
     Attributes:
-        source: what to build.
-        keys: its stage keys.
+        source: object to build.
+        keys: stage keys of the source.
         root: the library's folder.
         folder: folder to build in; made when the work begins.
         confirm: simulate the stable poses.
@@ -147,25 +146,25 @@ class BuildTask:
     confirm: bool
 
 
-def check_task_size(item: BuildTask) -> None:
+def check_task_size(task: BuildTask) -> None:
     """Refuses an object that is too small or too large for a table.
 
     Raises:
         MeshError: the file cannot be read, or its size tells of a wrong unit.
     """
-    check_size(item.source.mesh, item.source.scale)
+    check_size(task.source.mesh, task.source.scale)
 
 
-def run_build_task(item: BuildTask) -> BuiltObject:
+def run_build_task(task: BuildTask) -> BuiltObject:
     """Builds one object.
 
     Raises:
         SimulationError: Drake ended by a failed condition.
         Exception: any other error that a broken mesh causes.
     """
-    item.folder.mkdir()
+    task.folder.mkdir()
     try:
-        return build_object(item.source, item.keys, item.root, item.folder, item.confirm)
+        return build_object(task.source, task.keys, task.root, task.folder, task.confirm)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
         raise SimulationError(f"Drake failed: {error}") from error
 
@@ -180,7 +179,7 @@ error."""
 
 @dataclass(frozen=True)
 class BuildReport:
-    """What a build did.
+    """Result of a build.
 
     Attributes:
         library: the updated library, with the objects of earlier builds.
@@ -280,11 +279,11 @@ def _build_objects(
         ]
         try:
             # Sizes are checked first, to report a wrong unit before anything takes long.
-            for item, outcome in map_unordered(run_build_task, work, workers, check_task_size):
+            for task, outcome in map_unordered(run_build_task, work, workers, check_task_size):
                 if isinstance(outcome, BuiltObject):
-                    tally.publish(item.source, outcome, Path(scratch))
+                    tally.publish(task.source, outcome, Path(scratch))
                 else:
-                    tally.fail(item.source.name, outcome)
+                    tally.fail(task.source.name, outcome)
         finally:
             tally.save()
 

@@ -38,7 +38,7 @@ class LibraryIssue:
     """An error or warning about a library.
 
     Attributes:
-        object: name of the object; empty where it is about the library's folder.
+        object: name of the object; empty for an issue of the library's folder.
         kind: `missing` or `changed` files, `stale` against its source or this release, `broken`
             for Drake: errors. `implausible` values, `unsure` ones that were assumed: warnings.
         message: one clear line.

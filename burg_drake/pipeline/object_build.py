@@ -78,8 +78,8 @@ def build_geometry(
     """Builds everything but the final SDF.
 
     Args:
-        source: what to build.
-        keys: its stage keys.
+        source: object to build.
+        keys: stage keys of the source.
         home: the object's folder in the library; unchanged pieces in it are reused.
         folder: folder to write to, with the object's name.
         confirm: simulate the stable poses.
@@ -262,8 +262,8 @@ def build_object(
     """Builds an object, or the stages of it that have changed.
 
     Args:
-        source: what to build.
-        keys: its stage keys.
+        source: object to build.
+        keys: stage keys of the source.
         root: the library's folder; unchanged files in the object's folder are reused.
         scratch: empty folder to build in, with the object's name.
         confirm: simulate the stable poses.

@@ -33,24 +33,25 @@ class ObjectSource:
         burg.build_library([mug, crate], "my_library")
 
     Attributes:
-        name: of the library entry: lower-case letters, digits and underscores.
+        name: name of the library entry: lower-case letters, digits and underscores.
         mesh: mesh file, or a mesh in memory.
-        mass: [kg]; computed from the density if None.
-        density: of the material [kg/m^3]; `DEFAULT_DENSITY` if None.
+        mass: mass [kg]; computed from the density if None.
+        density: density of the material [kg/m^3]; `DEFAULT_DENSITY` if None.
         fixed: the object has no mass and can only be background of a scene, such as furniture.
-        center_of_mass: `p_OOcm` [m], in place of the centroid.
+        center_of_mass: centre of mass `p_OOcm` [m], in place of the centroid.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
             place of the inertia of uniform density.
-        wall_thickness: [m]. A closed surface becomes a hollow body with all mass in its wall; an
-            open surface becomes a wall of this thickness (`Preparation` has the default).
+        wall_thickness: thickness of the wall [m]. A closed surface becomes a hollow body with all
+            mass in its wall; an open surface becomes a wall of this thickness (`Preparation` has
+            the default).
         openings: how to close an open surface: as a `wall`, or with flat caps (`close`).
-        friction: coefficient; `DEFAULT_FRICTION` if None.
+        friction: friction coefficient; `DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
         pieces: convex pieces, meshes in O [m] or mesh files in the mesh's own frame and unit; made
             by decomposition if None.
         contact: kind of contact geometry in simulation; chosen by the object's shape if None.
         rgba: colour, 0 to 1 each; by default that of the mesh file.
-        description: for people.
+        description: text for people.
         decomposition: parameters of the convex decomposition.
     """
 
@@ -108,7 +109,7 @@ def object_name(text: str) -> str:
 
 
 def piece_meshes(source: ObjectSource) -> tuple[trimesh.Trimesh, ...] | None:
-    """The convex pieces that come with an object, in O [m]; None if there are none.
+    """Reads the convex pieces that come with an object, in O [m]; None if there are none.
 
     Raises:
         MeshError: a file cannot be read.

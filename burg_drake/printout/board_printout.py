@@ -70,8 +70,8 @@ class Caption:
     """Text at the foot of every page.
 
     Attributes:
-        title: the scene's name.
-        board: its size and content.
+        title: name of the scene.
+        board: size of the board and content hash of the scene.
         facts: dictionary and positions of the markers, in small print.
         how: printing instructions.
     """
@@ -197,9 +197,8 @@ def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
     for k in range(steps):
         luma = luma_at(MAX_TINT_HEIGHT * (k + 0.5) / steps)
         r, g, b = tint_colors(FIXED_TINT_COLOR, luma).tolist()
-        end = min(
-            edges[k + 1] + 0.1e-3, edges[-1]
-        )  # overlaps the next band, against white hairlines
+        # Bands overlap, against white hairlines.
+        end = min(edges[k + 1] + 0.1e-3, edges[-1])
         corners = at(edges[k], 0.0), at(end, 0.0), at(end, 2.0e-3), at(edges[k], 2.0e-3)
         pen.area([np.array(corners)], (r, g, b))
     pen.text(*at(0.0, 2.8e-3), "height above the sheet", 6, turned=turned)
@@ -261,7 +260,7 @@ def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
     """Parts of the objects that no page shows, by page, except for objects beyond the board."""
     min_loss = 0.5e-3  # Metres; smaller losses are not reported.
     beyond = {arrow.name for arrow in sheet.arrows}
-    lost = []
+    losses = []
     for tile in tiling.tiles:
         for drawing in sheet.drawings:
             loops = [*drawing.outline, *drawing.raised]
@@ -272,13 +271,13 @@ def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
                 continue
             below = np.array(tile.lower) - points.min(axis=0)
             above = points.max(axis=0) - np.array(tile.upper)
-            most = float(max(below.max(), above.max()))
-            if most > min_loss:
-                lost.append(
-                    f"page {tile.number}: the outermost {1e3 * most:.1f} mm of {drawing.name!r} lie"
+            loss = float(max(below.max(), above.max()))
+            if loss > min_loss:
+                losses.append(
+                    f"page {tile.number}: the outermost {1e3 * loss:.1f} mm of {drawing.name!r} lie"
                     " in the margin of the page; larger pages have room"
                 )
-    return lost
+    return losses
 
 
 def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
@@ -291,7 +290,7 @@ def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
     upper = np.array([paper.width, paper.height]) - usual_margin
     corners = [c[:, :2] for c in sheet.layout.p_SQ]
     outlines = [loop for d in sheet.drawings for loop in (*d.outline, *d.raised)]
-    lost = []
+    losses = []
     for tile in tiling.tiles:
         shown = np.array([tile.lower, tile.upper]) + tile.p_PS
         cut = []
@@ -299,14 +298,14 @@ def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
             parts = [p for shape in shapes if len(p := _between_cuts(shape, tile))]
             if parts:
                 points = np.clip(np.concatenate(parts) + tile.p_PS, *shown)
-                most = max((lower - points).max(), (points - upper).max())
-                cut += [f"{1e3 * most:.1f} mm of {what}"] if most > 1e-4 else []
+                loss = max((lower - points).max(), (points - upper).max())
+                cut += [f"{1e3 * loss:.1f} mm of {what}"] if loss > 1e-4 else []
         if cut:
-            lost.append(
+            losses.append(
                 f"page {tile.number}: a printer with a margin of {1e3 * usual_margin:.1f} mm, as"
                 f" most laser printers have, cuts off {' and '.join(cut)}"
             )
-    return lost
+    return losses
 
 
 def markers_without_quiet_zone(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
@@ -568,10 +567,10 @@ def _make_caption(scene: Scene, settings: PrintSettings, pages: int, flap: float
     if not flap:
         join = "Join each page to those before it edge to edge, cross on cross."
     steps = f" 1 Check the rulers. 2 Cut along the lines that say CUT. 3 {join}"
-    told = settings.instructions or pages == 1
+    has_steps_elsewhere = settings.instructions or pages == 1
     return Caption(
         title=scene.name,
         board=f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm, content {scene.content[:8]}",
-        facts=f"{markers} {origin}{'' if told else steps}",
+        facts=f"{markers} {origin}{'' if has_steps_elsewhere else steps}",
         how=how,
     )

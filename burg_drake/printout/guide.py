@@ -315,7 +315,7 @@ def guide_steps(
 
     Args:
         sheet: the board.
-        tiling: its pages.
+        tiling: pages of the board.
         settings: print settings.
         losses: parts that the margins of printers cut off, a sentence each.
     """
@@ -398,7 +398,7 @@ class Guide:
     """The instructions.
 
     Attributes:
-        title: of the page.
+        title: title of the page.
         subtitle: one line.
         steps: steps in order.
     """
@@ -416,7 +416,7 @@ class StepPlace:
         number: number of the step, from 1.
         step: the step.
         page: number of the page, from 0.
-        left, top: its upper left corner, from the lower left corner of the page's text area [m].
+        left, top: upper left corner, from the lower left corner of the page's text area [m].
         width: width of its column [m].
     """
 

@@ -55,9 +55,9 @@ def tint_colors(hue: Rgb, luma: ArrayLike) -> Array:
     The hue is mixed with white to be brighter, and with black to be darker.
     """
     color, goal = np.asarray(hue), np.asarray(luma, dtype=float)[..., None]
-    own = color @ BT601_LUMA_WEIGHTS
-    lighter = 1.0 - (1.0 - color) * (1.0 - goal) / (1.0 - own)
-    tinted: Array = np.where(goal >= own, lighter, color * goal / own)
+    hue_luma = color @ BT601_LUMA_WEIGHTS
+    lighter = 1.0 - (1.0 - color) * (1.0 - goal) / (1.0 - hue_luma)
+    tinted: Array = np.where(goal >= hue_luma, lighter, color * goal / hue_luma)
     return tinted
 
 
@@ -132,7 +132,7 @@ def lowest_surface(grid: SheetGrid, p_SV: Array, faces: NDArray[np.int64]) -> Sh
 
     Args:
         grid: grid of the sheet; parts beside it are left out.
-        p_SV: (V, 3) vertices [m].
+        p_SV: (V, 3) vertices in the scene frame [m].
         faces: (F, 3) triangles of any winding.
     """
     uv = grid.pixels(p_SV)
@@ -221,9 +221,8 @@ def _row_spans(
         rise = b[:, 1] - a[:, 1]
         with np.errstate(divide="ignore", invalid="ignore"):
             share = (row - a[:, 1]) / rise
-        crossed = (share >= 0.0) & (
-            share <= 1.0
-        )  # never at a level edge, whose ends belong to other edges, too
+        # Never at a level edge, whose ends belong to other edges, too.
+        crossed = (share >= 0.0) & (share <= 1.0)
         u = a[:, 0] + np.where(crossed, share, 0.0) * (b[:, 0] - a[:, 0])
         left = np.where(crossed, np.minimum(left, u), left)
         right = np.where(crossed, np.maximum(right, u), right)
@@ -332,8 +331,8 @@ def mask_outlines(
     curves, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     grid = layer.grid
     offset = np.array([layer.column, layer.row])
-    least = min_area / grid.resolution**2
-    kept = [c for c in curves if cv2.contourArea(c) >= least]
+    min_pixels = min_area / grid.resolution**2
+    kept = [c for c in curves if cv2.contourArea(c) >= min_pixels]
     simple = [cv2.approxPolyDP(c, smoothing, True)[:, 0] for c in kept]
     return [grid.points(c + offset) for c in simple if len(c) > 2]
 
@@ -343,7 +342,7 @@ def cell_outlines(black: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     one would show white hairlines between them.
 
     Args:
-        black: (K, K) cells, rows from the top.
+        black: (K, K) mask of the black cells, rows from the top.
 
     Returns:
         Closed polygons (N, 2) of columns and rows of corners of cells, with black to the right as
@@ -392,9 +391,9 @@ class ObjectDrawing:
     """An object on the sheet.
 
     Attributes:
-        name: of the instance.
+        name: name of the instance.
         words: text beside it.
-        layer: its height map.
+        layer: height map of the instance.
         bands: colours and the areas that they fill, from high to low, each over the previous ones.
         outline: outlines of the object, drawn in `outline_color`.
         footprint: outlines of the area that touches the sheet, drawn in `footprint_color`.
@@ -423,7 +422,7 @@ class OutOfBoundsArrow:
     """An arrow to an object that reaches beyond the board.
 
     Attributes:
-        name: of the instance.
+        name: name of the instance.
         words: text beside it.
         start, tip: ends of the arrow on the board [m].
     """

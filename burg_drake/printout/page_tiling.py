@@ -121,11 +121,11 @@ def page_orientations(
         )
         for w, h in ((short, long), (long, short))
     ]
-    white = 2 * margin - 0.01  # the minimum sizes assume margins of 5 mm
+    excess_margin = 2 * margin - 0.01  # the minimum sizes assume margins of 5 mm
     fits = [
         p
         for p in pages
-        if p.width - white >= MIN_PAGE_WIDTH and p.height - white >= MIN_PAGE_HEIGHT
+        if p.width - excess_margin >= MIN_PAGE_WIDTH and p.height - excess_margin >= MIN_PAGE_HEIGHT
     ]
     if not fits:
         raise InvalidInputError(
@@ -228,7 +228,7 @@ def tile_board(
 
     Args:
         size: extents of the board [m].
-        layout: its markers, which are never cut.
+        layout: markers of the board, which are never cut.
         needed: lower and upper corner of the area that has to be on paper, with the markers [m].
         papers: paper orientations to choose from.
 

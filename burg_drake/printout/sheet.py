@@ -74,10 +74,10 @@ class Pen:
         """Fills areas, all as one shape.
 
         Args:
-            polygons: (N, 2) each [m].
+            polygons: corners (N, 2) of each polygon [m].
             color: colour of the area.
             holes: polygons inside others are holes; otherwise polygons in the opposite direction
-                are.
+                are holes.
         """
         if polygons:
             self.canvas.setFillColorRGB(*color)
@@ -111,12 +111,12 @@ class Pen:
         """Writes a line of text.
 
         Args:
-            x, y: start of its baseline [m]; its middle with `align` 0.5, its end with 1.
+            x, y: start of the baseline [m]; its middle with `align` 0.5, its end with 1.
             text: the line.
-            size: [points].
+            size: text size [points].
             font: one of a PDF's built-in fonts.
             color: colour of the text.
-            align: share of its length before x.
+            align: share of the line's length before x.
             turned: the text reads upwards.
         """
         canvas = self.canvas
@@ -186,7 +186,7 @@ def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
 
     Args:
         pen: draws in the scene frame.
-        tile: of the page.
+        tile: part of the board on the page.
         size: extents of the board [m].
     """
     label = "edge of the board"  # Text along the edge.
@@ -220,7 +220,7 @@ def draw_origin(pen: Pen, tile: Tile, clear: float) -> bool:
 
     Args:
         pen: draws in the scene frame.
-        tile: of the page.
+        tile: part of the board on the page.
         clear: larger of the distances of the markers from the corner along x and y [m].
 
     Returns:
@@ -329,16 +329,16 @@ class FreeSpace:
         if rows > taken.shape[0] or columns > taken.shape[1]:
             return None
         sums = cv2.integral(blocked.astype(np.uint8))
-        inside = sums[rows:, columns:] - sums[:-rows, columns:]
-        inside += sums[:-rows, :-columns] - sums[rows:, :-columns]
-        # Distance of the box's nearest cell, then of its middle.
-        away = cv2.distanceTransform((~beside).astype(np.uint8), cv2.DIST_L2, 5)
-        near = cv2.erode(away, np.ones((rows, columns), np.uint8), anchor=(0, 0))
-        near = near[: inside.shape[0], : inside.shape[1]]
+        blocked_count = sums[rows:, columns:] - sums[:-rows, columns:]
+        blocked_count += sums[:-rows, :-columns] - sums[rows:, :-columns]
+        # The distance of the box's nearest cell counts first, then that of its middle.
+        distance = cv2.distanceTransform((~beside).astype(np.uint8), cv2.DIST_L2, 5)
+        box_distance = cv2.erode(distance, np.ones((rows, columns), np.uint8), anchor=(0, 0))
+        box_distance = box_distance[: blocked_count.shape[0], : blocked_count.shape[1]]
         centre = np.argwhere(beside).mean(axis=0)
-        r, c = np.indices(inside.shape)
+        r, c = np.indices(blocked_count.shape)
         middle = np.hypot(r + rows / 2 - centre[0], c + columns / 2 - centre[1])
-        cost = np.where(inside == 0, near + 0.2 * middle, np.inf)
+        cost = np.where(blocked_count == 0, box_distance + 0.2 * middle, np.inf)
         row, column = np.unravel_index(np.argmin(cost), cost.shape)
         if not np.isfinite(cost[row, column]):
             return None
@@ -450,7 +450,7 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
             (arrow.words, OUT_OF_BOUNDS_COLOR, masks.get(arrow.name, space.cell_mask(arrow.start)))
         )
     names: list[ObjectName] = []
-    homeless: list[str] = []
+    unplaced: list[str] = []
     for words, color, beside in wanted:
         extent = (
             text_width(words, NAME_SIZE, BOLD_FONT) + 2 * NAME_CLEARANCE,
@@ -458,7 +458,7 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
         )
         corner = space.place(extent, beside)
         if corner is None:
-            homeless.append(repr(words))
+            unplaced.append(repr(words))
             continue
         # a line's letters reach a fifth of its height below the baseline
         shift = np.array([NAME_CLEARANCE, 0.22 * extent[1]])
@@ -471,13 +471,13 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
                 continue
             again = space.place(extent, part, page)
             if again is None:
-                homeless.append(f"{words!r} on page {tile.number}")
+                unplaced.append(f"{words!r} on page {tile.number}")
             else:
                 corners.append(again)
         for at in corners:
             x, y = (at + shift).tolist()
             names.append(ObjectName(words, (x, y), color))
-    return dataclasses.replace(sheet, names=tuple(names)), homeless
+    return dataclasses.replace(sheet, names=tuple(names)), unplaced
 
 
 def _space_for_names(sheet: Sheet, tiling: Tiling) -> FreeSpace:

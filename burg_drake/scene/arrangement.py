@@ -112,7 +112,7 @@ class Heap:
         occupied: the board and the objects on it.
         shapes: shapes of all objects to be added.
         """
-        layer_count = 3.0  # Layers of objects on the spot, if they were balls of their size.
+        layer_count = 3.0  # Layers of objects on the spot, if objects were balls of their size.
         self._size = occupied.size
         self._below = [*occupied.obstacles]
         for standing in occupied.standing:
@@ -124,7 +124,7 @@ class Heap:
         """Places an object above the spot, in a random orientation, as low as possible.
 
         Returns:
-            Its pose (4, 4) in S; None if it is within the board at none of the places.
+            Its pose (4, 4) in S; None if it reaches beyond the board at all places.
         """
         draw_count = 6  # Random places, of which the lowest is taken.
         wxyz = rng.normal(size=4)

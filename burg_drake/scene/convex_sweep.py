@@ -19,7 +19,7 @@ class ConvexShapes:
     """Convex shapes: each is the Minkowski sum of a point hull and an ellipsoid.
 
     Attributes:
-        points: (S, V, 3) [m]; shapes with fewer points repeat one.
+        points: (S, V, 3) points [m]; shapes with fewer points repeat one.
         spread: (S, 3, 3) matrices A [m]: the ellipsoid is A u for all vectors u up to length 1. 0
             for a polytope, r times identity for a ball or capsule, of rank two, a disc, for a
             cylinder.
@@ -189,7 +189,7 @@ class _Triangles:
     """Triangles above the plane perpendicular to the line.
 
     Args:
-        corners: (K, 3 corners, 3).
+        corners: (K, 3 corners, 3) corners.
     """
 
     def __init__(self, corners: Array) -> None:

@@ -23,8 +23,8 @@ class Outline:
     Attributes:
         corners: (N + M, 2) corners of the convex hull, and of a polygon around it with fewer
             corners [m].
-        count: N.
-        height: of its highest point [m].
+        count: number N of corners of the hull.
+        height: height of the object's highest point [m].
     """
 
     corners: Array
@@ -33,7 +33,7 @@ class Outline:
 
     @cached_property
     def hull(self) -> Footprint:
-        """Its convex hull."""
+        """Convex hull of the outline."""
         return Footprint(self.corners[: self.count])
 
     @cached_property
@@ -92,7 +92,7 @@ class ObjectShape:
 
     @cached_property
     def pieces(self) -> ConvexShapes:
-        """Convex shapes of its contact geometry."""
+        """Convex shapes of the object's contact geometry."""
         entry = self.library.entry(self.name)
         if entry.contact.primitive is not None:
             return _primitive_shape(entry.contact.primitive)
@@ -101,7 +101,7 @@ class ObjectShape:
 
     @cached_property
     def hull(self) -> ConvexShapes:
-        """Its convex hull."""
+        """Convex hull of the object."""
         return ConvexShapes.of([self.corners], [np.zeros((3, 3))])
 
 

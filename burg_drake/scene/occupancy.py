@@ -54,11 +54,11 @@ class StandingObject:
     """An object in a stable pose at a place on the board.
 
     Attributes:
-        shape: of the object.
+        shape: shape of the object.
         pose: number of its stable pose.
         yaw: rotation about the vertical through its centre of mass [rad].
-        offset: (2,) position of its centre of mass from the board's corner [m].
-        outline: its outline on the board.
+        offset: (2,) position of the centre of mass from the board's corner [m].
+        outline: outline of the object on the board.
     """
 
     shape: ObjectShape

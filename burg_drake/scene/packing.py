@@ -45,9 +45,8 @@ def pack_objects(
     for i, (shape, pose) in enumerate(objects):
         best, best_area = None, np.inf
         yaws = _aligned_yaws(shape.outline(pose).hull.corners, occupied.standing)
-        for yaw in (
-            yaws[:max_yaws] if occupied.standing else yaws[quarter_turns : quarter_turns + 1]
-        ):
+        first, count = (0, max_yaws) if occupied.standing else (quarter_turns, 1)
+        for yaw in yaws[first : first + count]:
             turned = place_in_stable_pose(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
             if place is not None and place_area < best_area - 1e-12:
@@ -98,11 +97,11 @@ def _best_place(
     low, high = -turned.footprint.low, occupied.size - turned.footprint.high
     if (low > high).any():
         return None, np.inf
-    there = [standing.footprint for standing in occupied.standing]
+    footprints = [standing.footprint for standing in occupied.standing]
     coarse = [standing.outline.coarse for standing in occupied.standing]
     points = (
         _touching_positions(turned.outline.coarse, coarse, low, high)
-        if there
+        if footprints
         else ((low + high) / 2.0)[None]
     )
     points = points[((points >= low) & (points <= high)).all(axis=1)]
@@ -110,7 +109,7 @@ def _best_place(
     if not len(points):
         return None, np.inf
     reaches = turned.footprint.support_values + points @ SUPPORT_DIRECTIONS.T
-    for footprint in there:
+    for footprint in footprints:
         reaches = np.maximum(reaches, footprint.support_values)
     areas = support_area(reaches)
     best = int(areas.argmin())
@@ -118,10 +117,10 @@ def _best_place(
 
 
 def _touching_positions(
-    footprint: Footprint, there: Sequence[Footprint], low: Array, high: Array
+    footprint: Footprint, others: Sequence[Footprint], low: Array, high: Array
 ) -> Array:
     """Places (N, 2) of a footprint's origin at which it touches one or two other footprints."""
-    around = [_grow_polygon(other.no_fit_polygon(footprint)) for other in there]
+    around = [_grow_polygon(other.no_fit_polygon(footprint)) for other in others]
     starts = np.concatenate(around)
     ends = np.concatenate([next_vertices(polygon) for polygon in around])
     frame = np.array([low, (high[0], low[1]), high, (low[0], high[1])])

@@ -98,7 +98,7 @@ def simplify_polygon(polygon: Array, max_excess: float) -> Array:
     their neighbours extended until they meet.
 
     Args:
-        polygon: (N, 2).
+        polygon: (N, 2) corners.
         max_excess: largest distance by which it may reach beyond a removed side [m].
     """
     while len(polygon) > 3:
@@ -156,7 +156,7 @@ class Footprint:
     """A convex polygon. Derived properties are computed on first use.
 
     Attributes:
-        corners: (N, 2) counter-clockwise [m].
+        corners: (N, 2) corners, counter-clockwise [m].
     """
 
     corners: Array

@@ -1,7 +1,7 @@
 """The scene document: printed board with markers, instances, and how the scene was sampled.
 
-A scene lists objects of a library with their poses on the board. The recipe holds all that
-decides, with the number of a scene, about a sampled scene.
+A scene lists objects of a library with their poses on the board. A recipe and
+a number determine a sampled scene.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ class MarkerLayout:
     """The markers of a board, placed.
 
     Attributes:
-        dictionary: OpenCV's name of their dictionary, without `DICT_`.
-        ids: (N,) numbers in the dictionary, row by row from the upper left.
+        dictionary: name of the markers' dictionary in OpenCV, without `DICT_`.
+        ids: (N,) numbers of the markers in the dictionary, row by row from the upper left.
         p_SQ: (N, 4, 3) corners in the scene frame [m], clockwise from the marker's upper left, the
             order in which ArUco detectors return them.
         black: (N, K, K) cells that are black, border included, rows from the top.
@@ -206,8 +206,9 @@ gets; `heap`: in any orientation above a spot, to be dropped."""
 LAYOUT_NAMES: tuple[LayoutName, ...] = get_args(LayoutName)  # Names of the layouts.
 
 PoseChoice = Literal["probability", "uniform", "as_scanned"]
-"""Which of its stable poses an object gets: by their probabilities, each as often,
-or as its mesh stands, where that is stable, and else the most probable one."""
+"""How an object's stable pose is chosen. `probability`: by the probabilities of the poses;
+`uniform`: each as often; `as_scanned`: as the mesh stands if that is stable, or else the most
+probable one."""
 
 DEFAULT_TRIES = 100
 """Random places that are tried for an object."""
@@ -310,24 +311,24 @@ class SamplingProvenance:
     versions: dict[str, str] = field(default_factory=dict)
 
     def differences(self, other: SamplingProvenance) -> list[str]:
-        """Differences in words; `other` is "here", this is "there". Libraries and stations are
-        compared by content, not by path, and versions only of packages that matter."""
+        """Differences in words, in which `self` is "there" and `other` is "here". Libraries and
+        stations are compared by content, not by path; versions only of packages that matter."""
         # Packages whose versions change sampled scenes.
         packages = ("burg_drake", "drake", "numpy", "scipy")
         found = []
-        for name, mine in vars(self.recipe).items():
-            theirs = getattr(other.recipe, name)
-            if name not in ("library", "station") and mine != theirs:
-                there, here = _value_text(mine), _value_text(theirs)
-                found.append(f"{name.replace('_', ' ')} is {there} there, {here} here")
+        for name, there in vars(self.recipe).items():
+            here = getattr(other.recipe, name)
+            if name not in ("library", "station") and there != here:
+                texts = f"{_value_text(there)} there, {_value_text(here)} here"
+                found.append(f"{name.replace('_', ' ')} is {texts}")
         for name in ("library", "station"):
-            mine, theirs = (getattr(one, f"{name}_content") for one in (self, other))
-            if mine != theirs:
-                found.append(f"the {name} has content {mine} there, {theirs} here")
+            there, here = (getattr(one, f"{name}_content") for one in (self, other))
+            if there != here:
+                found.append(f"the {name} has content {there} there, {here} here")
         for name in packages:
-            mine, theirs = (one.versions.get(name, "unknown") for one in (self, other))
-            if mine != theirs:
-                found.append(f"{name} is {mine} there, {theirs} here")
+            there, here = (one.versions.get(name, "unknown") for one in (self, other))
+            if there != here:
+                found.append(f"{name} is {there} there, {here} here")
         return found
 
 

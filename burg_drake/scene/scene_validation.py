@@ -46,8 +46,8 @@ class SceneIssue:
             all other kinds are errors.
         amount: distance beyond, below or above something, or penetration depth [m].
         message: one clear line.
-        other: body that it overlaps or hovers above: another instance, the table, the board, or a
-            body of the station.
+        other: body that the instance overlaps or hovers above: another instance, the table, the
+            board, or a body of the station.
     """
 
     instance: str
@@ -67,8 +67,8 @@ class Extent:
     """Bounding box of a placed object, along the axes of the board.
 
     Attributes:
-        low, high: (3,) its corners in the scene frame [m].
-        support: height of the lowest point of its contact geometry, in the scene frame [m].
+        low, high: (3,) corners of the box in the scene frame [m].
+        support: height of the lowest contact point of the object in the scene frame [m].
     """
 
     low: Array
@@ -137,7 +137,7 @@ def placed_vertices(scene: Scene, instance: str) -> Array:
 
 def support_vertices(library: ObjectLibrary, name: str) -> Array:
     """(N, 3) points of an object's primitive, else its pieces, else its surface, in the object
-    frame [m]; it rests on a plane with these.
+    frame [m]; the object rests on a plane with these points.
 
     Raises:
         UnknownNameError: there is no such object, or one of its files is missing.
@@ -165,7 +165,7 @@ def read_library_vertices(library: ObjectLibrary, file: str) -> Array:
 
     Raises:
         UnknownNameError: the file is missing.
-        MeshError: it is damaged.
+        MeshError: the file is damaged.
     """
     path = library.path(file)
     try:

@@ -89,7 +89,7 @@ def test_values_for_objects_that_are_not_there() -> None:
         "a mass is given for unknown object 'tabel'; did you mean 'table'? Known: mug_10f6, table"
     )
     assert message_of(UnknownNameError, burg(MUG, TABLE), skip=["wall"]) == (
-        "skip is given for unknown object 'wall'; known: mug_10f6, table"
+        "skip names unknown object 'wall'; known: mug_10f6, table"
     )
     assert message_of(InvalidInputError, burg(TABLE), {"table": 0.0}) == (
         "table: mass is 0 kg; it must be above 0 (leave it out to use a density)"
@@ -177,8 +177,8 @@ def test_recorded_poses_of_a_brick(tmp_path: Path) -> None:
         down(Z), down(NEAR_Z, 1.0), down((0, 0, -1), 2.0, 7.0), down(X), down(CORNER),
     ]  # fmt: skip
     comparison = compare_poses(recorded, library, "a")
-    assert (comparison.listed, comparison.distinct, comparison.here) == (5, 3, 3)
-    assert comparison.unknown == (4,)
+    assert (comparison.n_recorded, comparison.n_distinct, comparison.n_library) == (5, 3, 3)
+    assert comparison.unmatched == (4,)
     assert comparison.sentence("object_library.yaml") == (
         "object_library.yaml lists 5 stable poses (3 different), 3 poses found here; 1 of the"
         " listed was not found"
@@ -191,7 +191,7 @@ def test_recorded_poses_of_a_can(tmp_path: Path) -> None:
     library = library_with(tmp_path, can, down(X), down(Z))
     sides = [down((np.cos(a), np.sin(a), 0.0)) for a in np.arange(0.0, 6.0, 0.7)]
     comparison = compare_poses([*sides, down((0, 0, -1))], library, "a")
-    assert (comparison.listed, comparison.distinct, comparison.unknown) == (10, 2, ())
+    assert (comparison.n_recorded, comparison.n_distinct, comparison.unmatched) == (10, 2, ())
     assert (
         comparison.sentence("l.yaml")
         == "l.yaml lists 10 stable poses (2 different), 2 poses found here"
