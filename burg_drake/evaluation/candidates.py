@@ -123,10 +123,11 @@ class Candidates:
     @property
     def counts(self) -> dict[str, int]:
         """Number of grasps of each instance that has some."""
-        begins = np.flatnonzero(np.append(True, self.instance[1:] != self.instance[:-1]))
+        changes = np.flatnonzero(self.instance[1:] != self.instance[:-1]) + 1
         counts: Counter[str] = Counter()
-        for begin, end in pairwise([*begins.tolist(), len(self)]):
-            counts[str(self.instance[begin])] += end - begin
+        for begin, end in pairwise([0, *changes.tolist(), len(self)]):
+            if begin < end:
+                counts[str(self.instance[begin])] += end - begin
         return counts
 
     def at(self, rows: Sequence[int] | NDArray[np.int64]) -> Sequence[Candidate]:

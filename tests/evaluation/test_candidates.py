@@ -120,6 +120,7 @@ def test_given_grasps_are_used_as_they_are(scene: Scene) -> None:
     assert given.instance.tolist() == ["right", "right"]  # the third is the first again
     np.testing.assert_array_equal(given.grasps.X_OG, X_OG[:2])
     assert given.counts == {"right": 2}
+    assert given_candidates(scene, {}).counts == {}
 
 
 def test_grasps_with_equal_hashes_are_not_taken_for_equal(
