@@ -22,7 +22,7 @@ import numpy as np
 from burg_drake.generation import SampledScene, SceneSampler, sample_scenes
 from burg_drake.objects import load_library
 from burg_drake.scene import LAYOUT_NAMES, Board, LayoutName, SceneRecipe
-from burg_drake.simulation import is_still, stillness
+from burg_drake.simulation import is_still, measure_drift
 from burg_drake.station import Station, load_station
 
 A2, A3 = Board(), Board(size=(0.42, 0.297))
@@ -88,7 +88,7 @@ def by_layout(scenes: int, still: int) -> None:
 
 def hold(found: Sequence[SampledScene], station: Station) -> None:
     """Simulates settled scenes for 5 s by the reference engine."""
-    moved = [stillness(one.scene, station) for one in found if one.accepted]
+    moved = [measure_drift(one.scene, station) for one in found if one.accepted]
     if moved:
         every = [displacement for scene in moved for displacement in scene.values()]
         print(

@@ -35,7 +35,7 @@ from burg_drake.scene import (
     choose_objects,
     save_scene,
 )
-from burg_drake.simulation import settled_scene as settling, stillness
+from burg_drake.simulation import measure_drift, settled_scene as settling
 from burg_drake.station import SceneCheck, Station, check_scene, load_station
 from tools.household import household_shapes
 from tools.household.curves import ellipse
@@ -79,7 +79,7 @@ def main() -> None:
             times.append(cpu)
             rested += rests
             if seed < arguments.drift:
-                moved = stillness(settled, station)
+                moved = measure_drift(settled, station)
                 drifts += [(1e3 * m.distance, np.rad2deg(m.angle)) for m in moved.values()]
                 worst = max(moved, key=lambda n: moved[n].angle)
                 print(f"  worst in 5 s: {np.max(drifts[-len(moved) :], axis=0).round(3)}, {worst}")

@@ -1,5 +1,8 @@
 """Scenes: their documents, checks, sampling, settling, printing and export."""
 
+import collections.abc
+import warnings
+
 from burg_drake.core import Pose as Pose
 from burg_drake.evaluation import (
     GraspCount as GraspCount,
@@ -39,6 +42,15 @@ from burg_drake.simulation import (
     Displacement as Displacement,
     SettledScene as SettledScene,
     is_still as is_still,
-    stillness as stillness,
+    measure_drift as measure_drift,
 )
 from burg_drake.station import SceneCheck as SceneCheck
+
+
+def __getattr__(name: str) -> collections.abc.Callable[..., object]:
+    """Earlier names, which go with 0.2."""
+    if name != "stillness":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    text = "scenes.stillness is scenes.measure_drift since 0.1"
+    warnings.warn(text, DeprecationWarning, stacklevel=2)
+    return measure_drift

@@ -56,7 +56,7 @@ from burg_drake.motion import (
 from burg_drake.objects import load_library
 from burg_drake.printout import height_map, print_board
 from burg_drake.scene import Scene, SceneLike, SceneRecipe, as_scene, load_scene, validate_scene
-from burg_drake.simulation import ArmTrial, HandTrial, settle_scene, stillness
+from burg_drake.simulation import ArmTrial, HandTrial, measure_drift, settle_scene
 from burg_drake.station import (
     SceneCheck,
     Station,
@@ -222,7 +222,7 @@ ANSWERS: dict[str, Answer] = {
     "SceneCheck": lambda scene, station, folder: checked(scene, station),
     "print_board": lambda scene, station, folder: print_board(scene).tiling,
     "height_map": lambda scene, station, folder: height_map(scene, 0.005).height.tobytes(),
-    "stillness": lambda scene, station, folder: stillness(scene, station, duration=0.01),
+    "measure_drift": lambda scene, station, folder: measure_drift(scene, station, duration=0.01),
     "FrameProcessor": lambda scene, station, folder: (
         FrameProcessor(scene, INTRINSICS).scene.content
     ),

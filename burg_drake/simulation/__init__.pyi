@@ -6,10 +6,10 @@ from .contacts import (
     RobotContactWatch as RobotContactWatch,
 )
 from .drift import (
-    StillnessLimits as StillnessLimits,
+    DriftLimits as DriftLimits,
     is_still as is_still,
+    measure_drift as measure_drift,
     predict_drift as predict_drift,
-    stillness as stillness,
 )
 from .grasp_trial import HandTrial as HandTrial
 from .grip_limits import (

@@ -39,7 +39,7 @@ from burg_drake.station import (
 )
 
 
-class StillnessLimits:
+class DriftLimits:
     """How far an object of a settled scene may move."""
 
     distance = 5e-4  # Metres.
@@ -47,11 +47,11 @@ class StillnessLimits:
     duration = 5.0  # Seconds that are simulated to measure it.
 
 
-def stillness(
+def measure_drift(
     scene: SceneLike,
     station: StationLike,
     *,
-    duration: float = StillnessLimits.duration,
+    duration: float = DriftLimits.duration,
     engine: Engine | str = ENGINES["reference"],
 ) -> Mapping[str, Displacement]:
     """Simulates a scene without the robot, and measures how far each object moves.
@@ -122,8 +122,8 @@ def is_still(displacements: Mapping[str, Displacement]) -> bool:
 
 
 def _has_stayed(moved: Displacement, share: float = 1.0) -> bool:
-    """Whether a displacement is below a share of `StillnessLimits`; False for NaN."""
-    limits = StillnessLimits
+    """Whether a displacement is below a share of `DriftLimits`; False for NaN."""
+    limits = DriftLimits
     return moved.distance < share * limits.distance and moved.angle < share * limits.angle
 
 
@@ -136,7 +136,7 @@ class DriftPrediction:
     """Predicted drift of a scene that is released.
 
     Attributes:
-        moving: mean speed of each free object that would exceed `StillnessLimits` within their
+        moving: mean speed of each free object that would exceed `DriftLimits` within their
             duration, by name.
         X_WO: (4, 4) poses in the world of the free objects that are still on the table, by name:
             final poses of doubtful objects, else those of the document.
@@ -151,10 +151,10 @@ class DriftPrediction:
     def relative_speed(self) -> float:
         """Speed of the fastest object relative to the limit of a settled scene."""
         shares = [
-            max(moved.speed / StillnessLimits.distance, moved.turning / StillnessLimits.angle)
+            max(moved.speed / DriftLimits.distance, moved.turning / DriftLimits.angle)
             for moved in self.moving.values()
         ]
-        return StillnessLimits.duration * max(shares, default=0.0)
+        return DriftLimits.duration * max(shares, default=0.0)
 
 
 def predict_drift(
@@ -221,7 +221,7 @@ class _DriftSimulation:
         self._simulator.AdvanceTo(start)
         before = {name: center_pose(body, context) for name, body in bodies.items()}
         self._simulator.AdvanceTo(end)
-        X_WO, left, shifts = free_poses(built, context), StillnessLimits.duration - end, {}
+        X_WO, left, shifts = free_poses(built, context), DriftLimits.duration - end, {}
         for name, body in bodies.items():
             speed = mean_speed(before[name], center_pose(body, context), end - start)
             now = displacement_from_document(built, name, X_WO[name])
@@ -240,5 +240,5 @@ class _DriftSimulation:
 
 
 def _mean_speed(shift: Displacement) -> BodySpeed:
-    time = StillnessLimits.duration
+    time = DriftLimits.duration
     return BodySpeed(shift.distance / time, shift.angle / time)

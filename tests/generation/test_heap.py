@@ -10,7 +10,7 @@ from burg_drake.core import Pose
 from burg_drake.generation import settle_heap
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import Board, Instance, ObjectShapes, Scene, SceneDocument
-from burg_drake.simulation import stillness
+from burg_drake.simulation import measure_drift
 from burg_drake.station import SceneCheck, Station
 
 BESIDE = -3.0
@@ -35,5 +35,5 @@ def test_what_falls_off_the_table_is_dropped_once_more(
     assert list(settled.scene.instances) == ["box", "can"]
     assert settled.scene.X_SO("can")[0, 3] > 0.0
     assert not [issue for issue in check.issues(settled.scene) if issue.is_error]
-    for moved in stillness(settled.scene, tabletop, duration=1.0).values():
+    for moved in measure_drift(settled.scene, tabletop, duration=1.0).values():
         assert moved.distance < 1e-4 and moved.angle < np.deg2rad(0.02)

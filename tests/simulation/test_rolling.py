@@ -22,9 +22,9 @@ from burg_drake.scene import Board, Instance, Scene, SceneDocument
 from burg_drake.simulation import (
     ROLLING_RESISTANCE,
     is_still,
+    measure_drift,
     resist_rolling,
     settle_scene,
-    stillness,
 )
 from burg_drake.station import Obstacle, build_station_diagram, load_station
 from tools.household.curves import ellipse
@@ -105,10 +105,10 @@ def test_a_marble_in_a_mug_comes_to_rest() -> None:
     x, y, z, _ = settled.scene.X_SO("marble") @ (0.0, 0.0, RADIUS, 1.0)
     assert z == pytest.approx(0.006 + RADIUS, abs=3e-4)
     assert math.hypot(x - 0.3, y - 0.2) < 0.0365 - RADIUS + 3e-4
-    assert is_still(stillness(settled.scene, make_station(), duration=0.3))
+    assert is_still(measure_drift(settled.scene, make_station(), duration=0.3))
 
 
-@pytest.mark.thorough  # `test_stillness` has what rocks until it rests
+@pytest.mark.thorough  # `test_drift` has what rocks until it rests
 def test_a_ring_over_a_peg_comes_to_rest(tmp_path: Path) -> None:
     """In long steps, the peg's foot of few faces starts to rock by itself, ever farther."""
     base = trimesh.creation.box((0.08, 0.08, 0.012))

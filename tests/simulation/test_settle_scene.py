@@ -15,8 +15,8 @@ from burg_drake.simulation import (
     SettledScene,
     drop_onto_scene,
     is_still,
+    measure_drift,
     settle_scene,
-    stillness,
 )
 from burg_drake.station import (
     ENGINES,
@@ -166,7 +166,7 @@ def test_what_sinks_in_on_tips_is_lifted_out_of_the_table(pose: int, tmp_path) -
     lowest = surface.min() + settled.scene.X_SO("airplane")[2, 3]
     assert lowest == pytest.approx(0.0, abs=6e-4)
     assert check_scene(settled.scene, make_station()) == ()
-    moved = stillness(settled.scene, make_station(), duration=1.0)
+    moved = measure_drift(settled.scene, make_station(), duration=1.0)
     assert is_still(moved), moved
 
 

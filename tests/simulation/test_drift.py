@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from trial_world import GRAVITY, make_station
 
+import burg_drake as burg
 from burg_drake.core import InvalidInputError, Pose
 from burg_drake.objects import load_library
 from burg_drake.scene import Instance, Scene, SceneDocument
 from burg_drake.simulation import (
     RELAXING_ENGINE,
-    StillnessLimits,
+    DriftLimits,
     is_still,
+    measure_drift,
     predict_drift,
     reduce_friction,
     settle_scene,
-    stillness,
 )
 from burg_drake.station import build_station_diagram, load_station
 
@@ -47,7 +48,7 @@ def test_a_settled_heap_is_still(heap: Scene) -> None:
     assert settled.at_rest
     assert settled.scene.X_SO("high")[2, 3] == pytest.approx(EDGE, abs=3e-4)
     assert settled.displacements["ball"].distance < 1e-3
-    moved = stillness(settled.scene, make_station(), duration=0.5)
+    moved = measure_drift(settled.scene, make_station(), duration=0.5)
     assert moved.keys() == heap.instances.keys()
     assert is_still(moved), moved
     again = settle_scene(heap, make_station())
@@ -56,12 +57,12 @@ def test_a_settled_heap_is_still(heap: Scene) -> None:
 
 def test_what_is_in_the_air_falls(make_scene) -> None:
     scene = make_scene(placed("block", "block", 0.3, 0.5))
-    moved = stillness(scene, make_station(), duration=0.1)
+    moved = measure_drift(scene, make_station(), duration=0.1)
     assert not is_still(moved)
     assert moved["block"].distance == pytest.approx(GRAVITY * 0.1**2 / 2, rel=0.02)
     assert moved["block"].angle == pytest.approx(0.0, abs=1e-6)
     low = make_scene(placed("block", "block", 0.3, 0.002))
-    assert stillness(low, make_station(), duration=0.5)["block"].distance > 1.9e-3
+    assert measure_drift(low, make_station(), duration=0.5)["block"].distance > 1.9e-3
 
 
 def test_what_will_not_stay_is_foretold(make_scene) -> None:
@@ -71,7 +72,7 @@ def test_what_will_not_stay_is_foretold(make_scene) -> None:
     built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING_ENGINE)
     moving = predict_drift(built).moving
     assert list(moving) == ["tilted"]
-    assert moving["tilted"].turning > StillnessLimits.angle / StillnessLimits.duration
+    assert moving["tilted"].turning > DriftLimits.angle / DriftLimits.duration
 
 
 def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
@@ -88,7 +89,7 @@ def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
     assert foretold.X_WO.keys() == scene.instances.keys()
     assert (foretold.X_WO["other"] == built.X_WO("other")).all()
     assert foretold.relative_speed == pytest.approx(
-        foretold.moving["one"].turning * 5.0 / StillnessLimits.angle
+        foretold.moving["one"].turning * 5.0 / DriftLimits.angle
     )
     assert predict_drift(built, among=["other"]).moving.keys() == {"other"}
 
@@ -103,7 +104,7 @@ def test_what_rocks_until_it_rests_is_no_creep() -> None:
     built = build_station_diagram(scene, station, robot="none", engine=RELAXING_ENGINE)
     assert predict_drift(built, once=True).moving  # as far as one can tell so soon
     assert not predict_drift(built).moving
-    assert is_still(stillness(scene, station, duration=1.0))
+    assert is_still(measure_drift(scene, station, duration=1.0))
 
 
 def test_friction_is_slackened(make_scene) -> None:
@@ -121,4 +122,9 @@ def test_friction_is_slackened(make_scene) -> None:
 def test_a_duration_that_is_none(heap: Scene) -> None:
     for duration in (0.0, np.nan):
         with pytest.raises(InvalidInputError, match="give more than 0"):
-            stillness(heap, make_station(), duration=duration)
+            measure_drift(heap, make_station(), duration=duration)
+
+
+def test_the_earlier_name_still_works() -> None:
+    with pytest.warns(DeprecationWarning, match="measure_drift since 0.1"):
+        assert burg.scenes.stillness is burg.scenes.measure_drift
