@@ -82,8 +82,8 @@ def test_the_help_has_units_and_defaults() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("-c 0", "'0' is not a whole number from 1 to 10000000"),
-        (f"--number {1 << 64}", f"'{1 << 64}' is not a whole number from 0 to {(1 << 64) - 1}"),
+        ("-c 0", "'0' is not a whole number from 1 to 10,000,000"),
+        (f"--number {1 << 64}", f"'{1 << 64}' is not a whole number from 0 to {(1 << 64) - 1:,}"),
         ("--size 3", "'3' is not two whole numbers"),
         ("--depth-mm 51", "51 is not a length from 0 to 50 mm"),
         ("--depth-mm deep", "'deep' is not a finite number"),

@@ -59,7 +59,7 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
         (["--approach-angle", "steep"], "'steep' is not a finite number"),
         (["--seed", "-1"], "'-1' is not a whole number from 0"),
         (["--workers", "0"], "'0' is not a whole number from 1"),
-        (["--workers", "100000"], "'100000' is not a whole number from 1 to 1024"),
+        (["--workers", "100000"], "'100000' is not a whole number from 1 to 1,024"),
         (["--grasps-per-object", "9" * 5000], "999...999"),
         (["--mode", "leg"], "invalid choice: 'leg'"),
         (["--station", "wsg_tabletop", "--mode", "arm"], "mode 'arm' needs an arm, which station"),

@@ -267,8 +267,10 @@ def run_dataset_generate(arguments: argparse.Namespace) -> int:
     for number, error in generated.failed.items():
         print_remark(f"scene {number}: {error}")
     samples = len(load_dataset(generated.folder))
-    old = f", {len(generated.known)} were there" if generated.known else ""
-    print(f"{generated.folder}: {samples} samples of {len(generated.new)} new scenes{old}")
+    known = len(generated.known)
+    old = f", {known} {'was' if known == 1 else 'were'} there" if known else ""
+    new = core.count_with_noun(len(generated.new), "new scene")
+    print(f"{generated.folder}: {core.count_with_noun(samples, 'sample')} in all; {new}{old}")
     return 1 if generated.failed else 0
 
 

@@ -79,7 +79,7 @@ def whole_number(text: str, low: int, high: int) -> int:
         value = low - 1
     if not low <= value <= high:
         raise argparse.ArgumentTypeError(
-            f"{quote_value(text)} is not a whole number from {low} to {high}"
+            f"{quote_value(text)} is not a whole number from {low:,} to {high:,}"
         )
     return value
 
