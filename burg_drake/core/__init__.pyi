@@ -117,6 +117,7 @@ from .files import (
     try_lock as try_lock,
 )
 from .frames import (
+    MAX_POSE_COORDINATE as MAX_POSE_COORDINATE,
     canonical_fingers as canonical_fingers,
     check_pose as check_pose,
     grasp_from_axes as grasp_from_axes,

@@ -270,8 +270,8 @@ def resolve_reference(
         reference: `package://burg_drake/...`; `package://NAME/...` of another package; or, with
             `kind`, the bare name of something that the package installs; or a path, relative to
             `base` (or to the working directory).
-        kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or `models`
-            (bare names stand for a folder).
+        kind: `scenes`, `scenes/suites`, `stations` or `models/hands` (bare names stand for
+            `NAME.yaml`), or `models` (bare names stand for a folder).
         base: folder of the document with the reference.
         packages: package folders of the document.
 
@@ -283,7 +283,13 @@ def resolve_reference(
             kind, or the searched places.
         InvalidInputError: it is a pipe.
     """
-    nouns = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
+    nouns = {
+        "scenes": "scene",
+        "scenes/suites": "suite",
+        "stations": "station",
+        "models": "library",
+        "models/hands": "hand",
+    }
     text = str(reference)
     if text.startswith(PACKAGE_URI):
         path = data_root() / text.removeprefix(PACKAGE_URI)

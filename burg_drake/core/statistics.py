@@ -36,13 +36,16 @@ def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
     return lower, upper
 
 
-def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple[float, float]:
+def clustered_interval(
+    successes: Sequence[float], trials: Sequence[float]
+) -> tuple[float, float]:
     """95 % interval for a proportion whose trials come in clusters that may differ, such as scenes:
     the linearised variance of a ratio of totals (W. G. Cochran, Sampling Techniques, 1977, ch. 6)
     with Student's quantile; never narrower than Wilson's, which takes all trials as independent.
 
     Args:
-        successes, trials: (S,) counts of each cluster.
+        successes, trials: (S,) counts of each cluster; sums of values between 0 and 1 and their
+            number, for a mean of such values.
 
     Returns:
         Lower and upper bound in [0, 1]; all of it if there were no trials.
@@ -50,7 +53,7 @@ def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple
     k, n = np.asarray(successes, dtype=float), np.asarray(trials, dtype=float)
     k, n = k[n > 0.0], n[n > 0.0]
     whole = float(n.sum())
-    low, high = wilson_interval(int(k.sum()), int(whole))
+    low, high = wilson_interval(float(k.sum()), whole)
     if len(n) < 2:
         return low, high
     from scipy.special import stdtrit

@@ -135,6 +135,10 @@ from .tsdf import (
     mesh_distance as mesh_distance,
 )
 from .view_sampler import PlacedBox as PlacedBox, ViewSampler as ViewSampler
-from .views import View as View, ViewpointSettings as ViewpointSettings
+from .views import (
+    View as View,
+    ViewpointSettings as ViewpointSettings,
+    camera_looking_at as camera_looking_at,
+)
 from .webdataset import write_webdataset as write_webdataset
 from .writer import DatasetWriter as DatasetWriter, write_scene as write_scene

@@ -122,7 +122,12 @@ from .grasp_sets.input import (
     shown_ids as shown_ids,
     station_reference as station_reference,
 )
-from .grasp_sets.mistake_search import find_mistake as find_mistake, mistake_notes as mistake_notes
+from .grasp_sets.mistake_search import (
+    count_fitting as count_fitting,
+    find_mistake as find_mistake,
+    mistake_notes as mistake_notes,
+    width_ratios as width_ratios,
+)
 from .grasp_sets.pose_mistakes import (
     FileReading as FileReading,
     Mistake as Mistake,
@@ -293,6 +298,7 @@ from .run_merging import merge_folders as merge_folders, merge_runs as merge_run
 from .run_preparation import (
     GraspsLike as GraspsLike,
     RunRequest as RunRequest,
+    current_command as current_command,
     given_content as given_content,
     given_correction as given_correction,
     sample_requested as sample_requested,

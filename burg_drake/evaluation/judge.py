@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from burg_drake.station import DRAKE_ENGINES, Engine, GraspMotion, Station
 if TYPE_CHECKING:
     from burg_drake.grasping import HandClearance
     from burg_drake.motion import ArmReach, Reach, ReachSettings
-    from burg_drake.simulation import TrialResult, TrialSettings
+    from burg_drake.simulation import GraspTrial, TrialResult, TrialSettings
 
 
 def mode_for(station: Station, asked: Mode | None = None) -> Mode:
@@ -413,12 +413,19 @@ class StationJudge:
 
     Attributes:
         screens, stages: see `Judge`.
+        trial: executes the grasps.
         plan: last plan that the arm has executed; None if there is none.
     """
 
-    def __init__(self, screens: list[Screen], stages: list[tuple[Stage, Decide]]) -> None:
+    def __init__(
+        self,
+        screens: list[Screen],
+        stages: list[tuple[Stage, Decide]],
+        trial: GraspTrial[Any],
+    ) -> None:
         self.screens = screens
         self.stages = stages
+        self.trial = trial
         self.plan: Plan | None = None
 
 
@@ -446,7 +453,7 @@ class HandJudge(StationJudge):
         screens = [hand_screen(self._trial.clearance, X_WO, free_lift)]
         if mode == "reach":
             screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
-        super().__init__(screens, [(Stage.EXECUTED, self._execute)])
+        super().__init__(screens, [(Stage.EXECUTED, self._execute)], self._trial)
 
     def _execute(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
         lift = self._trial.motion.lift_height if grasp.lift is None else grasp.lift
@@ -474,6 +481,7 @@ class ArmJudge(StationJudge):
         super().__init__(
             [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)],
             [(Stage.PLANNED, self._time_plan), (Stage.EXECUTED, self._execute)],
+            self._trial,
         )
 
     def _time_plan(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:

@@ -33,6 +33,7 @@ from .scene_document import (
     load_scene as load_scene,
     marker_dictionary as marker_dictionary,
     marker_layout as marker_layout,
+    place_objects as place_objects,
     save_scene as save_scene,
     scene_references as scene_references,
 )

@@ -518,10 +518,27 @@ def load_scene(
         objects = library(document.library, path.parent)
     except UnknownNameError as error:
         raise UnknownNameError(f"{path}: library: {error}") from error
+    return place_objects(document, objects, path)
+
+
+def place_objects(
+    document: SceneDocument, objects: ObjectLibrary, path: Path, key_prefix: str = ""
+) -> Scene:
+    """Makes a scene of a document whose library is loaded.
+
+    Args:
+        document: the scene.
+        objects: its library.
+        path: file of the document.
+        key_prefix: key of the scene in that file, for messages, such as `scenes[2].`.
+
+    Raises:
+        UnknownNameError, DocumentError: as `load_scene`.
+    """
     seen: dict[str, str] = {}
     for key, instances in (("instances", document.instances), ("background", document.background)):
         for i, instance in enumerate(instances):
-            where = f"{path}: {key}[{i}]"
+            where = f"{path}: {key_prefix}{key}[{i}]"
             try:
                 entry = objects.entry(instance.object)
             except UnknownNameError as error:

@@ -11,7 +11,7 @@ from .drift import (
     measure_drift as measure_drift,
     predict_drift as predict_drift,
 )
-from .grasp_trial import HandTrial as HandTrial
+from .grasp_trial import GraspTrial as GraspTrial, HandTrial as HandTrial
 from .grip_limits import (
     SHAKE_AXES as SHAKE_AXES,
     TUG_DIRECTIONS as TUG_DIRECTIONS,

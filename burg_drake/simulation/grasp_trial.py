@@ -116,6 +116,18 @@ class GraspTrial(ABC, Generic[W]):
             self._complete = self._build(None)
         return self._complete
 
+    def final_poses(self) -> dict[str, Array]:
+        """Poses (4, 4) of the free instances in the world at the end of the last trial.
+
+        Only valid if that trial began: its open hand was clear.
+        """
+        poses = {name: self.world.X_WB(body) for name, body in self.world.free.items()}
+        scene, station = self.scene, self.station
+        return {
+            name: poses[name] if name in poses else instance_pose(scene, station, name)
+            for name in scene.instances
+        }
+
     def X_WG(self, instance: str, X_OG: Array) -> Array:
         """A grasp (4, 4) of an instance in the world.
 

@@ -29,14 +29,19 @@ def require_another_file(scene: Path, output: str) -> None:
         raise core.InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 
-def add_recipe_options(parser: Any) -> None:
-    """Adds the options of a recipe."""
-    _add_object_options(parser)
+def add_recipe_options(parser: Any, *, with_count: bool = True) -> None:
+    """Adds the options of a recipe.
+
+    Args:
+        parser: parser that gets the options.
+        with_count: whether an option gives the number of scenes.
+    """
+    _add_object_options(parser, with_count=with_count)
     _add_layout_options(parser)
     _add_rule_options(parser)
 
 
-def _add_object_options(parser: Any) -> None:
+def _add_object_options(parser: Any, *, with_count: bool) -> None:
     from burg_drake.scene import SceneRecipe
 
     group = parser.add_argument_group("objects")
@@ -52,13 +57,14 @@ def _add_object_options(parser: Any) -> None:
         "--only", metavar="A,B", type=options.names, action="extend", help="only these objects"
     )
     options.add_settings_options(group, SceneRecipe, "repeat", "poses", "seed")
-    group.add_argument(
-        "--count",
-        metavar="N",
-        type=options.positive_int,
-        default=1,
-        help="number of scenes (default: %(default)d)",
-    )
+    if with_count:
+        group.add_argument(
+            "--count",
+            metavar="N",
+            type=options.positive_int,
+            default=1,
+            help="number of scenes (default: %(default)d)",
+        )
     options.add_workers(group, "worker processes (default: %(default)d)", default=1)
 
 

@@ -71,6 +71,7 @@ from .values import (
     names as names,
     not_negative as not_negative,
     number as number,
+    port as port,
     positive as positive,
     positive_int as positive_int,
     seed as seed,

@@ -53,6 +53,7 @@ class MistakeLimits:
     min_share = 0.6  # Minimum share of grasps that fit after the correction.
     min_share_combined = 0.8  # The same for two mistakes at once.
     min_share_about = 0.9  # The same for turns about the closing direction, and above max_closing.
+    min_gain_about = 10.0  # Above this ratio such turns need only `min_share`.
     min_gain = 2.5  # Minimum ratio of fitting grasps after to before the correction.
     min_gained = 10  # Minimum number that fit only after, where more fit before.
     max_lost_share = 0.1  # Maximum ratio of grasps that fit only before to those only after.
@@ -77,7 +78,10 @@ Fits = NDArray[np.bool_]
 
 
 def find_mistake(
-    grasps: Mapping[str, GraspSet], station: StationLike, source: SceneLike | ObjectLibrary
+    grasps: Mapping[str, GraspSet],
+    station: StationLike,
+    source: SceneLike | ObjectLibrary,
+    frames: Sequence[Mistake] | None = None,
 ) -> MistakeFound | None:
     """Finds the common pose mistake of a grasp set, if it has one.
 
@@ -86,6 +90,8 @@ def find_mistake(
             library. Their provenance says how a file was read.
         station: station with the hand.
         source: scene or library of the objects.
+        frames: possible mistakes in the frame that the poses are measured in; those of files if
+            None.
 
     Returns:
         The mistake whose correction makes most grasps fit, where few fit as read. If all grasps
@@ -100,14 +106,37 @@ def find_mistake(
     station = as_station(station)
     source = source if isinstance(source, ObjectLibrary) else as_scene(source)
     gripper = station_gripper(station)
-    if found := _find_common_mistake(_MistakeSearch(held, station, source, gripper)):
+    if found := _find_common_mistake(_MistakeSearch(held, station, source, gripper, frames)):
         return found
     many = {name: part for name, part in held.items() if len(part) >= MIN_LIKELY_GRASPS}
     for name, part in many.items() if len(held) > 1 else ():
-        found = _find_common_mistake(_MistakeSearch({name: part}, station, source, gripper))
+        search = _MistakeSearch({name: part}, station, source, gripper, frames)
+        found = _find_common_mistake(search)
         if found and found.is_likely:  # among many objects, one may show a mistake by chance
             return replace(found, only=name)
     return None
+
+
+def count_fitting(
+    grasps: Mapping[str, GraspSet], station: StationLike, source: SceneLike | ObjectLibrary
+) -> tuple[int, int]:
+    """Number of grasps that fit their object, and number of the grasps that were examined.
+
+    A grasp fits if the open hand is clear of the object and the pads close on it.
+
+    Args:
+        grasps, station, source: see `find_mistake`.
+    """
+    held = {name: part for name, part in grasps.items() if len(part)}
+    if not held:
+        return 0, 0
+    from burg_drake.station import station_gripper
+
+    station = as_station(station)
+    source = source if isinstance(source, ObjectLibrary) else as_scene(source)
+    search = _MistakeSearch(held, station, source, station_gripper(station))
+    alone, _ = search.fits(())
+    return int(alone.sum()), search.count
 
 
 def _find_common_mistake(search: _MistakeSearch) -> MistakeFound | None:
@@ -226,16 +255,9 @@ def half_width_note(
     grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
 ) -> str:
     """A note if most widths are half of the distance of the contacts; else ""."""
-    from burg_drake.grasping import grasp_contacts
-
-    test, ratios = _FitTest(station, source), []
-    for name, part in grasps.items():
-        known = np.flatnonzero(part.width > 0.0)[: MistakeLimits.max_grasps]
-        contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
-        apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
-        ratios += (part.width[known] / apart)[contacts.touching].tolist()
+    ratios = width_ratios(grasps, station, source)
     low, high = MistakeLimits.half_width_ratios
-    half = sum(low < ratio < high for ratio in ratios)
+    half = int(((low < ratios) & (ratios < high)).sum())
     if half < max(MistakeLimits.min_fitting, MistakeLimits.min_share_combined * len(ratios)):
         return ""
     return (
@@ -243,6 +265,26 @@ def half_width_note(
         " the distance between the contacts. They are very likely those of one finger;"
         f" --correction {HALF_WIDTHS} reads them that way."
     )
+
+
+def width_ratios(
+    grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
+) -> Array:
+    """(N,) ratios of width to distance of the contacts, of up to `MistakeLimits.max_grasps` grasps
+    of each object that have a width and touch the object.
+
+    Args:
+        grasps, station, source: see `find_mistake`.
+    """
+    from burg_drake.grasping import grasp_contacts
+
+    test, ratios = _FitTest(station, source), [np.empty(0)]
+    for name, part in grasps.items():
+        known = np.flatnonzero(part.width > 0.0)[: MistakeLimits.max_grasps]
+        contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
+        apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
+        ratios.append(part.width[known][contacts.touching] / apart[contacts.touching])
+    return np.concatenate(ratios)
 
 
 class _MistakeSearch:
@@ -254,7 +296,9 @@ class _MistakeSearch:
         station: Station,
         source: Scene | ObjectLibrary,
         gripper: Gripper,
+        frames: Sequence[Mistake] | None = None,
     ) -> None:
+        self._frames = frames
         self._scene = source if isinstance(source, Scene) else None
         self._gripper = gripper
         self._test = _FitTest(station, source)
@@ -290,6 +334,8 @@ class _MistakeSearch:
         distance = np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1))
         if distance < MistakeLimits.millimetre_distance:
             found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
+        if self._frames is not None:
+            return [*found, *self._frames]
         if self._scene is None:
             return found
         if self._X_SM is None:
@@ -384,7 +430,8 @@ class _MistakeSearch:
         if self.closing_share <= MistakeLimits.max_closing or about:
             combined = mistake.step or bool(mistake.turn and mistake.forward)
             share = MistakeLimits.min_share_combined if combined else MistakeLimits.min_share
-            share = MistakeLimits.min_share_about if about else share
+            if about and not self._fit_only_after(before, n):
+                share = MistakeLimits.min_share_about
             least = max(MistakeLimits.min_fitting, share * self.count)
         elif mistake.changes_reading:
             least = max(
@@ -400,6 +447,11 @@ class _MistakeSearch:
         )
         nearly_all = n >= MistakeLimits.min_share_about * self.count
         return enough and mistake.changes_reading and nearly_all
+
+    def _fit_only_after(self, before: Fits, after: int) -> bool:
+        """Whether nearly all of the grasps that fit after a correction do not fit as read."""
+        gained = after >= MistakeLimits.min_gain_about * before.sum()
+        return after >= MIN_LIKELY_GRASPS and bool(gained)
 
     def formats_alike(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
         """Other formats with the grasp frame of the corrected grasps."""

@@ -1,0 +1,401 @@
+"""`burg-drake benchmark`: suites, runs of planners on them, and their comparison."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from burg_drake import benchmark, core
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_note_lines, print_remark, show_progress
+
+if TYPE_CHECKING:
+    from burg_drake.scene import Scene
+    from burg_drake.station import Station
+
+
+def add_benchmark_list_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark list`."""
+    parser.epilog = options.examples_text("burg-drake benchmark list")
+
+
+def run_benchmark_list(arguments: argparse.Namespace) -> int:
+    """Prints the built-in suites."""
+    table = core.TextTable("Built-in suites").names("suite")
+    table.numbers("release", "scenes", "objects", "grasps").texts("station", "what it has")
+    for name in benchmark.suite_names():
+        suite = benchmark.load_suite(name)
+        document = suite.document
+        counts = [len(scene.instances) for scene in suite.scenes().values()]
+        table.row(
+            name,
+            str(document.release),
+            str(len(counts)),
+            f"{min(counts)}-{max(counts)}" if min(counts) < max(counts) else str(counts[0]),
+            str(document.budget.grasps),
+            suite.station.name,
+            document.description,
+        )
+    table.caption = (
+        "objects: in a scene\ngrasps: judged of each answer\n"
+        "benchmark show SUITE prints the scenes, and writes them with their boards"
+    )
+    table.show()
+    return 0
+
+
+def add_benchmark_show_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark show`."""
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark show tabletop",
+        "burg-drake benchmark show tabletop --scenes tabletop/",
+    )
+    _add_suite(parser)
+    parser.add_argument(
+        "--scenes",
+        metavar="FOLDER",
+        help="also write each scene as YAML, its board as PDF, and what the camera sees as PNG",
+    )
+    options.add_quiet(parser)
+
+
+def run_benchmark_show(arguments: argparse.Namespace) -> int:
+    """Prints a suite; writes its scenes if asked for."""
+    suite = benchmark.load_suite(arguments.suite)
+    document = suite.document
+    print(f"{suite.name}, release {document.release}: {document.description}")
+    print(f"hash      {suite.hash}")
+    print(f"library   {suite.library.root}")
+    print(f"station   {suite.station.path}")
+    for camera in document.cameras:
+        image = camera.scene_camera().intrinsics
+        noise = "with its noise" if camera.noise else "without noise"
+        print(f"camera    {camera.name}: {camera.sensor}, {image.width} x {image.height}, {noise}")
+    budget = document.budget
+    print(f"budget    {budget.grasps} grasps and {budget.seconds:g} s for each image")
+    print(f"judged    mode {document.mode}, engine {document.engine}")
+    table = core.TextTable("Scenes").names("scene").texts("split").numbers("objects").texts("which")
+    for one in document.scenes:
+        counts = Counter(instance.object for instance in one.instances)
+        names = ", ".join(name if n == 1 else f"{n} x {name}" for name, n in counts.items())
+        table.row(one.name, one.split, str(len(one.instances)), names)
+    table.show()
+    if arguments.scenes is not None:
+        _write_scenes(suite, Path(arguments.scenes), quiet=arguments.quiet)
+    return 0
+
+
+def _write_scenes(suite: benchmark.Suite, folder: Path, *, quiet: bool) -> None:
+    """Writes scenes, boards and pictures of a suite."""
+    scenes = {**suite.scenes("test"), **suite.scenes("tuning")}
+    with show_progress("writing", "scenes", len(scenes), quiet=quiet) as meter:
+        for scene in scenes.values():
+            benchmark.write_suite_scene(suite, scene, folder)
+            meter.step()
+    print(f"wrote     {folder}: for each scene .yaml, .pdf (print at 100 %) and .png")
+
+
+def add_benchmark_run_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark run`."""
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark run tabletop --planner antipodal -o results/antipodal",
+        "burg-drake benchmark run tabletop --planner my_method:plan -o results/mine",
+        "burg-drake benchmark run tabletop --planner ws://127.0.0.1:9000 -o results/network",
+        "burg-drake benchmark run packed --planner antipodal --protocol clear -o results/clear",
+        "burg-drake benchmark run my_suite.yaml --planner random -o results/random --settle"
+        " reference",
+        "",
+        "The same command continues where an interrupted one stopped.",
+    )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+    _add_suite(parser)
+    parser.add_argument(
+        "--planner",
+        required=True,
+        metavar="PLANNER",
+        help="built-in planner, MODULE:FUNCTION, ws://HOST:PORT or command:LINE (see `planner"
+        " list`)",
+    )
+    options.add_output(parser, "RESULT", "folder of the result")
+    parser.add_argument(
+        "--name", default="", help="name of the method in tables (default: the planner's)"
+    )
+    parser.add_argument(
+        "--protocol",
+        choices=get_args(benchmark.Protocol),
+        default="single",
+        help="single: judge one answer for each image; clear: execute the best feasible grasp, take"
+        " the object away, look again, until the scene is empty (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--tuning",
+        action="store_true",
+        help="use the scenes for tuning, which do not count, not those for the test",
+    )
+    parser.add_argument(
+        "--depth-only",
+        action="store_true",
+        help="give the planner no colour images, which need a renderer",
+    )
+    parser.add_argument(
+        "--settle",
+        metavar="ENGINE",
+        default="",
+        help="judge contested grasps again with this engine, such as reference",
+    )
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group)
+    options.add_cluster(workers_group)
+    options.add_quiet(parser)
+
+
+def run_benchmark_run(arguments: argparse.Namespace) -> int:
+    """Benchmarks a planner; returns 1 if scenes or grasps could not be judged."""
+    with options.cluster_from_options(arguments) as executor:
+        result = benchmark.run_benchmark(
+            arguments.suite,
+            arguments.planner,
+            arguments.output,
+            name=arguments.name,
+            protocol=arguments.protocol,
+            split="tuning" if arguments.tuning else "test",
+            depth_only=arguments.depth_only,
+            settle=arguments.settle,
+            workers=arguments.workers,
+            executor=executor,
+            progress=not arguments.quiet,
+        )
+    _print_tables([result])
+    times = result.document.times
+    print(
+        f"time      {core.format_duration(times.total)}: rendering"
+        f" {core.format_duration(times.rendering)}, planner {core.format_duration(times.planning)},"
+        f" trials {core.format_duration(times.judging)}"
+    )
+    print(f"result    {result.path}")
+    campaign = result.rounds[0].campaign
+    if campaign is not None:
+        print(f"report    {campaign.report_path}")
+    return _report_failures(result)
+
+
+def _report_failures(result: benchmark.BenchmarkResult) -> int:
+    """Prints failed answers and scenes; returns the exit code."""
+    max_lines = 5  # Failed answers, and kinds of notes, that are printed.
+    answers = [one.answer for round in result.rounds for one in result.judged_answers(round)]
+    failed = [one for one in answers if one.error]
+    for one in failed[:max_lines]:
+        print_remark(f"{one.scene}, camera {one.camera}: {one.error}")
+    if len(failed) > max_lines:
+        print_remark(f"and {len(failed) - max_lines} more answers that cannot be used")
+    notes = Counter(note for one in answers for note in one.notes)
+    print_note_lines(f"{note} ({n} images)" for note, n in notes.most_common(max_lines))
+    campaigns = [round.campaign for round in result.rounds]
+    unjudged = {name: why for one in campaigns if one for name, why in one.failed.items()}
+    for name, why in unjudged.items():
+        print_remark(f"scene {name} could not be judged: {why}")
+    return 1 if unjudged else 0
+
+
+def add_benchmark_compare_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark compare`."""
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark compare results/*",
+        "burg-drake benchmark compare results/* --html leaderboard.html",
+    )
+    _add_results(parser)
+    parser.add_argument("--html", metavar="PAGE", help="write a leaderboard as a page (.html)")
+
+
+def run_benchmark_compare(arguments: argparse.Namespace) -> int:
+    """Prints and writes the comparison of results."""
+    results = [benchmark.load_result(folder) for folder in arguments.results]
+    _print_tables(results)
+    if arguments.html is not None:
+        comparisons = benchmark.compare_by_suite(results)
+        benchmark.write_leaderboard(comparisons, arguments.html)
+        print(f"wrote {arguments.html}")
+    return 0
+
+
+def add_benchmark_table_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark table`."""
+    parser.epilog = options.examples_text("burg-drake benchmark table results/* --markdown")
+    _add_results(parser)
+    parser.add_argument("--markdown", action="store_true", help="print GitHub's Markdown")
+
+
+def run_benchmark_table(arguments: argparse.Namespace) -> int:
+    """Prints the tables of results."""
+    results = [benchmark.load_result(folder) for folder in arguments.results]
+    if not arguments.markdown:
+        _print_tables(results)
+        return 0
+    for comparison in benchmark.compare_by_suite(results):
+        for table in benchmark.comparison_tables(comparison):
+            print(table.markdown())
+    return 0
+
+
+def add_benchmark_verify_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark verify`."""
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark verify results/antipodal",
+        "burg-drake benchmark verify results/antipodal -n 200 --seed 3",
+    )
+    parser.add_argument("result", metavar="RESULT", help="folder that `benchmark run` wrote")
+    parser.add_argument(
+        "-n",
+        dest="count",
+        metavar="N",
+        type=options.positive_int,
+        default=benchmark.VERIFIED_GRASPS,
+        help="number of grasps to judge again (default: %(default)d)",
+    )
+    parser.add_argument(
+        "--seed", type=options.seed, default=0, help="seed of the choice (default: %(default)d)"
+    )
+    options.add_workers(parser)
+    options.add_quiet(parser)
+
+
+def run_benchmark_verify(arguments: argparse.Namespace) -> int:
+    """Judges a sample of a result again; returns 1 if something differs."""
+    found = benchmark.verify_result(
+        arguments.result,
+        count=arguments.count,
+        seed=arguments.seed,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    print_note_lines(found.notes)
+    for grasp in found.differing:
+        print("\n    ".join([f"{grasp.scene} {grasp.id}", *grasp.text]))
+    same = len(found.grasps) - len(found.differing)
+    print(f"{same} of {core.count_with_noun(len(found.grasps), 'grasp')} judged again as recorded")
+    return 1 if found.differing else 0
+
+
+def add_benchmark_new_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark new`."""
+    from burg_drake.apps.commands.scene_sampling import add_recipe_options
+
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark new my_suite.yaml --scenes scenes/",
+        "burg-drake benchmark new my_suite.yaml --sample my_library:50 -n 6 --spacing close",
+        "burg-drake benchmark new bin.yaml --sample household:20 --heap --station panda_bin",
+        "",
+        "The suite records the content of its objects and station; it is refused when they change.",
+    )
+    parser.add_argument("suite", metavar="SUITE", help="file to write (.yaml)")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "--sample", metavar="LIBRARY:N", type=_library_and_count, help="sample N scenes"
+    )
+    source.add_argument("--scenes", metavar="SCENE", nargs="+", help="scene files or folders")
+    options.add_settings_options(parser, benchmark.Budget, "grasps", "seconds", "picks")
+    group = parser.add_argument_group("camera")
+    options.add_settings_options(
+        group,
+        benchmark.CameraPlacement,
+        *("sensor", "distance", "elevation_deg", "azimuth_deg", "exact_depth"),
+    )
+    parser.add_argument(
+        "--tuning-scenes",
+        metavar="N",
+        type=int,
+        default=0,
+        help="the last N scenes are for tuning and do not count (default: %(default)d)",
+    )
+    add_recipe_options(parser, with_count=False)
+    options.add_quiet(parser)
+
+
+def run_benchmark_new(arguments: argparse.Namespace) -> int:
+    """Writes a suite of given or sampled scenes."""
+    from burg_drake.scene import load_scene, scene_references
+    from burg_drake.station import load_station
+
+    station = load_station(arguments.station)
+    if arguments.sample is None:
+        scenes = [load_scene(reference) for reference in scene_references(arguments.scenes)]
+    else:
+        scenes = _sample_scenes(arguments, station)
+    placement = options.settings_from(arguments, benchmark.CameraPlacement)
+    suite = benchmark.make_suite(
+        arguments.suite,
+        scenes,
+        station=station,
+        cameras=[placement.camera(scenes[0].board)],
+        budget=options.settings_from(arguments, benchmark.Budget),
+        tuning=arguments.tuning_scenes,
+    )
+    print(f"wrote {suite.path}: {core.count_with_noun(len(scenes), 'scene')}, hash {suite.hash}")
+    return 0
+
+
+def _sample_scenes(arguments: argparse.Namespace, station: Station) -> list[Scene]:
+    """Samples the scenes of a suite.
+
+    Raises:
+        InvalidInputError: fewer scenes than asked for were accepted.
+    """
+    from burg_drake import generation
+    from burg_drake.apps.commands.scene_sampling import recipe_from_options
+    from burg_drake.objects import load_library
+    from burg_drake.scene import load_scene
+
+    name, count = arguments.sample
+    library = load_library(name)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        show_progress("sampling", "scenes", count, quiet=arguments.quiet) as meter,
+    ):
+        chosen = argparse.Namespace(**{**vars(arguments), "library": name})
+        recipe = recipe_from_options(chosen, library, station, Path(folder))
+        found = generation.sample_scenes(
+            *(recipe, library, station, folder, count),
+            workers=arguments.workers,
+            progress=lambda _: meter.step(),
+        )
+        files = [
+            Path(folder, f"scene_{k:04d}.yaml") for k, row in found.rows.items() if row.accepted
+        ]
+        if len(files) < count:
+            raise core.InvalidInputError(
+                f"only {len(accepted)} of {count} scenes were accepted; ask for fewer objects, a"
+                " larger board or more --attempts"
+            )
+        return [load_scene(Path(folder, f"scene_{number:04d}.yaml")) for number in accepted]
+
+
+def _library_and_count(text: str) -> tuple[str, int]:
+    library, colon, count = text.rpartition(":")
+    if not colon or not library or not count.isdigit() or int(count) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LIBRARY:N, such as household:50")
+    return library, int(count)
+
+
+def _add_suite(parser: Any) -> None:
+    parser.add_argument(
+        "suite",
+        metavar="SUITE",
+        help=f"suite file, or built-in: {', '.join(core.builtin_names('scenes/suites'))}",
+    )
+
+
+def _add_results(parser: Any) -> None:
+    parser.add_argument(
+        "results", metavar="RESULT", nargs="+", help="folder that `benchmark run` wrote"
+    )
+
+
+def _print_tables(results: Iterable[benchmark.BenchmarkResult]) -> None:
+    """Prints the tables of results, suite by suite."""
+    for comparison in benchmark.compare_by_suite(list(results)):
+        for table in benchmark.comparison_tables(comparison):
+            table.text_table().show()

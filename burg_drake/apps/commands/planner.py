@@ -1,0 +1,77 @@
+"""`burg-drake planner list` and `planner serve`: the planners there are, and one as a server."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+
+from burg_drake import benchmark, core
+from burg_drake.apps import options
+from burg_drake.apps.terminal import sigterm_as_interrupt
+
+
+def add_planner_list_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake planner list`."""
+    parser.epilog = options.examples_text("burg-drake planner list")
+
+
+def run_planner_list(arguments: argparse.Namespace) -> int:
+    """Prints the built-in planners, and how to refer to others."""
+    table = core.TextTable().texts("planner", "uses", "grasps")
+    for name, planner in benchmark.BUILTIN_PLANNERS.items():
+        table.row(name, planner.uses, planner.summary)
+    table.show()
+    print()
+    others = core.TextTable().texts("your own, for example", "is a")
+    for example, meaning in benchmark.REFERENCE_FORMS.items():
+        others.row(example, meaning)
+    others.show()
+    return 0
+
+
+def add_planner_serve_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake planner serve`."""
+    parser.epilog = options.examples_text(
+        "burg-drake planner serve antipodal",
+        "burg-drake planner serve my_module:plan --port 9001",
+        "burg-drake planner serve my_module:plan --host 0.0.0.0",
+        "",
+        "Other programs ask it as ws://127.0.0.1:9000. A planner that lives in another environment"
+        " needs no burg_drake to be served: copy burg_planner.py there.",
+    )
+    parser.add_argument(
+        "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
+    )
+    parser.add_argument(
+        "--port",
+        type=options.port,
+        metavar="N",
+        default=9000,
+        help="port to listen on (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to listen on (default: 127.0.0.1, this computer alone); with 0.0.0.0 every"
+        " computer in the network can ask the planner",
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=options.positive,
+        metavar="S",
+        default=60.0,
+        help="time for each answer [s] (default: 60)",
+    )
+
+
+def run_planner_serve(arguments: argparse.Namespace) -> int:
+    """Serves a planner until Ctrl-C."""
+    benchmark.require_websocket_packages()
+    with (
+        sigterm_as_interrupt(),
+        benchmark.open_planner(arguments.planner, time_limit=arguments.time_limit) as planner,
+        contextlib.suppress(KeyboardInterrupt),
+    ):
+        benchmark.serve_planner(planner, arguments.port, arguments.host)
+    return 0

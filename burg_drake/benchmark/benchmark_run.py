@@ -1,0 +1,443 @@
+"""Runs a benchmark: observes each scene, asks the planner, and has the grasps judged.
+
+Nothing is judged here: answers become given grasps of a run over many scenes, see `evaluate`. An
+interrupted benchmark goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.benchmark.answers import AnswerError, PlannedGrasps, read_answer
+from burg_drake.benchmark.benchmark_folder import (
+    ANSWERS_FOLDER,
+    BENCHMARK_FILE,
+    CAMERA_COLUMN,
+    FRICTION_COLUMN,
+    RANK_COLUMN,
+    SCENES_FOLDER,
+    TRIALS_FOLDER,
+    BenchmarkDocument,
+    BenchmarkResult,
+    BenchmarkTimes,
+    Round,
+    StoredAnswer,
+    answer_path,
+    load_result,
+    round_folder,
+    save_result,
+    scene_path,
+)
+from burg_drake.benchmark.burg_planner import Observation
+from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
+from burg_drake.benchmark.planners import Planner, PlannerError, open_planner
+from burg_drake.benchmark.suite import Protocol, Split, Suite, SuiteCamera, SuiteLike, as_suite
+from burg_drake.core import (
+    Array,
+    FolderLock,
+    GraspSet,
+    InvalidInputError,
+    Listener,
+    Prefetcher,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    Task,
+    WorkerPool,
+    atomic_folder,
+    default_workers,
+    ensure_writable_folder,
+    map_unordered,
+    portable_reference,
+    remove_unfinished,
+    software_versions,
+)
+from burg_drake.evaluation import (
+    INSTANCE_COLUMN,
+    EvaluationSettings,
+    Executor,
+    LocalExecutor,
+    current_command,
+    evaluate,
+    group_by_instance,
+    held_instances,
+    judge_again,
+    require_second_engine,
+)
+from burg_drake.formats import Gripper
+from burg_drake.geometry import Surface
+from burg_drake.grasping import friction_needed, grasp_contacts, jaws_of, suppress_near_grasps
+from burg_drake.scene import Scene, load_scene, save_scene
+from burg_drake.station import ENGINES, Station, station_gripper
+
+
+def run_benchmark(
+    suite: SuiteLike,
+    planner: str,
+    folder: str | Path,
+    *,
+    name: str = "",
+    protocol: Protocol = "single",
+    split: Split = "test",
+    depth_only: bool = False,
+    settle: str = "",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: bool | Listener = True,
+) -> BenchmarkResult:
+    """Benchmarks a planner on a suite, and writes the result.
+
+    Each scene is observed by each camera of the suite, and the planner is asked once for each
+    observation. Of an answer the best grasps within the suite's budget are judged, without those
+    near a better one on the same object. Results do not depend on the number of workers. A planner
+    that fails costs the answer to that observation only. The same call continues an interrupted
+    one.
+
+    Example::
+
+        result = burg.benchmark.run_benchmark("tabletop", "antipodal", "results/antipodal")
+        print(result.measures["top_success"])
+
+    Args:
+        suite: as loaded, or a reference for `load_suite`.
+        planner: see `open_planner`.
+        folder: folder of the result; made if need be.
+        name: name of the method in tables; the planner's own if empty.
+        protocol: `single`: the answer to each observation is judged. `clear`: of each answer the
+            best grasp that can be executed is executed in simulation; an object that is held is
+            taken away, the others come to rest, and the planner is asked again; until a scene is
+            empty, three attempts in a row fail, or the suite's budget of picks ends.
+        split: the scenes that are observed.
+        depth_only: give the planner no colour images, which need a renderer.
+        settle: engine that judges contested grasps again; none if empty.
+        workers: number of processes; one per processor if None.
+        executor: executor that judges, instead of `workers` processes of this machine.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Raises:
+        InvalidInputError: bad argument, or the folder holds something else, or another benchmark.
+        UnknownNameError: a reference does not exist.
+        PlannerError: the planner cannot be opened.
+        MissingDependencyError: a renderer or package is missing.
+    """
+    begun, suite, folder = time.monotonic(), as_suite(suite), Path(folder)
+    if executor is None:
+        executor = LocalExecutor.of_this_machine(workers)
+    elif workers is not None:
+        raise InvalidInputError(
+            "give either workers or an executor; an executor has workers of its own"
+        )
+    if not suite.scenes(split):
+        raise InvalidInputError(f"{suite.path} has no scenes of split {split!r}")
+    if settle:
+        require_second_engine(settle, ENGINES[suite.document.engine], suite.document.mode)
+    with open_planner(planner, time_limit=suite.document.budget.seconds) as opened:
+        document = BenchmarkDocument(
+            command=current_command(),
+            name=_require_method_name(name or opened.name),
+            planner=opened.reference,
+            suite=suite.name,
+            release=suite.document.release,
+            suite_hash=suite.hash,
+            protocol=protocol,
+            split=split,
+            depth_only=depth_only,
+            versions=software_versions(),
+        )
+        _require_own_folder(folder, document)
+        with FolderLock(ensure_writable_folder(folder)), Reporter(progress) as reporter:
+            remove_unfinished(folder)
+            result = _open_result(folder, document, suite)
+            return _BenchmarkCall(result, suite, opened, executor, reporter, begun).run(settle)
+
+
+def _require_method_name(name: str) -> str:
+    """Refuses names that would break tables."""
+    if not name.isprintable() or not 0 < len(name) <= 100:
+        raise InvalidInputError(f"the name {name!r} of the method is empty, long or unprintable")
+    return name
+
+
+def _require_own_folder(folder: Path, document: BenchmarkDocument) -> None:
+    """Refuses a folder that holds another benchmark, or anything else.
+
+    Raises:
+        InvalidInputError: the message says what differs.
+    """
+    if (folder / BENCHMARK_FILE).exists():
+        differences = load_result(folder).document.differences(document)
+        if differences:
+            raise InvalidInputError(
+                f"{folder} already holds another benchmark ({'; '.join(differences)}); choose"
+                " another folder, or delete it"
+            ).about("folder")
+    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InvalidInputError(
+            f"{folder} is not empty, but has no benchmark ({BENCHMARK_FILE} is missing); choose"
+            " another folder, or delete it"
+        ).about("folder")
+
+
+def _open_result(folder: Path, document: BenchmarkDocument, suite: Suite) -> BenchmarkResult:
+    """The benchmark in a folder, or a new one."""
+    if (folder / BENCHMARK_FILE).exists():
+        return load_result(folder)
+    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
+    copy = replace(
+        suite.document,
+        library=portable_reference(suite.library.root, folder),
+        station=portable_reference(suite.station.path, folder),
+    )
+    return save_result(folder, document, copy)
+
+
+@dataclass
+class _BenchmarkCall:
+    """One call of `run_benchmark`."""
+
+    result: BenchmarkResult
+    suite: Suite
+    planner: Planner
+    executor: Executor
+    reporter: Reporter
+    begun: float
+
+    def run(self, settle: str) -> BenchmarkResult:
+        """Goes through the rounds, and returns the complete result."""
+        first, times = self.result.rounds[0], BenchmarkTimes()
+        scenes: Mapping[str, Scene] = self.suite.scenes(self.result.document.split)
+        for number in itertools.count(1):
+            folder = round_folder(self.result.path, number)
+            round = replace(first, path=folder, scenes=tuple(scenes))
+            times += self._ask(round, scenes, number)
+            begun = time.monotonic()
+            self._judge(round, scenes, settle)
+            scenes = {} if self._is_last(number) else self._next_scenes(round, scenes, number)
+            times += BenchmarkTimes(judging=time.monotonic() - begun)
+            if not scenes:
+                break
+        times = replace(times, total=time.monotonic() - self.begun)
+        document = self.result.document
+        document = replace(
+            document, settled=settle or document.settled, times=document.times + times
+        )
+        return save_result(self.result.path, document, self.result.suite)
+
+    def _is_last(self, number: int) -> bool:
+        if self.result.document.protocol == "single":
+            return True
+        return number >= self.suite.document.budget.picks
+
+    def _judge(self, round: Round, scenes: Mapping[str, Scene], settle: str) -> None:
+        """Has the answers of a round judged."""
+        grasps = round.stored_grasps()
+        if not grasps.count:
+            return
+        campaign = evaluate(
+            list(scenes.values()),
+            self.suite.station,
+            round.path / TRIALS_FOLDER,
+            grasps=grasps,
+            settings=EvaluationSettings(
+                mode=self.suite.document.mode, engine=self.suite.document.engine
+            ),
+            executor=self.executor,
+            progress=self.reporter.show,
+        )
+        if settle:
+            judge_again(
+                campaign, engine=settle, executor=self.executor, progress=self.reporter.show
+            )
+
+    def _next_scenes(
+        self, round: Round, scenes: Mapping[str, Scene], number: int
+    ) -> dict[str, Scene]:
+        """The scenes of the next round: at rest after the grasps of this one, if not cleared or
+        given up. They are written once all are known."""
+        folder = round_folder(self.result.path, number + 1)
+        if not folder.is_dir():
+            work: list[tuple[Scene, ExecutedGrasp]] = []
+            found = {name: scenes[name] for name in scenes_to_clear(self.result, number)}
+            for answer in self.result.judged_answers(round):
+                name, executed = answer.answer.scene, answer.executed
+                if executed is not None:
+                    grasp = ExecutedGrasp(round.run_folder(name), answer.ids[executed])
+                    work.append((scenes[name], grasp))
+            for (scene, _), after in map_unordered(scene_after, work, default_workers()):
+                if isinstance(after, BaseException):
+                    raise after
+                if scene.name in found:
+                    found[scene.name] = after
+            found = {name: scene for name, scene in found.items() if scene.instances}
+            if not found:
+                return {}
+            with atomic_folder(folder) as fresh:
+                (fresh / ANSWERS_FOLDER).mkdir()
+                (fresh / SCENES_FOLDER).mkdir()
+                library = portable_reference(self.suite.library.root, folder / SCENES_FOLDER)
+                for name, scene in found.items():
+                    save_scene(replace(scene.document, library=library), scene_path(fresh, name))
+        return {
+            name: load_scene(scene_path(folder, name))
+            for name in scenes
+            if scene_path(folder, name).exists()
+        }
+
+    def _ask(self, round: Round, scenes: Mapping[str, Scene], number: int) -> BenchmarkTimes:
+        """Asks the planner for the missing answers of a round; returns the times waited."""
+        cameras = {camera.name: camera for camera in self.suite.document.cameras}
+        missing = {
+            name: [
+                cameras[camera]
+                for camera in round.cameras
+                if not answer_path(round.path, name, camera).exists()
+            ]
+            for name in scenes
+        }
+        total, rendering, planning = len(round.cases), 0.0, 0.0
+        phase = "planning" if self.result.document.protocol == "single" else f"planning {number}"
+        done = total - sum(map(len, missing.values()))
+        progress = Progress(phase, done, total, unit="images")
+        meter = ProgressMeter(self.reporter.show, progress, phase)
+        station, depth_only = self.suite.station, self.result.document.depth_only
+        work = [
+            _Rendering(scenes[name], station, tuple(wanted), number - 1, depth_only)
+            for name, wanted in missing.items()
+            if wanted
+        ]
+        before = time.monotonic()
+        for scene, observations in _observe(work):
+            rendering += time.monotonic() - before
+            before = time.monotonic()
+            for camera, observation in observations.items():
+                self._ask_once(scene, camera, observation).save(round.path)
+                meter.step()
+            planning += time.monotonic() - before
+            before = time.monotonic()
+        return BenchmarkTimes(rendering=rendering, planning=planning)
+
+    def _ask_once(self, scene: Scene, camera: str, observation: Observation) -> StoredAnswer:
+        """Asks the planner once; an answer that cannot be used becomes one with its error."""
+        gripper, budget = station_gripper(self.suite.station), self.suite.document.budget
+        begun = time.monotonic()
+        try:
+            raw = self.planner.ask(observation, scene, self.suite.station)
+            planned = read_answer(raw, observation, gripper)
+        except (PlannerError, AnswerError) as error:
+            return StoredAnswer(
+                scene=scene.name,
+                camera=camera,
+                grasps=_with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", camera),
+                observation=observation.id,
+                seconds=time.monotonic() - begun,
+                error=str(error),
+            )
+        grasps = choose_grasps(scene, planned, gripper, budget.grasps, camera)
+        return StoredAnswer(
+            scene=scene.name,
+            camera=camera,
+            grasps=_with_friction_needed(grasps, scene, self.suite.station),
+            observation=observation.id,
+            seconds=planned.time,
+            answered=len(planned.score),
+            notes=planned.notes,
+        )
+
+
+@dataclass(frozen=True)
+class _Rendering:
+    """The observations of a scene that are needed.
+
+    Attributes:
+        scene, station: what is observed.
+        cameras: the cameras.
+        take: number of the image.
+        depth_only: whether no colours are rendered.
+    """
+
+    scene: Scene
+    station: Station
+    cameras: tuple[SuiteCamera, ...]
+    take: int
+    depth_only: bool
+
+
+def _observe(work: Sequence[_Rendering]) -> Iterator[tuple[Scene, dict[str, Observation]]]:
+    """Renders observations in processes, a few scenes ahead of the planner."""
+    if not work:
+        return
+    with WorkerPool(min(default_workers(), len(work))) as pool:
+        rendered = Prefetcher(pool, work, lambda one: Task(_render, (one,)))
+        while (found := rendered.take()) is not None:
+            one, observations = found
+            if isinstance(observations, BaseException):
+                raise observations
+            yield one.scene, observations
+
+
+def _render(work: _Rendering) -> dict[str, Observation]:
+    """Observations of a scene by camera."""
+    found = {}
+    for camera in work.cameras:
+        camera = replace(camera, color=camera.color and not work.depth_only)
+        seen = camera.scene_camera().observe(work.scene, work.station, take=work.take)
+        found[camera.name] = seen
+    return found
+
+
+def choose_grasps(
+    scene: Scene, planned: PlannedGrasps, gripper: Gripper, count: int, camera: str
+) -> GraspSet:
+    """The best grasps of an answer in the frames of the objects that they hold, best first.
+
+    A grasp near a better one of the same object is left out, as in GraspNet-1Billion's evaluation.
+
+    Args:
+        scene: the scene that was observed.
+        planned: the answer.
+        gripper: the hand.
+        count: largest number of grasps.
+        camera: name of the camera.
+    """
+    n = len(planned.score)
+    if not n or not scene.instances:
+        return _with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", camera)
+    poses = GraspSet.create(planned.X_SG, object="", width=planned.width, score=planned.score)
+    owner, _ = held_instances(scene, planned.X_SG, gripper)
+    parts = [
+        part.with_columns(**{INSTANCE_COLUMN: np.full(len(part), name)})
+        for name, part in group_by_instance(scene, poses, planned.X_SG, owner).items()
+    ]
+    grasps = GraspSet.concatenate(parts)
+    kept = grasps.select(suppress_near_grasps(grasps)[:count])
+    return _with_columns(kept, kept.columns[INSTANCE_COLUMN], camera)
+
+
+def _with_columns(grasps: GraspSet, instance: Array | str, camera: str) -> GraspSet:
+    """Grasps, best first, with the columns of an answer."""
+    n = len(grasps)
+    columns = {
+        INSTANCE_COLUMN: np.broadcast_to(np.asarray(instance, dtype=str), (n,)),
+        RANK_COLUMN: np.arange(n),
+        CAMERA_COLUMN: np.full(n, camera),
+        FRICTION_COLUMN: np.full(n, np.nan),
+    }
+    return grasps.with_columns(**columns)
+
+
+def _with_friction_needed(grasps: GraspSet, scene: Scene, station: Station) -> GraspSet:
+    """Grasps with the smallest friction coefficient at which each holds by the geometry of its
+    contacts; NaN if the pads do not both touch."""
+    jaws = jaws_of(station.hand, station.hand_model, station.packages)
+    needed = np.full(len(grasps), np.nan)
+    for name in sorted(set(grasps.object.tolist())):
+        rows = np.flatnonzero(grasps.object == name)
+        surface = Surface.of(scene.library.surface(name))
+        needed[rows] = friction_needed(grasp_contacts(surface, grasps.X_OG[rows], jaws))
+    return grasps.with_columns(**{FRICTION_COLUMN: needed})

@@ -1,0 +1,184 @@
+"""The leaderboard: one self-contained page with the methods of any number of suites."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
+from burg_drake.benchmark.method_comparison import MethodComparison
+from burg_drake.benchmark.method_tables import (
+    STEP_MEASURES,
+    SUCCESS_MEASURES,
+    TableText,
+    comparison_tables,
+    measure_text,
+    planning_time,
+)
+from burg_drake.core import NO_VALUE, atomic_write, format_duration, outcome_label
+from burg_drake.evaluation import (
+    GROUP_CLASSES,
+    REPORT_FILE,
+    command,
+    header,
+    html_page,
+    number_cells,
+    section,
+    style_sheet,
+    table,
+)
+from burg_drake.visualization import OUTCOME_GROUPS, Html, element
+
+OUTCOME_CLASSES = {
+    outcome: GROUP_CLASSES[group.name] for group in OUTCOME_GROUPS for outcome in group.outcomes
+}
+"""CSS class of each outcome."""
+
+
+def write_leaderboard(comparisons: Sequence[MethodComparison], path: str | Path) -> Path:
+    """Writes the leaderboard; links to reports are relative to the page.
+
+    Args:
+        comparisons: methods of each suite.
+        path: file to write (.html).
+    """
+    path = Path(path)
+    atomic_write(path, leaderboard_page(comparisons, path.parent))
+    return path
+
+
+def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> str:
+    """The page as HTML.
+
+    Args:
+        comparisons: methods of each suite.
+        folder: folder of the page.
+    """
+    methods = len({name for one in comparisons for name in one.names})
+    suites = [one.results[0].suite.name for one in comparisons]
+    script = (files("burg_drake.benchmark") / "leaderboard.js").read_text(encoding="utf-8")
+    parts = [part for one in comparisons for part in _suite_sections(one, folder)]
+    return html_page(
+        "Grasp planners compared",
+        element("style", style_sheet()),
+        header(
+            "Benchmark",
+            "Grasp planners compared",
+            f"{methods} methods on {', '.join(suites)}; click a heading to sort by it",
+        ),
+        *parts,
+        element("script", Html(script)),
+    )
+
+
+def _suite_sections(comparison: MethodComparison, folder: Path) -> list[Html]:
+    success, steps, *others = comparison_tables(comparison)
+    suite = comparison.results[0].suite
+    found = [
+        section(
+            success.title,
+            suite.description,
+            _measure_table(comparison, SUCCESS_MEASURES, with_times=True),
+            _caption(success),
+        ),
+        section(
+            steps.title,
+            "Of all judged grasps, the share that passed each stage: where a method loses.",
+            _measure_table(comparison, STEP_MEASURES),
+            _caption(steps),
+        ),
+    ]
+    found += [
+        section(one.title, "Pairs of methods on the same scenes.", _text_table(one), _caption(one))
+        for one in others
+    ]
+    found.append(
+        section(
+            f"The best grasp in each scene of {suite.name}",
+            "How it ended. A scene opens the report of its grasps; a failed grasp is shown by the"
+            " command below with its id.",
+            _scene_table(comparison, folder),
+            command("burg-drake replay RESULT/trials/scenes/SCENE --grasp ID"),
+        )
+    )
+    return found
+
+
+def _caption(text: TableText) -> Html:
+    lines = [element("li", line) for line in text.caption.splitlines()]
+    return element("ul", *lines, class_="caption")
+
+
+def _measure_table(
+    comparison: MethodComparison, heads: dict[str, str], *, with_times: bool = False
+) -> Html:
+    """Measures by method, with numbers to sort by."""
+    rows = []
+    names = [name for name in heads if name in comparison.measures[comparison.names[0]]]
+    for result in comparison.results:
+        measures = comparison.measures[result.document.name]
+        cells = [element("th", result.document.name, scope="row")]
+        cells += [
+            element(
+                "td",
+                measure_text(measures[name]),
+                class_="number",
+                data_value=_sortable(measures[name].value),
+            )
+            for name in names
+        ]
+        if with_times:
+            seconds = planning_time(result)
+            cells.append(
+                element(
+                    "td", format_duration(seconds), class_="number", data_value=_sortable(seconds)
+                )
+            )
+        rows.append(element("tr", *cells))
+    head = ["method", *(heads[name] for name in names), *(["time"] if with_times else [])]
+    return table(head, rows, numbers=range(1, len(head)), style="sortable")
+
+
+def _sortable(value: float) -> str:
+    return "-1" if np.isnan(value) else f"{value:.9g}"
+
+
+def _text_table(text: TableText) -> Html:
+    rows = [
+        element("tr", element("th", row[0], scope="row"), *number_cells(row[1:]))
+        for row in text.rows
+    ]
+    return table(text.head, rows, numbers=range(1, len(text.head)), style="sortable")
+
+
+def _scene_table(comparison: MethodComparison, folder: Path) -> Html:
+    """How the best grasp of each method ended, by scene and camera."""
+    rows = []
+    for k, (scene, camera) in enumerate(comparison.results[0].cases):
+        label = scene if len(comparison.results[0].suite.cameras) == 1 else f"{scene}, {camera}"
+        cells = [
+            _best_grasp_cell(result, result.answers[k], folder) for result in comparison.results
+        ]
+        rows.append(element("tr", element("th", label, scope="row"), *cells))
+    return table(["scene", *comparison.names], rows)
+
+
+def _best_grasp_cell(result: BenchmarkResult, answer: JudgedAnswer, folder: Path) -> Html:
+    if answer.answer.error:
+        return element("td", "no answer", title=answer.answer.error)
+    if not answer.verdicts or answer.verdicts[0] is None:
+        return element("td", NO_VALUE, title="no grasp")
+    outcome, id = answer.verdicts[0].outcome, answer.ids[0]
+    run = result.rounds[0].run_folder(answer.answer.scene)
+    label = outcome_label(outcome)
+    if (run / REPORT_FILE).exists():
+        address = quote(os.path.relpath(run / REPORT_FILE, folder.resolve()).replace(os.sep, "/"))
+        return element(
+            "td", element("a", label, href=address), class_=OUTCOME_CLASSES[outcome], title=id
+        )
+    return element("td", label, class_=OUTCOME_CLASSES[outcome], title=id)

@@ -1,0 +1,211 @@
+"""Compares methods on one suite: paired tests on the same scenes, corrected for their number."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
+from burg_drake.benchmark.measures import Measure, measure_all, precision_at, trial_ap
+from burg_drake.core import Array, InvalidInputError, list_names
+
+SIGNIFICANCE = 0.05
+"""Two methods differ if the corrected p value is below this."""
+
+
+@dataclass(frozen=True)
+class MethodDifference:
+    """Two methods on the same scenes.
+
+    Attributes:
+        first, second: names of the methods.
+        measure: name of the measure.
+        difference: mean of the first minus mean of the second.
+        low, high: 95 % interval of the difference over scenes (Student's t of paired differences).
+        p_value: p value of the paired permutation test.
+        corrected: the same, corrected by Holm for all pairs that are compared.
+    """
+
+    first: str
+    second: str
+    measure: str
+    difference: float
+    low: float
+    high: float
+    p_value: float
+    corrected: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the methods differ."""
+        return self.corrected < SIGNIFICANCE
+
+
+@dataclass(frozen=True, eq=False)
+class MethodComparison:
+    """Methods on one suite, the best first.
+
+    Attributes:
+        results: the benchmarks, by falling average precision.
+        measures: measures of each method, by its name.
+        differences: all pairs of methods, by measure.
+    """
+
+    results: tuple[BenchmarkResult, ...]
+    measures: Mapping[str, Mapping[str, Measure]]
+    differences: Mapping[str, tuple[MethodDifference, ...]]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the methods, the best first."""
+        return [result.document.name for result in self.results]
+
+
+def compare_methods(results: Sequence[BenchmarkResult]) -> MethodComparison:
+    """Compares complete benchmarks of one suite.
+
+    Example::
+
+        both = [burg.benchmark.load_result(f"results/{name}") for name in ("mine", "antipodal")]
+        for pair in burg.benchmark.compare_methods(both).differences["top_success"]:
+            print(pair.first, pair.second, pair.difference, pair.corrected)
+
+    Raises:
+        InvalidInputError: the benchmarks are of different suites, releases or splits, two have the
+            same name, or one is not complete.
+    """
+    _require_comparable(results)
+    measures = {one.document.name: measure_all(one) for one in results}
+    order = sorted(
+        results,
+        key=lambda one: (
+            -measures[one.document.name]["average_precision"].value,
+            one.document.name,
+        ),
+    )
+    budget = order[0].suite.budget.grasps
+    values = {
+        "top_success": [_scene_means(one, lambda a: precision_at(a, 1)) for one in order],
+        "average_precision": [_scene_means(one, lambda a: trial_ap(a, budget)) for one in order],
+    }
+    names = [one.document.name for one in order]
+    differences = {
+        measure: tuple(compare_pairs(names, means, measure)) for measure, means in values.items()
+    }
+    return MethodComparison(tuple(order), measures, differences)
+
+
+def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodComparison]:
+    """Compares benchmarks suite by suite, in the order in which suites first occur.
+
+    Raises:
+        InvalidInputError: as `compare_methods`.
+    """
+    by_suite: dict[str, list[BenchmarkResult]] = {}
+    for result in results:
+        by_suite.setdefault(result.document.suite, []).append(result)
+    if not by_suite:
+        raise InvalidInputError("no results are given; give folders that `benchmark run` wrote")
+    return [compare_methods(found) for found in by_suite.values()]
+
+
+def compare_pairs(
+    names: Sequence[str], means: Sequence[Array], measure: str
+) -> list[MethodDifference]:
+    """All pairs of methods.
+
+    Args:
+        names: names of M methods.
+        means: (S,) mean of the measure in each scene, for each method, scenes in the same order.
+        measure: name of the measure.
+    """
+    from scipy.special import stdtrit
+
+    pairs = list(itertools.combinations(range(len(names)), 2))
+    paired = [means[i] - means[j] for i, j in pairs]
+    p_values = [permutation_p_value(d) for d in paired]
+    found = []
+    for (i, j), d, p, corrected in zip(pairs, paired, p_values, holm(p_values), strict=True):
+        mean, n = float(d.mean()), len(d)
+        half = float(stdtrit(n - 1, 0.975) * d.std(ddof=1) / np.sqrt(n)) if n > 1 else np.inf
+        found.append(
+            MethodDifference(
+                names[i],
+                names[j],
+                measure,
+                mean,
+                max(-1.0, mean - half),
+                min(1.0, mean + half),
+                p,
+                corrected,
+            )
+        )
+    return found
+
+
+def permutation_p_value(differences: Array) -> float:
+    """Two-sided p value of paired differences (S,), if the sign of each were random.
+
+    All signs are tried if there are few differences, else 99,999 random ones. It assumes nothing of
+    their distribution (R. A. Fisher, The Design of Experiments, 1935, section 21).
+    """
+    from scipy.stats import permutation_test
+
+    nonzero = differences[differences != 0.0]
+    if not len(nonzero):
+        return 1.0
+    found = permutation_test(
+        (nonzero,),
+        np.sum,
+        permutation_type="samples",
+        n_resamples=99_999,
+        rng=np.random.default_rng(0),
+    )
+    return float(found.pvalue)
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """p values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979)."""
+    order = np.argsort(p_values, kind="stable")
+    corrected = np.empty(len(order))
+    largest = 0.0
+    for place, k in enumerate(order.tolist()):
+        largest = max(largest, min(1.0, (len(order) - place) * p_values[k]))
+        corrected[k] = largest
+    return [float(p) for p in corrected]
+
+
+def _scene_means(result: BenchmarkResult, value: Callable[[JudgedAnswer], float]) -> Array:
+    """(S,) mean over the cameras of each scene."""
+    by_scene: dict[str, list[float]] = {}
+    for answer in result.answers:
+        by_scene.setdefault(answer.answer.scene, []).append(value(answer))
+    return np.array([float(np.mean(found)) for found in by_scene.values()])
+
+
+def _require_comparable(results: Sequence[BenchmarkResult]) -> None:
+    first = results[0]
+    for other in results[1:]:
+        for name, noun in (
+            ("suite", "suite"),
+            ("suite_hash", "version"),
+            ("protocol", "protocol"),
+            ("split", "split"),
+        ):
+            here, there = getattr(first.document, name), getattr(other.document, name)
+            if here != there:
+                raise InvalidInputError(
+                    f"{noun} is {here} in {first.path} (suite {first.document.suite}), but {there}"
+                    f" in {other.path} (suite {other.document.suite}); only results of the same"
+                    " version of a suite, protocol and split can be compared"
+                )
+    names = [one.document.name for one in results]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InvalidInputError(
+            f"several results are called {list_names(repeated)}; give each method a name of its own"
+            " when it is run"
+        )

@@ -1,0 +1,157 @@
+"""Tables of a comparison of methods, as text and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from burg_drake.benchmark.benchmark_folder import BenchmarkResult
+from burg_drake.benchmark.measures import MEASURES, Measure
+from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
+from burg_drake.core import NO_VALUE, TextTable, format_duration, format_number
+
+SUCCESS_MEASURES = {
+    "top_success": "top grasp",
+    "precision_3": "best 3",
+    "precision_5": "best 5",
+    "average_precision": "AP",
+    "graspnet_ap": "GraspNet AP",
+}
+"""Heading of each measure of success."""
+CLEARING_MEASURES = {"cleared": "cleared", "pick_success": "picks", "emptied": "emptied"}
+"""Heading of each measure of the protocol `clear`."""
+STEP_MEASURES = {
+    "answered": "answered",
+    "clear": "clear",
+    "reachable": "reach",
+    "planned": "plan",
+    "held": "held",
+    "lifted": "lifted",
+    "disturbed": "disturbed",
+}
+"""Heading of each measure of how far grasps get."""
+
+
+class TableText(NamedTuple):
+    """A table in words.
+
+    Attributes:
+        title: heading.
+        head: names of the columns; the first one names the row.
+        rows: cells by row.
+        caption: what the columns mean.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str = ""
+
+    def text_table(self) -> TextTable:
+        """The table for a terminal."""
+        found = TextTable(self.title, caption=self.caption).names(self.head[0])
+        found.numbers(*self.head[1:])
+        for row in self.rows:
+            found.row(*row)
+        return found
+
+    def markdown(self) -> str:
+        """The table in GitHub's Markdown."""
+        lines = [
+            f"| {' | '.join(self.head)} |",
+            f"|---|{'---:|' * (len(self.head) - 1)}",
+            *(f"| {' | '.join(cell.replace('|', '¦') for cell in row)} |" for row in self.rows),
+        ]
+        return "\n".join([f"**{self.title}**", "", *lines, "", self.caption, ""])
+
+
+def comparison_tables(comparison: MethodComparison) -> list[TableText]:
+    """The tables of a comparison: success, how far grasps get, and differences of two or more."""
+    first = comparison.results[0]
+    budget, scenes = first.suite.budget, len(first.scene_names)
+    title = (
+        f"Success on {first.suite.name}, release {first.suite.release}"
+        f" ({first.document.suite_hash[:8]}), {scenes} scenes"
+    )
+    success = {
+        name: head
+        for name, head in SUCCESS_MEASURES.items()
+        if name in comparison.measures[comparison.names[0]]
+    }
+    tables = [
+        _measure_table(comparison, title, success, with_times=True),
+        _measure_table(
+            comparison, f"How far up to {budget.grasps} grasps an image get", STEP_MEASURES
+        ),
+    ]
+    if first.document.protocol == "clear":
+        tables.append(_measure_table(comparison, "Clearing the scenes", CLEARING_MEASURES))
+    pairs = comparison.differences["top_success"], comparison.differences["average_precision"]
+    if pairs[0]:
+        tables.append(_difference_table([*pairs[0], *pairs[1]]))
+    return tables
+
+
+def measure_text(measure: Measure) -> str:
+    """A measure with its interval, and what contested verdicts leave open, in percent."""
+    if np.isnan(measure.value):
+        return NO_VALUE
+    text = f"{_percent(measure.value)} ({_percent(measure.low)}-{_percent(measure.high)})"
+    if measure.most - measure.least > 0.0:
+        text += f" [{_percent(measure.least)}-{_percent(measure.most)}]"
+    return text
+
+
+def planning_time(result: BenchmarkResult) -> float:
+    """Median time of an answer [s]; NaN without answers."""
+    times = [one.answer.seconds for one in result.answers if not one.answer.error]
+    return float(np.median(times)) if times else float("nan")
+
+
+def _percent(share: float) -> str:
+    return format_number(100.0 * share, 0)
+
+
+def _measure_table(
+    comparison: MethodComparison, title: str, heads: dict[str, str], *, with_times: bool = False
+) -> TableText:
+    rows = []
+    for result in comparison.results:
+        measures = comparison.measures[result.document.name]
+        cells = [measure_text(measures[name]) for name in heads]
+        times = [format_duration(planning_time(result))] if with_times else []
+        rows.append((result.document.name, *cells, *times))
+    meanings = [f"{head}: {MEASURES[name]}" for name, head in heads.items()]
+    if with_times:
+        meanings.append(
+            "in percent, with the 95 % interval if scenes were drawn again; in brackets the range"
+            " that contested verdicts leave open"
+        )
+    head = ("method", *heads.values(), *(["time"] if with_times else []))
+    return TableText(title, head, tuple(rows), "\n".join(meanings))
+
+
+def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
+    rows = tuple(
+        (
+            f"{d.first} - {d.second}",
+            SUCCESS_MEASURES[d.measure],
+            f"{_signed(d.difference)} ({_signed(d.low)} to {_signed(d.high)})",
+            format_number(d.p_value),
+            format_number(d.corrected),
+            "yes" if d.is_significant else "no",
+        )
+        for d in differences
+    )
+    caption = (
+        "difference: in percentage points with its 95 % interval, on the same scenes\n"
+        "p: paired permutation test over scenes; corrected by Holm for the pairs of a measure"
+    )
+    head = ("methods", "measure", "difference", "p", "corrected", "differ")
+    return TableText("Differences", head, rows, caption)
+
+
+def _signed(share: float) -> str:
+    return f"{100.0 * share:+.0f}"

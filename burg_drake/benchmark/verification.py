@@ -1,0 +1,162 @@
+"""Verifies a result: judges a random sample of its grasps again, and compares to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.benchmark.benchmark_folder import (
+    BenchmarkResult,
+    JudgedAnswer,
+    Round,
+    load_result,
+)
+from burg_drake.core import (
+    InvalidInputError,
+    Listener,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    map_unordered,
+    software_versions,
+    worker_count,
+)
+from burg_drake.evaluation import comparison, differences, load_run, origin_of, rerun
+
+VERIFIED_GRASPS = 20
+"""Number of grasps that are judged again by default."""
+
+
+@dataclass(frozen=True)
+class VerifiedGrasp:
+    """A grasp that was judged again.
+
+    Attributes:
+        scene, id: scene and id of the grasp.
+        text: `as recorded`, or what differs, in lines.
+        same: whether all results are the same to the bit.
+    """
+
+    scene: str
+    id: str
+    text: tuple[str, ...]
+    same: bool
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Result of `verify_result`.
+
+    Attributes:
+        grasps: the grasps that were judged again, by scene.
+        notes: packages whose versions differ from those of the result.
+    """
+
+    grasps: tuple[VerifiedGrasp, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def differing(self) -> list[VerifiedGrasp]:
+        """Grasps whose results differ."""
+        return [grasp for grasp in self.grasps if not grasp.same]
+
+
+def verify_result(
+    result: BenchmarkResult | str | Path,
+    *,
+    count: int = VERIFIED_GRASPS,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool | Listener = True,
+) -> Verification:
+    """Judges a random sample of the grasps of a benchmark again.
+
+    Args:
+        result: a complete benchmark, or its folder.
+        count: number of grasps; all if there are fewer.
+        seed: seed of the choice.
+        workers: number of processes; one per processor if None.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Raises:
+        InvalidInputError: the benchmark is not complete, or its answers and verdicts do not belong
+            together.
+    """
+    found = result if isinstance(result, BenchmarkResult) else load_result(result)
+    judged: list[tuple[Path, str]] = []
+    for round in found.rounds:
+        answers = found.judged_answers(round)
+        _require_consistent(found, round, answers)
+        judged += [
+            (round.run_folder(one.answer.scene), id)
+            for one in answers
+            for id, verdict in zip(one.ids, one.verdicts, strict=True)
+            if verdict is not None
+        ]
+    rng = np.random.default_rng(seed)
+    chosen = sorted(rng.permutation(len(judged))[:count].tolist())
+    work = [judged[k] for k in chosen]
+    again: list[VerifiedGrasp] = []
+    with Reporter(progress) as reporter:
+        meter = ProgressMeter(reporter.show, Progress("verifying", total=len(work)))
+        for _, grasp in map_unordered(_judge_again, work, worker_count(workers)):
+            if isinstance(grasp, BaseException):
+                raise grasp
+            again.append(grasp)
+            meter.step()
+    again.sort(key=lambda grasp: (grasp.scene, grasp.id))
+    return Verification(tuple(again), tuple(_version_notes(found)))
+
+
+def _require_consistent(
+    result: BenchmarkResult, round: Round, answers: Sequence[JudgedAnswer]
+) -> None:
+    """Refuses verdicts of other answers, and missing verdicts.
+
+    Raises:
+        InvalidInputError: the message says which.
+    """
+    campaign = round.campaign
+    if campaign is not None:
+        if campaign.document.grasps.content != round.stored_grasps().content:
+            raise InvalidInputError(
+                f"{campaign.path}: the verdicts are not those of the answers, which have changed"
+                " since"
+            )
+        if campaign.open_scenes:
+            raise InvalidInputError(
+                f"{result.path} is not complete; finish it with the command that began it:"
+                f" {result.document.command}"
+            )
+    failed = {} if campaign is None else campaign.failed
+    for one in answers:
+        if None in one.verdicts and one.answer.scene not in failed:
+            raise InvalidInputError(
+                f"{round.path}: grasps of scene {one.answer.scene} have no verdict, so the result"
+                " has been changed"
+            )
+
+
+def _judge_again(work: tuple[Path, str]) -> VerifiedGrasp:
+    """Judges one grasp of a scene again."""
+    folder, id = work
+    run = load_run(folder)
+    trial = run.trial(id)
+    assert trial.verdict is not None
+    origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
+    now, _ = rerun(run.scene(), run.station(), trial, origin)
+    found = differences(trial.verdict, now)
+    return VerifiedGrasp(folder.name, id, tuple(comparison(found, origin)), not found)
+
+
+def _version_notes(result: BenchmarkResult) -> Sequence[str]:
+    """Packages with another version than in the result."""
+    here = software_versions()
+    return [
+        f"{name} is {here[name]} here, {then} in the result"
+        for name, then in result.document.versions.items()
+        if name in here and here[name] != then
+    ]
