@@ -1,5 +1,6 @@
 from . import (
     arm as arm,
+    benchmark as benchmark,
     cameras as cameras,
     compose as compose,
     dataset as dataset,

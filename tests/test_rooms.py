@@ -46,6 +46,7 @@ ROOMS = [
     "generation",
     "dataset",
     "experiment",
+    "benchmark",
     "compose",
     "ui",
     "apps",

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from burg_drake.benchmark import SUITES, CameraPlacement, make_suite
+from burg_drake.benchmark import SUITES, CameraPlacement, SuiteSettings, make_suite
 from burg_drake.core import data_root
 from burg_drake.generation import sample_scene
 from burg_drake.objects import load_library
@@ -34,7 +34,6 @@ class SuitePlan:
         station: name of the station.
         elevation_deg, distance: of the camera, which looks at the middle of the board from the
             robot's side [degrees, m].
-        within_reach: whether the arm has to be able to grasp every object.
     """
 
     description: str
@@ -43,7 +42,6 @@ class SuitePlan:
     station: str = "panda_tabletop"
     elevation_deg: float = 60.0
     distance: float = 0.75
-    within_reach: bool = False
 
 
 SUITE_PLANS = {
@@ -57,9 +55,7 @@ SUITE_PLANS = {
         "One to twelve objects anywhere on the board", ("random",), (*range(1, 13),)
     ),
     "packed": SuitePlan("Six objects as dense as possible", ("packed",), (6,)),
-    "heap": SuitePlan(
-        "Eight objects dropped in a heap", ("heap",), (8,), elevation_deg=70.0, within_reach=False
-    ),
+    "heap": SuitePlan("Eight objects dropped in a heap", ("heap",), (8,), elevation_deg=70.0),
     "bin": SuitePlan(
         "Six objects dropped into a bin",
         ("heap",),
@@ -68,10 +64,9 @@ SUITE_PLANS = {
         elevation_deg=75.0,
     ),
     "shelf": SuitePlan(
-        "Three objects within reach in a compartment that is roofed over its back half",
+        "Three objects in a compartment that is roofed over its back half",
         ("random",),
         (3,),
-        within_reach=True,
         station="panda_shelf",
         elevation_deg=38.0,
         distance=0.8,
@@ -90,7 +85,6 @@ def sample_scenes_of(name: str, plan: SuitePlan, count: int) -> list[Scene]:
             repeat=True,
             layout=plan.layouts[k % len(plan.layouts)],
             station=plan.station,
-            within_reach=plan.within_reach,
             seed=RELEASE,
         )
         sampled = sample_scene(recipe, library, station, number=k)
@@ -120,11 +114,9 @@ def write_suite(name: str, count: int = 20) -> None:
     make_suite(
         data_root() / SUITES / f"{name}.yaml",
         scenes,
-        station=plan.station,
         cameras=[placement.camera(scenes[0].board)],
-        description=plan.description,
-        release=RELEASE,
-        tuning=TUNING,
+        station=plan.station,
+        settings=SuiteSettings(description=plan.description, release=RELEASE, tuning=TUNING),
     )
 
 

@@ -1,8 +1,54 @@
-"""Benchmarks of grasp planners: suites of scenes, planners, runs, and their comparison.
+"""Benchmarks of grasp planners: suites of scenes, planners, runs, and the comparison of methods.
 
-Read `suite` first, then `benchmark_run`; `burg_planner` is the file that planners copy.
+Read `suite` first, then `benchmark_run`; `burg_planner` is the file that is copied beside a planner.
 """
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, _, _ = lazy_loader.attach_stub(__name__, __file__)
+
+__all__ = [
+    "Attempt",
+    "BenchmarkDocument",
+    "BenchmarkMeasure",
+    "BenchmarkResult",
+    "BenchmarkSettings",
+    "BenchmarkTimes",
+    "Budget",
+    "CameraPlacement",
+    "GraspPlanner",
+    "JudgedAnswer",
+    "MethodComparison",
+    "MethodDifference",
+    "Observation",
+    "PlannerCheck",
+    "PlannerError",
+    "Round",
+    "SceneCamera",
+    "StoredAnswer",
+    "StoredGrasps",
+    "Suite",
+    "SuiteCamera",
+    "SuiteDocument",
+    "SuiteLike",
+    "SuiteScene",
+    "SuiteSettings",
+    "Verification",
+    "VerifiedGrasp",
+    "check_planner",
+    "compare_by_suite",
+    "compare_methods",
+    "episodes",
+    "load_result",
+    "load_suite",
+    "make_suite",
+    "measure_all",
+    "open_planner",
+    "run_benchmark",
+    "verify_result",
+    "write_leaderboard",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

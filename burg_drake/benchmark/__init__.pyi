@@ -1,33 +1,51 @@
 from .benchmark_folder import (
     BenchmarkDocument as BenchmarkDocument,
     BenchmarkResult as BenchmarkResult,
+    BenchmarkTimes as BenchmarkTimes,
     JudgedAnswer as JudgedAnswer,
+    Round as Round,
     StoredAnswer as StoredAnswer,
+    StoredGrasps as StoredGrasps,
     load_result as load_result,
 )
-from .benchmark_run import run_benchmark as run_benchmark
+from .benchmark_run import (
+    BenchmarkSettings as BenchmarkSettings,
+    run_benchmark as run_benchmark,
+)
 from .burg_planner import Observation as Observation
 from .clearing import Attempt as Attempt, episodes as episodes
 from .leaderboard import write_leaderboard as write_leaderboard
-from .measures import MEASURES as MEASURES, Measure as Measure, measure_all as measure_all
+from .measures import BenchmarkMeasure as BenchmarkMeasure, measure_all as measure_all
 from .method_comparison import (
     MethodComparison as MethodComparison,
     MethodDifference as MethodDifference,
     compare_by_suite as compare_by_suite,
     compare_methods as compare_methods,
+    holm as holm,
+    permutation_p_value as permutation_p_value,
 )
 from .method_tables import TableText as TableText, comparison_tables as comparison_tables
 from .observing import SceneCamera as SceneCamera
+from .planner_check import PlannerCheck as PlannerCheck, check_planner as check_planner
+from .planners import (
+    BUILTIN_PLANNERS as BUILTIN_PLANNERS,
+    REFERENCE_FORMS as REFERENCE_FORMS,
+    GraspPlanner as GraspPlanner,
+    PlannerError as PlannerError,
+    open_planner as open_planner,
+    require_websocket_packages as require_websocket_packages,
+    serve_planner as serve_planner,
+)
 from .suite import (
     SUITES as SUITES,
     Budget as Budget,
     CameraPlacement as CameraPlacement,
-    Protocol as Protocol,
     Suite as Suite,
     SuiteCamera as SuiteCamera,
     SuiteDocument as SuiteDocument,
     SuiteLike as SuiteLike,
     SuiteScene as SuiteScene,
+    SuiteSettings as SuiteSettings,
     load_suite as load_suite,
     make_suite as make_suite,
     suite_names as suite_names,

@@ -7,6 +7,7 @@ clear of the scene, on the whole way, if no height below its parts is above them
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,10 @@ from scipy import ndimage, sparse
 from scipy.sparse.csgraph import connected_components
 
 from burg_drake.benchmark.burg_planner import Observation
-from burg_drake.core import Array, Booleans, Indices, inverse, transform_points
+from burg_drake.core import Array, Booleans, Indices, Single, inverse, transform_points
 
+Floats = NDArray[np.floating[Any]]
+"""Numbers of single or double precision."""
 CELL = 0.002
 """Size of a cell of a height map [m]."""
 SURROUNDINGS = 0.15
@@ -104,10 +107,10 @@ def smooth_depth(depth: Array, step: Array) -> Array:
 
 def _pixels(depth: Array) -> tuple[Array, Array]:
     """Columns (1, W) and rows (H, 1) of an image."""
-    return np.arange(depth.shape[1])[None], np.arange(depth.shape[0])[:, None]
+    return np.arange(float(depth.shape[1]))[None], np.arange(float(depth.shape[0]))[:, None]
 
 
-def _points_at(depth: Array, K: Array, column: Array, row: Array) -> Array:
+def _points_at(depth: Floats, K: Array, column: Floats, row: Floats) -> Array:
     """(..., 3) points in the camera's frame at pixels with a depth (...)."""
     x = (column - K[0, 2]) / K[0, 0] * depth
     y = (row - K[1, 2]) / K[1, 1] * depth
@@ -225,8 +228,8 @@ class ApproachView:
 
     R_SV: Array
     origin: Array
-    height: NDArray[np.float32]
-    hidden: NDArray[np.float32]
+    height: Single
+    hidden: Single
 
     @classmethod
     def of(cls, cloud: SceneCloud, R_SV: Array, bounds: Array) -> ApproachView:
@@ -239,9 +242,9 @@ class ApproachView:
         table = -(R_SV[2, 0] * x[:, None] + R_SV[2, 1] * y) / R_SV[2, 2]
         seen = _highest(cloud.p_SP @ R_SV, origin, shape)
         hidden = _highest(cloud.p_SH @ R_SV, origin, shape)
-        # One cell around closes the gaps between points.
-        holes = np.isneginf(seen)
-        seen[holes] = ndimage.maximum_filter(seen, 3)[holes]
+        filled = np.isfinite(seen)
+        gaps = ndimage.binary_closing(filled, np.ones((3, 3))) & ~filled
+        seen[gaps] = ndimage.maximum_filter(seen, 3)[gaps]
         hidden = ndimage.maximum_filter(hidden, 3)
         height = np.maximum(seen, table)
         return cls(
@@ -251,7 +254,7 @@ class ApproachView:
             np.maximum(hidden, height).astype(np.float32),
         )
 
-    def sample(self, values: NDArray[np.float32], x: Array, y: Array) -> NDArray[np.float32]:
+    def sample(self, values: Floats, x: Floats, y: Floats) -> Floats:
         """Values (...) of a map (A, B) at positions (...) in V [m]; at the border outside of it."""
         i = np.rint((x - self.origin[0]) * (1.0 / CELL)).astype(np.int32)
         j = np.rint((y - self.origin[1]) * (1.0 / CELL)).astype(np.int32)

@@ -5,27 +5,28 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
-from burg_drake.benchmark.approach_view import ApproachView, SceneCloud
+from burg_drake.benchmark.approach_view import CELL, ApproachView, SceneCloud
 from burg_drake.benchmark.burg_planner import Observation
-from burg_drake.benchmark.depth_grasps import (
-    CLEARANCE,
-    PALM_HEIGHT,
-    HandFitter,
-    Hands,
-    propose_hands,
-    score_hands,
+from burg_drake.benchmark.depth_grasps import CLEARANCE, plan_hands, score_hands
+from burg_drake.core import Array, Booleans, GraspSet, Indices, make_pose, perpendicular_axes
+from burg_drake.evaluation import INSTANCE_COLUMN, SamplingSettings, sample_grasps, scored_set
+from burg_drake.grasping import (
+    GraspNetSettings,
+    HandClearance,
+    grasp_components,
+    pair_angle,
+    pair_translation,
 )
-from burg_drake.core import Array, GraspSet, Indices, inverse, make_pose, perpendicular_axes
-from burg_drake.evaluation import SamplingSettings, sample_grasps, scored_set
-from burg_drake.grasping import GraspNetSettings, HandClearance, pair_angle, pair_translation
-from burg_drake.grasping import grasp_components
 from burg_drake.motion import ArmReach, ReachSettings
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import Station, StationLike, as_station, build_station_diagram
 
 MAX_GRASPS = 50
 """Largest number of grasps in an answer."""
+MIN_SCORE = 0.02
+"""Grasps with a smaller score are left out of the answer of `antipodal`."""
 TIP_DEPTH = 0.03
 """Depth of the finger tips below the top of an object in `top_down` [m]."""
 
@@ -34,68 +35,82 @@ def antipodal(observation: Observation) -> dict[str, Any]:
     """Plans grasps on the depth image alone, in the manner of GPD; see `depth_grasps`.
 
     Returns:
-        An answer, see `burg_planner`: grasps at least 3 cm or 30 degrees apart, best first.
+        An answer, see `burg_planner`: grasps at least 3 cm or 30 degrees apart.
     """
-    samples = {True: 400, False: 100}  # Points on surfaces, straight from above and tilted.
-    refined = 150  # Hands of each view that are centred and turned once more.
+    steep, tilted = 400, 100  # Points on surfaces at which hands are tried in a view.
     cloud, rng = SceneCloud.of(observation), observation.rng()
     opening, tip = float(observation.hand["opening"][1]), float(observation.hand["tip"])
-    eligible = np.flatnonzero(cloud.cluster >= 0)
-    if not len(eligible):
+    graspable = np.flatnonzero(cloud.cluster >= 0)
+    if not len(graspable):
         return _answer(observation)
     # Small surfaces get more than their share of the points.
-    size = np.bincount(cloud.cluster[eligible])[cloud.cluster[eligible]]
+    weight = np.bincount(cloud.cluster[graspable])[cloud.cluster[graspable]] ** -0.5
+    weight /= weight.sum()
     found: list[tuple[Array, Array, Array]] = []
-    for k, R_SV in enumerate(_approach_frames()):
+    for R_SV in _approach_frames():
+        count = min(steep if R_SV[2, 2] == 1.0 else tilted, len(graspable))
+        rows = rng.choice(graspable, count, replace=False, p=weight)
         view = ApproachView.of(cloud, R_SV, observation.bounds)
-        count = min(samples[k == 0], len(eligible))
-        weight = size**-0.5 / (size**-0.5).sum()
-        chosen = rng.choice(eligible, count, replace=False, p=weight)
-        fitter = HandFitter(view, cloud, opening)
-        places = propose_hands(view, cloud.p_SP[chosen] @ R_SV, cloud.cluster[chosen], opening)
-        hands = fitter.fit(*places)
-        hands = hands[np.argsort(-score_hands(hands, opening), kind="stable")[:refined]]
-        hands = Hands.join([hands, fitter.refine(hands)])
+        hands = plan_hands(view, cloud, rows, opening)
         found.append((hands.poses(R_SV, tip), hands.width, score_hands(hands, opening)))
-        DEBUG.append(hands)
     X_SG, width, score = (np.concatenate(part) for part in zip(*found, strict=True))
     kept = _best_apart(X_SG, score)
-    global LAST
-    LAST = Hands.join(DEBUG)[kept]; DEBUG.clear()
+    kept = kept[score[kept] > MIN_SCORE]
     return _answer(observation, X_SG[kept], width[kept], score[kept])
-DEBUG=[]
 
 
 def top_down(observation: Observation) -> dict[str, Any]:
-    """Plans one grasp straight down on each connected surface, across its shorter axis.
+    """Plans one grasp straight down on each cluster of the height map, across its shorter axis.
+
+    Objects that touch are one cluster; clusters too wide for the hand have no grasp.
 
     Returns:
-        An answer, see `burg_planner`; surfaces too wide for the hand have no grasp.
+        An answer, see `burg_planner`, with better scores for narrow clusters that fingers reach
+        deep into.
     """
-    cloud = SceneCloud.of(observation)
     opening, tip = float(observation.hand["opening"][1]), float(observation.hand["tip"])
+    z = np.array([0.0, 0.0, -1.0])
     found = []
-    for k, p_ST in enumerate(cloud.p_ST):
-        points = cloud.p_SP[cloud.cluster == k]
-        flat = points[:, :2] - p_ST[:2]
-        across = np.linalg.eigh(flat.T @ flat)[1][:, 0]
-        low, high = np.percentile(flat @ across, [1.0, 99.0])
+    for p_SP in _height_clusters(SceneCloud.of(observation)):
+        center = p_SP[:, :2].mean(axis=0)
+        across = np.linalg.eigh(np.cov(p_SP[:, :2].T))[1][:, 0]
+        low, high = np.percentile((p_SP[:, :2] - center) @ across, [1.0, 99.0])
         width = float(high - low)
         if width >= opening:
             continue
-        top = float(np.percentile(points[:, 2], 98.0))
-        depth = min(TIP_DEPTH, PALM_HEIGHT - CLEARANCE, top - CLEARANCE)
+        top = float(np.percentile(p_SP[:, 2], 98.0))
+        depth = min(TIP_DEPTH, top - CLEARANCE)
         x = np.array([*across, 0.0])
-        z = np.array([0.0, 0.0, -1.0])
-        middle = p_ST[:2] + 0.5 * (low + high) * across
-        p_SG = np.array([*middle, top - depth + tip])
+        p_SG = np.array([*(center + 0.5 * (low + high) * across), top - depth + tip])
         X_SG = make_pose(np.stack([x, np.cross(z, x), z], axis=1), p_SG)
         found.append((X_SG, width, (1.0 - width / opening) * depth / TIP_DEPTH))
     if not found:
         return _answer(observation)
     X, widths, scores = (np.array(part) for part in zip(*found, strict=True))
-    best = np.argsort(-scores, kind="stable")[:MAX_GRASPS]
-    return _answer(observation, X[best], widths[best], scores[best])
+    return _answer(observation, X, widths, scores)
+
+
+def _height_clusters(cloud: SceneCloud) -> list[Array]:
+    """Connected clusters of a height map seen from above: for each, its cells as points (N, 3)."""
+    min_cells = 75  # 3 cm^2
+    p_SP = cloud.p_SP[cloud.cluster >= 0]
+    if not len(p_SP):
+        return []
+    border = 3  # Cells around the map, as many as closing needs.
+    cell = np.rint(p_SP[:, :2] / CELL).astype(np.intp)
+    first = cell.min(axis=0) - border
+    cell -= first
+    height = np.zeros(cell.max(axis=0) + border + 1)
+    np.maximum.at(height, tuple(cell.T), p_SP[:, 2])
+    joined = ndimage.binary_closing(height > 0.0, np.ones((3, 3)), iterations=2)
+    label, count = ndimage.label(joined, np.ones((3, 3)))
+    found = []
+    for k in range(1, count + 1):
+        i, j = np.nonzero((label == k) & (height > 0.0))
+        if len(i) >= min_cells:
+            xy = CELL * (first + np.stack([i, j], axis=1))
+            found.append(np.column_stack([xy, height[i, j]]))
+    return found
 
 
 def random_grasps(observation: Observation) -> dict[str, Any]:
@@ -106,10 +121,10 @@ def random_grasps(observation: Observation) -> dict[str, Any]:
     """
     max_tilt = np.deg2rad(60.0)
     cloud, rng = SceneCloud.of(observation), observation.rng()
-    eligible = np.flatnonzero(cloud.cluster >= 0)
-    if not len(eligible):
+    graspable = np.flatnonzero(cloud.cluster >= 0)
+    if not len(graspable):
         return _answer(observation)
-    p_SG = cloud.p_SP[rng.choice(eligible, MAX_GRASPS)]
+    p_SG = cloud.p_SP[rng.choice(graspable, MAX_GRASPS)]
     cosine = rng.uniform(np.cos(max_tilt), 1.0, MAX_GRASPS)
     azimuth, turn = rng.uniform(0.0, 2.0 * np.pi, (2, MAX_GRASPS))
     sine = np.sqrt(1.0 - cosine**2)
@@ -126,11 +141,11 @@ def _answer(
     width: Array | None = None,
     score: Array | None = None,
 ) -> dict[str, Any]:
-    """An answer with grasps (N, 4, 4) in the scene frame, their widths (N,) [m] and scores (N,), in
-    any order; without grasps by default."""
+    """An answer with the best of grasps (N, 4, 4) in the scene frame, in any order, with their
+    widths (N,) [m] and scores (N,); one without grasps by default."""
     if X_SG is None or width is None or score is None:
         return {"X_CG": np.empty((0, 4, 4)), "width": np.empty(0), "score": np.empty(0)}
-    order = np.argsort(-score, kind="stable")
+    order = np.argsort(-score, kind="stable")[:MAX_GRASPS]
     X_CG = observation.X_CS @ X_SG[order]
     return {"X_CG": X_CG, "width": width[order], "score": score[order]}
 
@@ -165,87 +180,92 @@ def _best_apart(X_SG: Array, score: Array) -> Indices:
 
 
 def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> dict[str, Any]:
-    """Plans with the objects' meshes and the arm: what no planner can know from an image.
+    """Plans with the objects' meshes and the arm, which no planner can know from an image.
 
-    Grasps are antipodal, the hand is clear, the arm can execute them, and the analytic quality of
-    the contacts is high. The best grasp of each object comes first, then the second best of each.
+    Grasps are antipodal, the open hand is clear, and the arm can execute them. The best grasp of
+    each object comes first, then the second best of each, and so on; grasps that do not bear the
+    object's weight come last.
 
     Args:
         observation: names the target, if any.
         scene: the scene that was observed.
-        station: station with hand and arm; without an arm, nothing is asked of its reach.
+        station: station with the hand; without an arm, reach is not checked.
 
     Returns:
         An answer, see `burg_planner`.
     """
+    checked = 12  # Grasps of each object whose reach is checked.
+    last = 100.0  # Subtracted from the scores of grasps that come last.
     scene, station = as_scene(scene), as_station(station)
     names = list(scene.instances)
     if observation.target is not None:
         names = [names[observation.target - 1]]
-    if not names:
+    grasps = _clear_grasps(scene, station, names) if names else None
+    if grasps is None or not len(grasps):
         return _answer(observation)
-    grasps = _clear_grasps(scene, station, names)
-    if not len(grasps):
-        return _answer(observation)
-    quality = _quality(scored_set(grasps, scene.library, station, scene))
-    grasps = grasps.with_columns(score=quality)
-    ranked: list[tuple[float, int]] = []
-    arm = None if station.document.arm is None else ArmReach(
+    grasps = scored_set(grasps, scene.library, station, scene)
+    quality, firm = _quality(grasps)
+    X_SG = _poses_in_scene(scene, grasps)
+    arm = _arm_reach(scene, station)
+    rows: list[int] = []
+    scores: list[float] = []
+    for name in names:
+        own = np.flatnonzero(grasps.column(INSTANCE_COLUMN) == name)
+        own = own[_best_apart(X_SG[own], quality[own])[:checked]]
+        if arm is not None and len(own):
+            X_WG = station.document.X_WS.matrix() @ X_SG[own]
+            verdicts = arm.check_all([name] * len(own), X_WG, grasps.width[own])
+            own = own[[verdict.outcome is None for verdict in verdicts]]
+        rows += own.tolist()
+        scores += [quality[row] - k - last * (not firm[row]) for k, row in enumerate(own)]
+    return _answer(observation, X_SG[rows], grasps.width[rows], np.array(scores))
+
+
+def _arm_reach(scene: Scene, station: Station) -> ArmReach | None:
+    """The arm in the scene; None without an arm."""
+    if station.document.arm is None:
+        return None
+    return ArmReach(
         scene, station, settings=ReachSettings(motion=station.document.motion, exact=False)
     )
-    X_SG = _poses_in_scene(scene, grasps)
-    X_WG = station.document.X_WS.matrix() @ X_SG
-    instance = grasps.column("instance")
-    for name in names:
-        rows = np.flatnonzero(instance == name)
-        rows = rows[np.argsort(-quality[rows], kind="stable")]
-        rows = rows[_best_apart(X_SG[rows], quality[rows])[:PER_OBJECT_CHECKED]]
-        if arm is not None and len(rows):
-            verdicts = arm.check_all([name] * len(rows), X_WG[rows], grasps.width[rows])
-            rows = rows[[verdict.outcome is None for verdict in verdicts]]
-        # A whole number for the turn of the grasp among those of its object, and a rest for quality.
-        ranked += [(-place + quality[row] , int(row)) for place, row in enumerate(rows)]
-    ranked.sort(key=lambda one: -one[0])
-    chosen = np.array([row for _, row in ranked[:MAX_GRASPS]], dtype=np.intp)
-    score = np.array([value for value, _ in ranked[:MAX_GRASPS]])
-    return _answer(observation, X_SG[chosen], grasps.width[chosen], score)
-
-
-PER_OBJECT_CHECKED = 12
 
 
 def _poses_in_scene(scene: Scene, grasps: GraspSet) -> Array:
     """(N, 4, 4) `X_SG` of grasps on instances."""
-    X_SO = np.array([scene.X_SO(name) for name in grasps.column("instance").tolist()])
-    return np.asarray(X_SO.reshape(-1, 4, 4) @ grasps.X_OG)
+    names = grasps.column(INSTANCE_COLUMN).tolist()
+    X_SO = {name: scene.X_SO(name) for name in set(names)}
+    return np.asarray(np.array([X_SO[name] for name in names]).reshape(-1, 4, 4) @ grasps.X_OG)
 
 
 def _clear_grasps(scene: Scene, station: Station, names: list[str]) -> GraspSet:
-    """Antipodal grasps at which the open hand is clear; more are tried where few are."""
-    tries, wanted, kept = (300, 1500), 20, 60
+    """Antipodal grasps at which the open hand is clear; more are sampled where few are clear."""
+    counts, wanted, kept = (300, 1000), 20, 60  # Grasps of each object.
     clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
     X_WS = station.document.X_WS.matrix()
     settings = SamplingSettings(blind=True, approach_angle_deg=60.0, approaches=2)
-    found: dict[str, GraspSet] = {}
-    for seed, n in enumerate(tries):
-        few = [name for name in names if name not in found or len(found[name]) < wanted]
-        if not few:
+    parts: list[GraspSet] = []
+    for seed, n in enumerate(counts):
+        if not names:
             break
-        grasps = sample_grasps(scene, station, n, seed=seed, settings=settings, only=few)
+        grasps = sample_grasps(scene, station, n, seed=seed, settings=settings, only=names)
         clear = clearance.is_clear(X_WS @ _poses_in_scene(scene, grasps))
-        for name in few:
-            part = grasps.select(np.flatnonzero(clear & (grasps.column("instance") == name))[:kept])
-            found[name] = GraspSet.concatenate([found[name], part]) if name in found else part
-    return GraspSet.concatenate([found[name] for name in names])
+        owner = grasps.column(INSTANCE_COLUMN)
+        found = {name: np.flatnonzero(clear & (owner == name))[:kept] for name in names}
+        parts += [grasps.select(rows) for rows in found.values()]
+        names = [name for name in names if len(found[name]) < wanted]
+    return GraspSet.concatenate(parts)
 
 
-def _quality(scored: GraspSet) -> Array:
-    """(N,) quality of grasps between 0 and 1, of their analytic metrics and clearance."""
+def _quality(scored: GraspSet) -> tuple[Array, Booleans]:
+    """(N,) quality of grasps between 0 and 1 by analytic metrics and clearance, and (N,) whether
+    the pads hold the object as it is, without slip or turn."""
+
     def share(name: str, full: float) -> Array:
-        values = np.nan_to_num(scored.column(name).astype(float), nan=0.0, posinf=full, neginf=0.0)
+        """(N,) a metric in units of its value that is good enough, at most 1."""
+        values = np.nan_to_num(scored.column(name).astype(float), posinf=full)
         return np.asarray(np.clip(values / full, 0.0, 1.0))
 
-    offset = np.exp(-0.5 * (scored.column("contact_offset") / 0.03) ** 2)
-    quality = share("gravity_margin", 3.0) * share("patch_area", 1e-4) ** 0.5
-    quality = (0.1+share("clearance", 0.005)) * quality * (0.3 + 0.7 * np.nan_to_num(offset))
-    return np.clip(quality, 0.0, 0.99)
+    margin = np.nan_to_num(scored.column("gravity_margin"))
+    firm = (margin > 1.2) & (scored.column("slide") == 0.0)
+    clearance = 0.2 + 0.8 * share("clearance", 0.005)
+    return share("gravity_margin", 3.0) * share("patch_area", 1e-4) ** 0.5 * clearance, firm

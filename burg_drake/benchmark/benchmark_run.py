@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from burg_drake.benchmark.benchmark_folder import (
 )
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
-from burg_drake.benchmark.planners import Planner, PlannerError, open_planner
+from burg_drake.benchmark.planners import GraspPlanner, PlannerError, open_planner
 from burg_drake.benchmark.suite import Protocol, Split, Suite, SuiteCamera, SuiteLike, as_suite
 from burg_drake.core import (
     Array,
@@ -53,9 +54,9 @@ from burg_drake.core import (
     atomic_folder,
     default_workers,
     ensure_writable_folder,
-    map_unordered,
     portable_reference,
     remove_unfinished,
+    setting,
     software_versions,
 )
 from burg_drake.evaluation import (
@@ -77,16 +78,45 @@ from burg_drake.scene import Scene, load_scene, save_scene
 from burg_drake.station import ENGINES, Station, station_gripper
 
 
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkSettings:
+    """Settings of a benchmark.
+
+    Attributes:
+        name: name of the method in tables; the planner's own if empty.
+        protocol: `single`: the answer to each observation is judged. `clear`: of each answer the
+            best grasp that can be executed is executed in simulation; an object that is held is
+            taken away, the others come to rest, and the planner is asked again; until a scene is
+            empty, three attempts in a row fail, or the suite's budget of picks ends.
+        split: the scenes that are observed: those for the `test`, or for `tuning`.
+        depth_only: give the planner no colour images, which need a renderer.
+        settle: engine that judges contested grasps again; none if empty.
+    """
+
+    name: str = setting("", "name of the method in tables (default: the planner's)", metavar="NAME")
+    protocol: Protocol = setting(
+        "single",
+        "single: judge one answer for each image; clear: execute the best feasible grasp, take the"
+        " object away, look again, until the scene is empty",
+        choices=get_args(Protocol),
+    )
+    split: Split = setting(
+        "test", "scenes that count, or those for tuning a planner", choices=get_args(Split)
+    )
+    depth_only: bool = setting(False, "give the planner no colour images, which need a renderer")
+    settle: str = setting(
+        "",
+        "judge contested grasps again with this engine, such as reference (default: none)",
+        metavar="ENGINE",
+    )
+
+
 def run_benchmark(
     suite: SuiteLike,
     planner: str,
     folder: str | Path,
     *,
-    name: str = "",
-    protocol: Protocol = "single",
-    split: Split = "test",
-    depth_only: bool = False,
-    settle: str = "",
+    settings: BenchmarkSettings | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: bool | Listener = True,
@@ -108,14 +138,7 @@ def run_benchmark(
         suite: as loaded, or a reference for `load_suite`.
         planner: see `open_planner`.
         folder: folder of the result; made if need be.
-        name: name of the method in tables; the planner's own if empty.
-        protocol: `single`: the answer to each observation is judged. `clear`: of each answer the
-            best grasp that can be executed is executed in simulation; an object that is held is
-            taken away, the others come to rest, and the planner is asked again; until a scene is
-            empty, three attempts in a row fail, or the suite's budget of picks ends.
-        split: the scenes that are observed.
-        depth_only: give the planner no colour images, which need a renderer.
-        settle: engine that judges contested grasps again; none if empty.
+        settings: the defaults if None.
         workers: number of processes; one per processor if None.
         executor: executor that judges, instead of `workers` processes of this machine.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
@@ -127,34 +150,40 @@ def run_benchmark(
         MissingDependencyError: a renderer or package is missing.
     """
     begun, suite, folder = time.monotonic(), as_suite(suite), Path(folder)
+    settings = settings or BenchmarkSettings()
     if executor is None:
         executor = LocalExecutor.of_this_machine(workers)
     elif workers is not None:
         raise InvalidInputError(
             "give either workers or an executor; an executor has workers of its own"
         )
-    if not suite.scenes(split):
-        raise InvalidInputError(f"{suite.path} has no scenes of split {split!r}")
-    if settle:
-        require_second_engine(settle, ENGINES[suite.document.engine], suite.document.mode)
+    if not suite.scenes(settings.split):
+        raise InvalidInputError(f"{suite.path} has no scenes of split {settings.split!r}")
+    if settings.settle:
+        require_second_engine(settings.settle, ENGINES[suite.document.engine], suite.document.mode)
     with open_planner(planner, time_limit=suite.document.budget.seconds) as opened:
         document = BenchmarkDocument(
             command=current_command(),
-            name=_require_method_name(name or opened.name),
+            name=_require_method_name(settings.name or opened.name),
             planner=opened.reference,
             suite=suite.name,
             release=suite.document.release,
             suite_hash=suite.hash,
-            protocol=protocol,
-            split=split,
-            depth_only=depth_only,
+            protocol=settings.protocol,
+            split=settings.split,
+            depth_only=settings.depth_only,
             versions=software_versions(),
         )
         _require_own_folder(folder, document)
-        with FolderLock(ensure_writable_folder(folder)), Reporter(progress) as reporter:
+        with (
+            FolderLock(ensure_writable_folder(folder)),
+            Reporter(progress) as reporter,
+            WorkerPool(min(executor.workers, default_workers())) as pool,
+        ):
             remove_unfinished(folder)
             result = _open_result(folder, document, suite)
-            return _BenchmarkCall(result, suite, opened, executor, reporter, begun).run(settle)
+            call = _BenchmarkCall(result, suite, opened, executor, reporter, begun, pool)
+            return call.run(settings.settle)
 
 
 def _require_method_name(name: str) -> str:
@@ -203,10 +232,11 @@ class _BenchmarkCall:
 
     result: BenchmarkResult
     suite: Suite
-    planner: Planner
+    planner: GraspPlanner
     executor: Executor
     reporter: Reporter
     begun: float
+    pool: WorkerPool
 
     def run(self, settle: str) -> BenchmarkResult:
         """Goes through the rounds, and returns the complete result."""
@@ -269,11 +299,9 @@ class _BenchmarkCall:
                 if executed is not None:
                     grasp = ExecutedGrasp(round.run_folder(name), answer.ids[executed])
                     work.append((scenes[name], grasp))
-            for (scene, _), after in map_unordered(scene_after, work, default_workers()):
-                if isinstance(after, BaseException):
-                    raise after
-                if scene.name in found:
-                    found[scene.name] = after
+            for after in self.pool.map(scene_after, work):
+                if after.name in found:
+                    found[after.name] = after
             found = {name: scene for name, scene in found.items() if scene.instances}
             if not found:
                 return {}
@@ -312,7 +340,7 @@ class _BenchmarkCall:
             if wanted
         ]
         before = time.monotonic()
-        for scene, observations in _observe(work):
+        for scene, observations in self._observe(work):
             rendering += time.monotonic() - before
             before = time.monotonic()
             for camera, observation in observations.items():
@@ -321,6 +349,17 @@ class _BenchmarkCall:
             planning += time.monotonic() - before
             before = time.monotonic()
         return BenchmarkTimes(rendering=rendering, planning=planning)
+
+    def _observe(
+        self, work: Sequence[_Rendering]
+    ) -> Iterator[tuple[Scene, dict[str, Observation]]]:
+        """Renders observations in processes, a few scenes ahead of the planner."""
+        rendered = Prefetcher(self.pool, work, lambda one: Task(_render, (one,)))
+        while (found := rendered.take()) is not None:
+            one, observations = found
+            if isinstance(observations, BaseException):
+                raise observations
+            yield one.scene, observations
 
     def _ask_once(self, scene: Scene, camera: str, observation: Observation) -> StoredAnswer:
         """Asks the planner once; an answer that cannot be used becomes one with its error."""
@@ -366,19 +405,6 @@ class _Rendering:
     cameras: tuple[SuiteCamera, ...]
     take: int
     depth_only: bool
-
-
-def _observe(work: Sequence[_Rendering]) -> Iterator[tuple[Scene, dict[str, Observation]]]:
-    """Renders observations in processes, a few scenes ahead of the planner."""
-    if not work:
-        return
-    with WorkerPool(min(default_workers(), len(work))) as pool:
-        rendered = Prefetcher(pool, work, lambda one: Task(_render, (one,)))
-        while (found := rendered.take()) is not None:
-            one, observations = found
-            if isinstance(observations, BaseException):
-                raise observations
-            yield one.scene, observations
 
 
 def _render(work: _Rendering) -> dict[str, Observation]:

@@ -9,12 +9,12 @@ formula.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from burg_drake.benchmark.approach_view import CELL, ApproachView, SceneCloud
+from burg_drake.benchmark.approach_view import CELL, ApproachView, Floats, SceneCloud
 from burg_drake.core import Array, Booleans, Indices, make_pose
 
 PAD_HALF_WIDTH = 0.00875
@@ -56,7 +56,6 @@ class Hands:
         depth: depth of the tips below the top between the fingers [m].
         hidden: share of the fingers' footprints in space that the camera does not see.
         hidden_side: share of the ways from finger to object in such space.
-        slack: distance by which the hand could go deeper [m].
         lever: distance of the cluster's middle from the plane through the fingers [m].
         offset: distance of the cluster's middle along the closing direction [m].
         steepness: cosine of the angle between the approach and straight down.
@@ -76,7 +75,6 @@ class Hands:
     depth: Array
     hidden: Array
     hidden_side: Array
-    slack: Array
     lever: Array
     offset: Array
     steepness: Array
@@ -116,6 +114,23 @@ class Hands:
         )
         p_VG = np.stack([self.x, self.y, self.tip + tip], axis=-1)
         return make_pose(R_SV @ R_VG, p_VG @ R_SV.T)
+
+
+def plan_hands(view: ApproachView, cloud: SceneCloud, rows: Indices, opening: float) -> Hands:
+    """Hands at points of a cloud that approach along a view; the best ones centred and turned.
+
+    Args:
+        view: the view.
+        cloud: the cloud of the view.
+        rows: (N,) indices of points of the cloud.
+        opening: largest distance between the pads [m].
+    """
+    refined = 150  # Hands that are fitted a second time.
+    fitter = HandFitter(view, cloud, opening)
+    places = propose_hands(view, cloud.p_SP[rows] @ view.R_SV, cloud.cluster[rows], opening)
+    hands = fitter.fit(*places)
+    best = hands[np.argsort(-score_hands(hands, opening), kind="stable")[:refined]]
+    return Hands.join([best, fitter.refine(best)])
 
 
 def propose_hands(
@@ -168,7 +183,10 @@ def _rectangle(
 ) -> tuple[Array, Array]:
     """Positions (K,) along x and y in a rectangle, at most `step` apart, with its border."""
     x, y = np.meshgrid(
-        *(np.linspace(a, b, int(np.ceil((b - a) / step)) + 1) for a, b in zip(low, high, strict=True))
+        *(
+            np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)
+            for a, b in zip(low, high, strict=True)
+        )
     )
     return x.ravel(), y.ravel()
 
@@ -215,13 +233,13 @@ class HandFitter:
         unseen = self._heights(self._view.hidden, place, grid).reshape(shape)
         beside = self._heights(self._view.hidden, place, self._fingers())
         found = [self._hands(place[:0], lowest[:0], cluster[:0], {})]
-        for raised in RAISES:
+        above_hidden = np.maximum(beside.max(axis=1) + CLEARANCE - lowest, 0.0)
+        for raised in (*RAISES, above_hidden):
             tip = lowest + raised
             chosen = np.flatnonzero(top - tip > MIN_ENGAGEMENT)
             tip = tip[chosen]
             values = {
                 "depth": top[chosen] - tip,
-                "slack": np.full(len(chosen), raised),
                 "hidden": (beside[chosen] > tip[:, None]).mean(axis=1),
                 **_measure_contact(profile[chosen], unseen[chosen], tip, between, rows),
             }
@@ -229,14 +247,14 @@ class HandFitter:
         hands = Hands.join(found)
         return hands[hands.patch > 0.0]
 
-    def _heights(self, values: Array, place: Array, offsets: tuple[Array, ...]) -> Array:
+    def _heights(self, values: Floats, place: Floats, offsets: tuple[Floats, ...]) -> Floats:
         """(N, K) values of a map at offsets (K,) along x and y of the grasps at places (N, 3)."""
         x, y, turn = (column[:, None] for column in place.astype(np.float32).T)
         c, s = np.cos(turn), np.sin(turn)
         dx, dy = (offset.astype(np.float32) for offset in offsets)
         return self._view.sample(values, x + c * dx + s * dy, y + s * dx - c * dy)
 
-    def _lowest_tips(self, place: Array) -> Array:
+    def _lowest_tips(self, place: Floats) -> Floats:
         """(N,) lowest heights of the finger tips at which hands at places (N, 3) are clear [m]."""
         a, b = PALM_HALF_SIZE
         palm = _rectangle((-a, -b), (a, b), 5.0 * CELL)
@@ -267,12 +285,14 @@ class HandFitter:
         return self.fit(x, y, turn, hands.cluster)
 
     def _hands(
-        self, place: Array, tip: Array, cluster: Indices, values: dict[str, Array]
+        self, place: Floats, tip: Floats, cluster: Indices, values: dict[str, Floats]
     ) -> Hands:
+        """Hands at places (N, 3) with measured attributes."""
         x, y, turn = place.T
         p_VT = self._p_VT[cluster]
         dx, dy, c, s = p_VT[:, 0] - x, p_VT[:, 1] - y, np.cos(turn), np.sin(turn)
-        given = {field.name: np.empty(len(x)) for field in fields(Hands)} | values
+        empty = {field.name: np.empty(len(x)) for field in fields(Hands)}
+        given: dict[str, Any] = empty | values
         given |= {"x": x, "y": y, "turn": turn, "tip": tip, "cluster": cluster}
         given["lever"], given["offset"] = np.abs(s * dx - c * dy), np.abs(c * dx + s * dy)
         given["steepness"] = np.full(len(x), self._view.R_SV[2, 2])
@@ -280,8 +300,8 @@ class HandFitter:
 
 
 def _measure_contact(
-    profile: Array, unseen: Array, tip: Array, between: Array, rows: Array
-) -> dict[str, Array]:
+    profile: Floats, unseen: Floats, tip: Floats, between: Floats, rows: Floats
+) -> dict[str, Floats]:
     """Measures what pads meet when they close.
 
     Args:
@@ -309,7 +329,10 @@ def _measure_contact(
     low, high = np.where(some, low, 0.0), np.where(some, high, 0.0)
     touch_low = (left < (low + near)[:, None, None]).mean(axis=(1, 2))
     touch_high = (right > (high - near)[:, None, None]).mean(axis=(1, 2))
-    gaps = np.where(full, left - low[:, None, None], 1.0), np.where(full, high[:, None, None] - right, 1.0)
+    gaps = (
+        np.where(full, left - low[:, None, None], 1.0),
+        np.where(full, high[:, None, None] - right, 1.0),
+    )
     slopes = [
         _fit_slopes(between[side], 1.0 / (1.0 + (gap / near) ** 2), levels, rows)
         for side, gap in zip((first, last), gaps, strict=True)
@@ -329,7 +352,9 @@ def _measure_contact(
     }
 
 
-def _fit_slopes(side: Array, weight: Array, levels: Array, rows: Array) -> tuple[Array, Array]:
+def _fit_slopes(
+    side: Floats, weight: Floats, levels: Floats, rows: Floats
+) -> tuple[Floats, Floats]:
     """Weighted least-squares slopes (N,) of a side (N, L, R) across the closing direction and along
     the approach."""
     found = []
@@ -343,18 +368,24 @@ def _fit_slopes(side: Array, weight: Array, levels: Array, rows: Array) -> tuple
 
 
 def score_hands(hands: Hands, opening: float) -> Array:
-    """(N,) scores of hands between 0 and 1."""
+    """(N,) scores of hands between 0 and 1, for a hand with this largest opening [m].
+
+    The scales follow 223 simulated trials of earlier versions on household objects. Of grasps from
+    straight above 70 % were lifted, 48 % of those at 20 degrees, 6 % of those at 40 degrees; 63 %
+    with a lever below 1 cm, 6 % above 6 cm; 66 % with slopes below 0.1, 13 % above 0.2. Of 137
+    hands with most of a finger in hidden space, 59 % overlapped something.
+    """
     angle = np.arctan(np.stack([hands.slope_low, hands.slope_high])).max(axis=0)
     room = 0.5 * opening - np.maximum(-hands.low, hands.high)
-    arm = np.hypot(hands.lever, hands.offset)
     factors = [
-        np.exp(-0.5 * (angle / 0.25) ** 2),
+        np.exp(-0.5 * (angle / 0.18) ** 2),
         np.clip((hands.patch - 0.25) / 0.4, 0.0, 1.0),
         np.clip((hands.depth - 0.005) / 0.012, 0.0, 1.0),
-        1.0 - 0.6 * hands.hidden,
+        np.clip(1.0 - 1.6 * hands.hidden, 0.05, 1.0),
         1.0 - 0.5 * np.clip(hands.hidden_side, 0.0, 1.0),
-        0.15 + 0.85 * np.exp(-0.5 * (arm / 0.05) ** 2),
-        np.clip(hands.steepness, 0.0, 1.0) ** 0.5,
-        np.clip(room / 0.006, 0.1, 1.0),
+        0.1 + 0.9 * np.exp(-0.5 * (hands.lever / 0.025) ** 2),
+        0.3 + 0.7 * np.exp(-0.5 * (hands.offset / 0.06) ** 2),
+        np.clip(hands.steepness, 0.0, 1.0) ** 4,
+        np.clip(room / 0.008, 0.1, 1.0),
     ]
     return np.asarray(np.prod(factors, axis=0))

@@ -159,7 +159,7 @@ def _text_table(text: TableText) -> Html:
 def _scene_table(comparison: MethodComparison, folder: Path) -> Html:
     """How the best grasp of each method ended, by scene and camera."""
     rows = []
-    for k, (scene, camera) in enumerate(comparison.results[0].cases):
+    for k, (scene, camera) in enumerate(comparison.results[0].rounds[0].cases):
         label = scene if len(comparison.results[0].suite.cameras) == 1 else f"{scene}, {camera}"
         cells = [
             _best_grasp_cell(result, result.answers[k], folder) for result in comparison.results

@@ -12,12 +12,12 @@ import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import FRICTION_COLUMN, BenchmarkResult, JudgedAnswer
 from burg_drake.benchmark.clearing import episodes
-from burg_drake.core import Array, Outcome, Stage, Verdict, clustered_interval
+from burg_drake.core import Array, Booleans, Outcome, Stage, Verdict, clustered_interval
 from burg_drake.grasping import GraspNetSettings
 from burg_drake.simulation import DEFAULT_TRIAL
 
 
-class Measure(NamedTuple):
+class BenchmarkMeasure(NamedTuple):
     """A measure of a benchmark.
 
     Attributes:
@@ -63,7 +63,7 @@ class _Ratio(NamedTuple):
     denominator: Callable[[JudgedAnswer], float]
 
 
-def measure_all(result: BenchmarkResult) -> dict[str, Measure]:
+def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     """All measures of a complete benchmark by name; see `MEASURES`.
 
     Raises:
@@ -76,7 +76,7 @@ def measure_all(result: BenchmarkResult) -> dict[str, Measure]:
     return {name: found[name] for name in MEASURES if name in found}
 
 
-def _clearing_measures(result: BenchmarkResult) -> dict[str, Measure]:
+def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     """Measures of the protocol `clear`. Contested verdicts decide how a scene goes on, so their
     range cannot be told."""
     counts = {one.name: len(one.instances) for one in result.suite.scenes}
@@ -86,9 +86,9 @@ def _clearing_measures(result: BenchmarkResult) -> dict[str, Measure]:
     made = [len(found) for found in attempts.values()]
     emptied = [float(n == all) for n, all in zip(taken, objects, strict=True)]
 
-    def measure(successes: Sequence[float], trials: Sequence[float]) -> Measure:
+    def measure(successes: Sequence[float], trials: Sequence[float]) -> BenchmarkMeasure:
         value = sum(successes) / sum(trials)
-        return Measure(value, *clustered_interval(successes, trials), value, value)
+        return BenchmarkMeasure(value, *clustered_interval(successes, trials), value, value)
 
     return {
         "cleared": measure(taken, objects),
@@ -97,7 +97,7 @@ def _clearing_measures(result: BenchmarkResult) -> dict[str, Measure]:
     }
 
 
-def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> Measure:
+def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> BenchmarkMeasure:
     """A measure with its interval over scenes."""
     scenes = [one.answer.scene for one in answers]
     numbers = {scene: k for k, scene in enumerate(dict.fromkeys(scenes))}
@@ -109,10 +109,10 @@ def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> Measure:
         for counted in (None, False, True)
     ]
     if not whole:
-        return Measure(*[float("nan")] * 5)
+        return BenchmarkMeasure(*[float("nan")] * 5)
     value, least, most = (float(total.sum() / whole) for total in totals)
     low, high = clustered_interval(totals[0].tolist(), trials.tolist())
-    return Measure(value, low, high, least, most)
+    return BenchmarkMeasure(value, low, high, least, most)
 
 
 def precision_at(answer: JudgedAnswer, k: int, contested: Contested = None) -> float:
@@ -141,7 +141,7 @@ def graspnet_ap_of(answer: JudgedAnswer, budget: int) -> float:
     )
 
 
-def _mean_precision(good: Array, budget: int) -> float:
+def _mean_precision(good: Array | Booleans, budget: int) -> float:
     hits = np.zeros(budget)
     hits[: len(good)] = good[:budget]
     return float(np.mean(np.cumsum(hits) / np.arange(1, budget + 1)))

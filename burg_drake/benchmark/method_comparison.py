@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
-from burg_drake.benchmark.measures import Measure, measure_all, precision_at, trial_ap
+from burg_drake.benchmark.measures import BenchmarkMeasure, measure_all, precision_at, trial_ap
 from burg_drake.core import Array, InvalidInputError, list_names
 
 SIGNIFICANCE = 0.05
@@ -55,7 +55,7 @@ class MethodComparison:
     """
 
     results: tuple[BenchmarkResult, ...]
-    measures: Mapping[str, Mapping[str, Measure]]
+    measures: Mapping[str, Mapping[str, BenchmarkMeasure]]
     differences: Mapping[str, tuple[MethodDifference, ...]]
 
     @property
@@ -155,7 +155,7 @@ def permutation_p_value(differences: Array) -> float:
     from scipy.stats import permutation_test
 
     nonzero = differences[differences != 0.0]
-    if not len(nonzero):
+    if len(nonzero) < 2:  # either sign of one difference is as likely
         return 1.0
     found = permutation_test(
         (nonzero,),

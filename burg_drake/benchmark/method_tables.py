@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
-from burg_drake.benchmark.measures import MEASURES, Measure
+from burg_drake.benchmark.measures import MEASURES, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
 from burg_drake.core import NO_VALUE, TextTable, format_duration, format_number
 
@@ -94,7 +94,7 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     return tables
 
 
-def measure_text(measure: Measure) -> str:
+def measure_text(measure: BenchmarkMeasure) -> str:
     """A measure with its interval, and what contested verdicts leave open, in percent."""
     if np.isnan(measure.value):
         return NO_VALUE

@@ -40,8 +40,7 @@ from burg_drake.evaluation import (
     Mistake,
     MistakeFound,
     correct_poses,
-    count_fitting,
-    find_mistake,
+    examine_grasps,
     group_by_instance,
     held_instances,
     width_ratios,
@@ -53,8 +52,6 @@ from burg_drake.station import Station, StationLike, as_station, station_gripper
 
 MAX_CHECKED_GRASPS = 200
 """Number of the best grasps of an answer that are looked at."""
-MAX_SEARCHED_SHARE = 0.9
-"""Share of fitting grasps from which poses are right, and no mistake is searched."""
 
 Ask = Callable[[Observation, Scene, Station], Mapping[str, Any]]
 """Asks a planner; returns its answer, unread."""
@@ -175,9 +172,7 @@ def check_answer(answer: Mapping[str, Any], seen: CheckScene) -> PlannerCheck:
         )
         return PlannerCheck(problems=tuple(problems), time=_time(read))
     search = _PlannerSearch(poses, read, seen)
-    fits, found = search.count_fitting(), None
-    if fits[0] < MAX_SEARCHED_SHARE * fits[1]:
-        found = search.find_mistake()
+    fits, found = search.examine()
     if found is not None:
         problems = problems[:-1] if far else problems
         problems.append(_problem(found, poses, seen))
@@ -211,14 +206,10 @@ class _PlannerSearch:
             self._X_MG = inverse(poses.X_SM) @ read.X_SG[best]
             self._width = read.width[best]
 
-    def count_fitting(self) -> tuple[int, int]:
-        """Number of grasps that fit as returned, and of those that were tried."""
-        return count_fitting(self._as_returned, self._seen.station, self._seen.scene)
-
-    def find_mistake(self) -> MistakeFound | None:
-        """The mistake in the poses, if there is one."""
+    def examine(self) -> tuple[tuple[int, int], MistakeFound | None]:
+        """Number of grasps that fit as returned and of those tried, and the mistake in poses."""
         frames = [*frame_mistakes(self._poses.entry, self._seen.observation)]
-        return find_mistake(self._as_returned, self._seen.station, self._seen.scene, frames)
+        return examine_grasps(self._as_returned, self._seen.station, self._seen.scene, frames)
 
     def width_problems(self, found: MistakeFound | None) -> list[str]:
         """What is wrong with the widths, after the correction of the poses."""
@@ -399,10 +390,11 @@ def _matrix_text(X: Array) -> str:
 
 def _fit_notes(fits: tuple[int, int]) -> tuple[str, ...]:
     """A note if so few grasps fit that frames cannot be told to be right."""
-    min_share = 1.0 / 3.0
+    min_tried, min_share = 3, 1.0 / 3.0
     count, tried = fits
-    if tried >= 3 and count >= min_share * tried:
-        return ()
+    if count >= min_share * tried:
+        few = f"Only {count} of {tried} grasps fit, too few to be sure that the frames are right."
+        return () if tried >= min_tried else (few,)
     return (
         f"Cannot tell whether the frames are right: {count} of {tried} grasps fit as returned, and"
         " no usual mistake explains why.",

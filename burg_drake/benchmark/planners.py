@@ -115,7 +115,7 @@ REFERENCE_FORMS: Mapping[str, str] = {
 """Examples of references to other planners, and what each refers to."""
 
 
-def open_planner(reference: str, *, time_limit: float = 60.0) -> Planner:
+def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
     """Opens a planner; use it in a `with` block.
 
     Built-in planners and functions run in a process of their own, with one thread for linear
@@ -168,7 +168,7 @@ def _unknown_planner(reference: str) -> UnknownNameError:
     ).about("planner")
 
 
-class Planner(abc.ABC):
+class GraspPlanner(abc.ABC):
     """A planner that can be asked; made by `open_planner`. Ask from one thread at a time.
 
     Attributes:
@@ -243,7 +243,7 @@ class _AnswerFailure(Exception):
 # --- functions, in a worker process ---------------------------------------------------------------
 
 
-class _FunctionPlanner(Planner):
+class _FunctionPlanner(GraspPlanner):
     def __init__(
         self, loader: FunctionLoader, name: str, time_limit: float, *, knows_meshes: bool = False
     ) -> None:
@@ -330,7 +330,7 @@ class _FunctionPlanner(Planner):
 # --- programs -------------------------------------------------------------------------------------
 
 
-class _CommandPlanner(Planner):
+class _CommandPlanner(GraspPlanner):
     def __init__(self, reference: str, time_limit: float) -> None:
         try:
             self._words = shlex.split(reference.removeprefix("command:"))
@@ -436,7 +436,7 @@ def require_websocket_packages() -> None:
             )
 
 
-def serve_planner(planner: Planner, port: int, host: str = "127.0.0.1") -> None:
+def serve_planner(planner: GraspPlanner, port: int, host: str = "127.0.0.1") -> None:
     """Serves a planner over a websocket until the process is interrupted.
 
     Args:
@@ -467,7 +467,7 @@ def serve_planner(planner: Planner, port: int, host: str = "127.0.0.1") -> None:
         ).about("host") from error
 
 
-class _ServedPlanner(Planner):
+class _ServedPlanner(GraspPlanner):
     def __init__(self, reference: str, time_limit: float) -> None:
         require_websocket_packages()
         try:

@@ -82,6 +82,8 @@ class SuiteCamera:
         color: whether it takes colour images, which need a renderer.
     """
 
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
     name: str = "front"
     X_SC: Pose
     sensor: str = "d435"
@@ -212,6 +214,8 @@ class SuiteDocument:
         scenes: the scenes.
     """
 
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
     version: int = 1
     name: str
     release: int = 1
@@ -231,7 +235,7 @@ class SuiteDocument:
         require_name(self.name, "name")
         if self.engine not in ENGINES:
             raise FieldError(
-                f"engine {self.engine!r} does not exist; give one of {list_names(ENGINES)}",
+                f"engine {self.engine!r} does not exist; give one of {list_names(list(ENGINES))}",
                 "engine",
             )
         for key, items in (("cameras", self.cameras), ("scenes", self.scenes)):
@@ -378,35 +382,52 @@ def _used_objects(library: ObjectLibrary, scenes: Sequence[SuiteScene]) -> dict[
     return {name: library.content[name][:HASH_DIGITS] for name in sorted(used)}
 
 
+@dataclass(frozen=True, kw_only=True)
+class SuiteSettings:
+    """How a suite is made of scenes.
+
+    Attributes:
+        description, release, budget, mode, engine: see `SuiteDocument`.
+        tuning: number of scenes, the last ones, on which planners may be tuned.
+    """
+
+    description: str = ""
+    release: int = 1
+    budget: Budget = Budget()
+    mode: Mode = "reach"
+    engine: str = DEFAULT_ENGINE
+    tuning: int = 0
+
+
 def make_suite(
     path: str | Path,
     scenes: Sequence[SceneLike],
     *,
-    station: StationLike = "panda_tabletop",
     cameras: Sequence[SuiteCamera],
-    name: str = "",
-    description: str = "",
-    release: int = 1,
-    budget: Budget = Budget(),
-    mode: Mode = "reach",
-    engine: str = DEFAULT_ENGINE,
-    tuning: int = 0,
+    station: StationLike = "panda_tabletop",
+    settings: SuiteSettings | None = None,
 ) -> Suite:
     """Writes a suite of existing scenes, and loads it.
 
+    Example::
+
+        scenes = [burg.load_scene(name) for name in ("tabletop_six", "tabletop_close")]
+        camera = burg.benchmark.CameraPlacement().camera(scenes[0].board)
+        suite = burg.benchmark.make_suite("mine.yaml", scenes, cameras=[camera])
+
     Args:
-        path: file to write.
-        scenes: scenes that share one library; two of the same name are numbered.
-        station: station of all scenes.
+        path: file to write; the suite has its name.
+        scenes: scenes that share one library; a second one of the same name is numbered.
         cameras: cameras that observe each scene.
-        name: name of the suite; that of the file if empty.
-        description, release, budget, mode, engine: see `SuiteDocument`.
-        tuning: number of scenes, the last ones, on which planners may be tuned.
+        station: station of all scenes.
+        settings: the defaults if None.
 
     Raises:
         InvalidInputError: a scene is invalid on the station, or scenes have different libraries.
     """
     path, loaded, station = Path(path), [as_scene(scene) for scene in scenes], as_station(station)
+    settings = settings or SuiteSettings()
+    tuning = settings.tuning
     if not 0 <= tuning < len(loaded):
         raise InvalidInputError(
             f"{tuning} of {len(loaded)} scenes are for tuning; leave one or more to test"
@@ -414,8 +435,8 @@ def make_suite(
     roots = {scene.library.root.resolve() for scene in loaded}
     if len(roots) > 1:
         raise InvalidInputError(
-            f"the scenes have objects of {len(roots)} libraries ({list_names(map(str, roots))});"
-            " give scenes of one library"
+            f"the scenes have objects of {len(roots)} libraries"
+            f" ({list_names(sorted(map(str, roots)))}); give scenes of one library"
         )
     for scene in loaded:
         require_valid_scene(scene, station)
@@ -433,16 +454,16 @@ def make_suite(
         )
     )
     document = SuiteDocument(
-        name=name or path.stem,
-        release=release,
-        description=description,
+        name=path.stem,
+        release=settings.release,
+        description=settings.description,
         library=_reference(library.root, "models", folder),
         station=_reference(station.path, "stations", folder),
         board=loaded[0].board,
         cameras=tuple(cameras),
-        budget=budget,
-        mode=mode,
-        engine=engine,
+        budget=settings.budget,
+        mode=settings.mode,
+        engine=settings.engine,
         objects=_used_objects(library, entries),
         station_content=station.content[:HASH_DIGITS],
         scenes=entries,

@@ -29,6 +29,8 @@ DOCUMENT_KINDS = {
     "run": "burg_drake.evaluation.run_document:RunDocument",
     "campaign": "burg_drake.evaluation.run_document:CampaignDocument",
     "plans": "burg_drake.evaluation.feasibility:PlansDocument",
+    "suite": "burg_drake.benchmark.suite:SuiteDocument",
+    "benchmark": "burg_drake.benchmark.benchmark_folder:BenchmarkDocument",
     "gap": "burg_drake.experiment.gap.gap_steps:GapDocument",
     "export": "burg_drake.export.scene_export:ExportRecord",
 }

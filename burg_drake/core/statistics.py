@@ -36,9 +36,7 @@ def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
     return lower, upper
 
 
-def clustered_interval(
-    successes: Sequence[float], trials: Sequence[float]
-) -> tuple[float, float]:
+def clustered_interval(successes: Sequence[float], trials: Sequence[float]) -> tuple[float, float]:
     """95 % interval for a proportion whose trials come in clusters that may differ, such as scenes:
     the linearised variance of a ratio of totals (W. G. Cochran, Sampling Techniques, 1977, ch. 6)
     with Student's quantile; never narrower than Wilson's, which takes all trials as independent.

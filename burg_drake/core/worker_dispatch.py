@@ -162,12 +162,13 @@ class Worker:
 
     def kill(self) -> None:
         """Ends the process and, if it leads a group, its child processes."""
-        if self.process is None or self.process.poll() is not None:
+        process = self.process  # the pool's thread may forget it meanwhile
+        if process is None or process.poll() is not None:
             return
         if self.own_group:
             with contextlib.suppress(ProcessLookupError):  # it does not lead a group yet
-                os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.kill()
+                os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
 
     def exit_error(self) -> tuple[WorkerDied, bool]:
         """The cause of the process's end, and whether a time limit ended it; waits for the end."""

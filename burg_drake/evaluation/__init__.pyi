@@ -123,7 +123,7 @@ from .grasp_sets.input import (
     station_reference as station_reference,
 )
 from .grasp_sets.mistake_search import (
-    count_fitting as count_fitting,
+    examine_grasps as examine_grasps,
     find_mistake as find_mistake,
     mistake_notes as mistake_notes,
     width_ratios as width_ratios,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,13 +10,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.benchmark.baselines import antipodal, random_grasps, top_down
+from burg_drake.benchmark.baselines import antipodal, oracle, random_grasps, top_down
 from burg_drake.benchmark.burg_planner import Observation, observation_id
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 Array = NDArray[np.float64]
+Plan = Callable[[Observation], dict[str, Any]]
+PLANS: tuple[Plan, ...] = (antipodal, top_down, random_grasps)
 
-SIZE = (480, 640)
-K = np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]])
+SIZE = (240, 320)
+K = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
 BOUNDS = np.array([[0.0, 0.0, 0.0], [0.5, 0.4, 0.4]])
 TIP = 0.0095
 HAND = {"name": "hand", "opening": [0.0, 0.08], "tip": TIP, "X_HG": np.eye(4).tolist()}
@@ -107,6 +112,12 @@ def both() -> Observation:
     return observe(cast_box, cast_cylinder, noise=0.001)
 
 
+@pytest.fixture(scope="module")
+def answers(both: Observation) -> dict[Plan, dict[str, Any]]:
+    """Answers of all planners to `both`."""
+    return {plan: plan(both) for plan in PLANS}
+
+
 def distances(X_SG: Array) -> tuple[Array, Array]:
     """(N,) horizontal distances of grasps from the middles of box and cylinder [m]."""
     p = X_SG[:, :2, 3]
@@ -114,13 +125,12 @@ def distances(X_SG: Array) -> tuple[Array, Array]:
     return box, np.linalg.norm(p - CYLINDER_MIDDLE, axis=1)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.001])
-def test_antipodal_closes_across_the_short_side_of_a_box(noise: float) -> None:
-    observation = observe(cast_box, noise=noise)
+def test_antipodal_closes_across_the_short_side_of_a_box() -> None:
+    observation = observe(cast_box, noise=0.001)
     answer = antipodal(observation)
     X_SG = in_scene(observation, answer)[:3]
     assert (np.abs(X_SG[:, :3, 0] @ box_short_side()) > np.cos(np.deg2rad(12.0))).all()
-    assert answer["width"][:3] == pytest.approx(0.04, abs=0.006)
+    assert answer["width"][:3] == pytest.approx(0.04, abs=0.008)
     across = (X_SG[:, :3, 3] - BOX_MIDDLE) @ box_short_side()
     steep = X_SG[:, 2, 2] < -0.99
     assert steep.any()
@@ -137,8 +147,10 @@ def test_antipodal_closes_on_the_diameter_of_a_cylinder() -> None:
     assert (tips(X_SG)[..., 2].mean(axis=1) < CYLINDER_HEIGHT - 0.01).all()
 
 
-def test_open_fingers_are_clear_of_table_and_objects(both: Observation) -> None:
-    answer = antipodal(both)
+def test_open_fingers_are_clear_of_table_and_objects(
+    both: Observation, answers: dict[Plan, dict[str, Any]]
+) -> None:
+    answer = answers[antipodal]
     X_SG = in_scene(both, answer)
     assert 10 <= len(X_SG) <= 50
     corners = np.array(
@@ -158,65 +170,75 @@ def test_open_fingers_are_clear_of_table_and_objects(both: Observation) -> None:
     assert not (near & (p_SP[..., 2] < CYLINDER_HEIGHT)).any()
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
-def test_answers_are_poses_best_first_that_approach_the_scene(plan: Any, both: Observation) -> None:
-    answer = plan(both)
+@pytest.mark.parametrize("plan", PLANS)
+def test_answers_are_poses_best_first_that_approach_the_scene(
+    plan: Plan, both: Observation, answers: dict[Plan, dict[str, Any]]
+) -> None:
+    answer = answers[plan]
     X_CG, n = answer["X_CG"], len(answer["score"])
     assert X_CG.shape == (n, 4, 4)
     assert answer["width"].shape == (n,)
     R = X_CG[:, :3, :3]
-    np.testing.assert_allclose(R.transpose(0, 2, 1) @ R, np.broadcast_to(np.eye(3), R.shape), atol=1e-9)
+    np.testing.assert_allclose(
+        R.transpose(0, 2, 1) @ R, np.broadcast_to(np.eye(3), R.shape), atol=1e-9
+    )
     np.testing.assert_allclose(np.linalg.det(R), 1.0)
     assert (np.diff(answer["score"]) <= 0.0).all()
     assert (X_CG[:, 2, 2] > 0.0).all()  # away from the camera
     assert (in_scene(both, answer)[:, 2, 2] < -0.49).all()  # within 60 degrees of straight down
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
-def test_equal_observations_get_equal_answers(plan: Any, both: Observation) -> None:
-    first, second = plan(both), plan(replace(both))
+@pytest.mark.parametrize("plan", PLANS)
+def test_equal_observations_get_equal_answers(
+    plan: Plan, both: Observation, answers: dict[Plan, dict[str, Any]]
+) -> None:
+    first, second = answers[plan], plan(replace(both))
     for name in ("X_CG", "width", "score"):
         np.testing.assert_array_equal(first[name], second[name])
 
 
-def test_random_grasps_follow_the_id_of_the_observation(both: Observation) -> None:
-    other = replace(both, id="f" * 64)
-    assert not np.allclose(random_grasps(both)["X_CG"], random_grasps(other)["X_CG"])
+def test_random_grasps_follow_the_id_of_the_observation(
+    both: Observation, answers: dict[Plan, dict[str, Any]]
+) -> None:
+    other = random_grasps(replace(both, id="f" * 64))
+    assert not np.allclose(answers[random_grasps]["X_CG"], other["X_CG"])
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
+@pytest.mark.parametrize("plan", PLANS)
 def test_a_move_of_the_whole_world_changes_nothing_for_the_camera(
-    plan: Any, both: Observation
+    plan: Plan, both: Observation, answers: dict[Plan, dict[str, Any]]
 ) -> None:
     X = np.eye(4)
     X[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     X[:3, 3] = [1.0, -2.0, 0.5]
     moved = replace(both, X_WC=X @ both.X_WC, X_WS=X @ both.X_WS)
-    np.testing.assert_allclose(plan(moved)["X_CG"], plan(both)["X_CG"], atol=1e-6)
+    np.testing.assert_allclose(plan(moved)["X_CG"], answers[plan]["X_CG"], atol=1e-6)
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
+@pytest.mark.parametrize("plan", PLANS)
 @pytest.mark.parametrize("target", [1, 2])
-def test_grasps_are_on_the_target(plan: Any, target: int, both: Observation) -> None:
+def test_grasps_are_on_the_target(plan: Plan, target: int, both: Observation) -> None:
     observation = replace(both, target=target)
     box, cylinder = distances(in_scene(observation, plan(observation)))
     assert len(box) > 0
     assert ((box < cylinder) == (target == 1)).all()
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
-def test_an_empty_table_gives_no_grasps(plan: Any) -> None:
+@pytest.mark.parametrize("plan", PLANS)
+def test_an_empty_table_gives_no_grasps(plan: Plan) -> None:
     assert plan(observe(noise=0.001))["X_CG"].shape == (0, 4, 4)
 
 
-@pytest.mark.parametrize("plan", [antipodal, top_down, random_grasps])
-def test_an_image_without_depth_gives_no_grasps(plan: Any, both: Observation) -> None:
+@pytest.mark.parametrize("plan", PLANS)
+def test_an_image_without_depth_gives_no_grasps(plan: Plan, both: Observation) -> None:
     empty = replace(both, depth=np.zeros(SIZE, np.float32))
     assert plan(empty)["X_CG"].shape == (0, 4, 4)
 
 
-def test_top_down_holds_each_object_across_its_short_axis(both: Observation) -> None:
-    answer = top_down(both)
+def test_top_down_holds_each_object_across_its_short_axis(
+    both: Observation, answers: dict[Plan, dict[str, Any]]
+) -> None:
+    answer = answers[top_down]
     X_SG = in_scene(both, answer)
     np.testing.assert_allclose(X_SG[:, :3, 2], np.tile([0.0, 0.0, -1.0], (2, 1)), atol=1e-9)
     box, cylinder = distances(X_SG)
@@ -229,7 +251,7 @@ def test_top_down_holds_each_object_across_its_short_axis(both: Observation) -> 
 
 def test_a_wall_beside_the_box_keeps_the_fingers_away() -> None:
     def cast_wall(origin: Array, rays: Array) -> Array:
-        """A wall of 15 cm along y, one finger's room from where the fingers go otherwise."""
+        """Distance (...) to a wall of 15 cm along y, which leaves no room for the whole palm."""
         o, d = origin - np.array([0.05, 0.2, 0.075]), rays
         with np.errstate(divide="ignore"):
             ends = np.stack([(s * np.array([0.02, 0.6, 0.15]) / 2 - o) / d for s in (-1.0, 1.0)])
@@ -241,6 +263,29 @@ def test_a_wall_beside_the_box_keeps_the_fingers_away() -> None:
     X_SG = in_scene(observation, answer)
     assert len(X_SG)
     palm = np.array([[x, y, TIP - 0.05, 1.0] for x in (-0.1, 0.1) for y in (-0.02, 0.02)])
-    p_SP = np.einsum("nij,kj->nki", X_SG, np.concatenate([palm]))[..., :3]
+    p_SP = np.einsum("nij,kj->nki", X_SG, palm)[..., :3]
     inside = (np.abs(p_SP[..., 0] - 0.05) < 0.01) & (p_SP[..., 2] < 0.15)
     assert not inside.any()
+
+
+def test_oracle_holds_its_target_on_opposite_sides() -> None:
+    station, scene = load_station("panda_tabletop"), load_scene("tabletop_six")
+    target = list(scene.instances).index("screwdriver") + 1
+    observation = replace(observe(), target=target)  # the oracle does not look at the image
+    answer = oracle(observation, scene, station)
+    X_SG = in_scene(observation, answer)
+    assert 2 <= len(X_SG) <= 50
+    assert (np.diff(answer["score"]) <= 0.0).all()
+    X_OG = np.linalg.inv(scene.X_SO("screwdriver")) @ X_SG
+    mesh = scene.library.surface(scene.instance("screwdriver").object)
+    for X, width in zip(X_OG, answer["width"], strict=True):
+        across = X[:3, 0]
+        ends = []
+        for side in (-1.0, 1.0):  # from each finger inwards
+            origin = X[:3, 3] + side * 0.06 * across
+            p, _, face = mesh.ray.intersects_location([origin], [-side * across])
+            nearest = np.linalg.norm(p - origin, axis=1).argmin()
+            ends.append(p[nearest])
+            cosine = side * mesh.face_normals[face[nearest]] @ across
+            assert cosine > np.cos(np.deg2rad(45.0))
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(width, abs=1e-3)

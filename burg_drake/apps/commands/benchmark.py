@@ -7,9 +7,9 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
-from burg_drake import benchmark, core
+from burg_drake import benchmark, core, evaluation
 from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark, show_progress
 
@@ -121,31 +121,10 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
         " list`)",
     )
     options.add_output(parser, "RESULT", "folder of the result")
-    parser.add_argument(
-        "--name", default="", help="name of the method in tables (default: the planner's)"
-    )
-    parser.add_argument(
-        "--protocol",
-        choices=get_args(benchmark.Protocol),
-        default="single",
-        help="single: judge one answer for each image; clear: execute the best feasible grasp, take"
-        " the object away, look again, until the scene is empty (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--tuning",
-        action="store_true",
-        help="use the scenes for tuning, which do not count, not those for the test",
-    )
-    parser.add_argument(
-        "--depth-only",
-        action="store_true",
-        help="give the planner no colour images, which need a renderer",
-    )
-    parser.add_argument(
-        "--settle",
-        metavar="ENGINE",
-        default="",
-        help="judge contested grasps again with this engine, such as reference",
+    options.add_settings_options(
+        parser,
+        benchmark.BenchmarkSettings,
+        *("name", "protocol", "split", "depth_only", "settle"),
     )
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)
@@ -160,11 +139,7 @@ def run_benchmark_run(arguments: argparse.Namespace) -> int:
             arguments.suite,
             arguments.planner,
             arguments.output,
-            name=arguments.name,
-            protocol=arguments.protocol,
-            split="tuning" if arguments.tuning else "test",
-            depth_only=arguments.depth_only,
-            settle=arguments.settle,
+            settings=options.settings_from(arguments, benchmark.BenchmarkSettings),
             workers=arguments.workers,
             executor=executor,
             progress=not arguments.quiet,
@@ -282,8 +257,6 @@ def run_benchmark_verify(arguments: argparse.Namespace) -> int:
 
 def add_benchmark_new_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake benchmark new`."""
-    from burg_drake.apps.commands.scene_sampling import add_recipe_options
-
     parser.epilog = options.examples_text(
         "burg-drake benchmark new my_suite.yaml --scenes scenes/",
         "burg-drake benchmark new my_suite.yaml --sample my_library:50 -n 6 --spacing close",
@@ -311,7 +284,7 @@ def add_benchmark_new_options(parser: options.Parser) -> None:
         default=0,
         help="the last N scenes are for tuning and do not count (default: %(default)d)",
     )
-    add_recipe_options(parser, with_count=False)
+    options.add_recipe_options(parser, with_count=False)
     options.add_quiet(parser)
 
 
@@ -329,10 +302,13 @@ def run_benchmark_new(arguments: argparse.Namespace) -> int:
     suite = benchmark.make_suite(
         arguments.suite,
         scenes,
-        station=station,
         cameras=[placement.camera(scenes[0].board)],
-        budget=options.settings_from(arguments, benchmark.Budget),
-        tuning=arguments.tuning_scenes,
+        station=station,
+        settings=benchmark.SuiteSettings(
+            budget=options.settings_from(arguments, benchmark.Budget),
+            mode=evaluation.mode_for(station),
+            tuning=arguments.tuning_scenes,
+        ),
     )
     print(f"wrote {suite.path}: {core.count_with_noun(len(scenes), 'scene')}, hash {suite.hash}")
     return 0
@@ -345,7 +321,6 @@ def _sample_scenes(arguments: argparse.Namespace, station: Station) -> list[Scen
         InvalidInputError: fewer scenes than asked for were accepted.
     """
     from burg_drake import generation
-    from burg_drake.apps.commands.scene_sampling import recipe_from_options
     from burg_drake.objects import load_library
     from burg_drake.scene import load_scene
 
@@ -356,16 +331,14 @@ def _sample_scenes(arguments: argparse.Namespace, station: Station) -> list[Scen
         show_progress("sampling", "scenes", count, quiet=arguments.quiet) as meter,
     ):
         chosen = argparse.Namespace(**{**vars(arguments), "library": name})
-        recipe = recipe_from_options(chosen, library, station, Path(folder))
+        recipe = options.recipe_from_options(chosen, library, station, Path(folder))
         found = generation.sample_scenes(
             *(recipe, library, station, folder, count),
             workers=arguments.workers,
             progress=lambda _: meter.step(),
         )
-        files = [
-            Path(folder, f"scene_{k:04d}.yaml") for k, row in found.rows.items() if row.accepted
-        ]
-        if len(files) < count:
+        accepted = [number for number, row in found.rows.items() if row.accepted]
+        if len(accepted) < count:
             raise core.InvalidInputError(
                 f"only {len(accepted)} of {count} scenes were accepted; ask for fewer objects, a"
                 " larger board or more --attempts"

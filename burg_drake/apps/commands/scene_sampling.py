@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from burg_drake import core, generation
 from burg_drake.apps import options
@@ -27,121 +26,6 @@ def require_another_file(scene: Path, output: str) -> None:
     """
     if os.path.realpath(output) == os.path.realpath(scene):
         raise core.InvalidInputError(f"-o {output} is the scene itself; choose another file")
-
-
-def add_recipe_options(parser: Any, *, with_count: bool = True) -> None:
-    """Adds the options of a recipe.
-
-    Args:
-        parser: parser that gets the options.
-        with_count: whether an option gives the number of scenes.
-    """
-    _add_object_options(parser, with_count=with_count)
-    _add_layout_options(parser)
-    _add_rule_options(parser)
-
-
-def _add_object_options(parser: Any, *, with_count: bool) -> None:
-    from burg_drake.scene import SceneRecipe
-
-    group = parser.add_argument_group("objects")
-    group.add_argument(
-        "-n",
-        metavar="N",
-        dest="objects",
-        type=options.positive_int,
-        default=SceneRecipe.count,
-        help="objects in a scene (default: %(default)d)",
-    )
-    group.add_argument(
-        "--only", metavar="A,B", type=options.names, action="extend", help="only these objects"
-    )
-    options.add_settings_options(group, SceneRecipe, "repeat", "poses", "seed")
-    if with_count:
-        group.add_argument(
-            "--count",
-            metavar="N",
-            type=options.positive_int,
-            default=1,
-            help="number of scenes (default: %(default)d)",
-        )
-    options.add_workers(group, "worker processes (default: %(default)d)", default=1)
-
-
-def _add_layout_options(parser: Any) -> None:
-    other_layouts = ("random", "packed", "heap")  # Layouts with an option of their own.
-    from burg_drake.scene import LAYOUT_NAMES, SceneRecipe
-
-    group = parser.add_argument_group("layout")
-    group.add_argument(
-        "--size",
-        metavar="SIZE",
-        default="A2",
-        help="size of the board: A4 to A0, or WxH in mm (default: %(default)s)",
-    )
-    group.add_argument("--portrait", action="store_true", help="board in portrait format")
-    layout_group = group.add_mutually_exclusive_group()
-    layout_group.add_argument(
-        "--spacing",
-        choices=[name for name in LAYOUT_NAMES if name not in other_layouts],
-        help="space between objects: 40 mm, 2 to 10 mm, or contact (default: random)",
-    )
-    layout_group.add_argument("--packed", action="store_true", help="pack objects side by side")
-    layout_group.add_argument("--heap", action="store_true", help="drop objects in a heap")
-    options.add_settings_options(group, SceneRecipe, "tries", "fewer", "settle")
-
-
-def _add_rule_options(parser: Any) -> None:
-    from burg_drake.scene import SceneRecipe
-
-    group = parser.add_argument_group("rules")
-    options.add_station(group)
-    options.add_settings_options(group, SceneRecipe, "within_reach")
-    options.add_settings_options(group, SceneRecipe, "clear_grasps", "visible_from", unset=True)
-    options.add_settings_options(group, SceneRecipe, "attempts")
-
-
-def recipe_from_options(
-    arguments: argparse.Namespace, library: ObjectLibrary, station: Station, folder: Path
-) -> SceneRecipe:
-    """The recipe from options, with references relative to a folder."""
-    max_objects = 1000
-    from burg_drake.scene import Board, SceneRecipe
-
-    if arguments.objects > max_objects:
-        raise core.InvalidInputError(
-            f"-n {arguments.objects}: a scene has {max_objects} objects at most"
-        )
-    layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
-    return options.settings_from(
-        arguments,
-        SceneRecipe,
-        library=core.name_or_reference(arguments.library, "models", library.root, folder),
-        count=arguments.objects,
-        only=tuple(sorted(set(arguments.only or ()))),
-        board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
-        layout=layout or "random",
-        station=core.name_or_reference(arguments.station, "stations", station.path, folder),
-    )
-
-
-def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
-    """Extents of a board along x and y [m]: A4 to A0, landscape unless upright, or WxH in mm.
-
-    Raises:
-        UnknownNameError: there is no such size.
-    """
-    from burg_drake.compose import BOARD_SIZES, board_size
-
-    own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", size.lower())
-    if own:
-        return float(own[1]) * 1e-3, float(own[2]) * 1e-3
-    if size.upper() not in BOARD_SIZES:
-        known = core.suggest_names(size, BOARD_SIZES)
-        raise core.UnknownNameError(
-            f"board size {size!r} does not exist; {known}; or give WxH in mm, such as 700x500"
-        )
-    return board_size(size.upper(), upright=upright)
 
 
 def add_scene_sample_options(parser: options.Parser) -> None:
@@ -165,7 +49,7 @@ def add_scene_sample_options(parser: options.Parser) -> None:
         help="folder of a library, or the built-in household",
     )
     options.add_output(parser, "SCENES", "folder to write, or for one scene a file (.yaml)")
-    add_recipe_options(parser)
+    options.add_recipe_options(parser)
     parser.add_argument(
         "--again",
         metavar="SCENE",
@@ -199,7 +83,9 @@ def run_scene_sample(arguments: argparse.Namespace) -> int:
         )
     library, station = load_library(arguments.library), load_station(arguments.station)
     output = Path(arguments.output)
-    recipe = recipe_from_options(arguments, library, station, output.parent if single else output)
+    recipe = options.recipe_from_options(
+        arguments, library, station, output.parent if single else output
+    )
     if single:
         return _sample_one(arguments, recipe, library, station)
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
@@ -282,7 +168,7 @@ def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
         InvalidInputError: such an option is given.
     """
     parser = argparse.ArgumentParser(add_help=False)
-    add_recipe_options(parser)
+    options.add_recipe_options(parser)
     for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
             raise core.InvalidInputError(

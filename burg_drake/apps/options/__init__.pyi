@@ -57,6 +57,10 @@ from .grasp_files import (
     print_notes as print_notes,
     station_from_options as station_from_options,
 )
+from .scene_recipes import (
+    add_recipe_options as add_recipe_options,
+    recipe_from_options as recipe_from_options,
+)
 from .settings_options import (
     add_settings_options as add_settings_options,
     settings_from as settings_from,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -30,7 +30,7 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     usual_mistakes,
 )
 from burg_drake.evaluation.run_folder import Run, load_run
-from burg_drake.formats import GRASP_FORMATS, GraspFormat, Gripper, PoseFrame
+from burg_drake.formats import GRASP_FORMATS, GraspFormat, PoseFrame
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import Station, StationLike, as_station
@@ -98,45 +98,57 @@ def find_mistake(
         together show none, the likely mistake of the first object whose own grasps show one. None
         if there is none.
     """
-    held = {name: part for name, part in grasps.items() if len(part)}
-    if not held:
-        return None
-    from burg_drake.station import station_gripper
-
-    station = as_station(station)
-    source = source if isinstance(source, ObjectLibrary) else as_scene(source)
-    gripper = station_gripper(station)
-    if found := _find_common_mistake(_MistakeSearch(held, station, source, gripper, frames)):
-        return found
-    many = {name: part for name, part in held.items() if len(part) >= MIN_LIKELY_GRASPS}
-    for name, part in many.items() if len(held) > 1 else ():
-        search = _MistakeSearch({name: part}, station, source, gripper, frames)
-        found = _find_common_mistake(search)
-        if found and found.is_likely:  # among many objects, one may show a mistake by chance
-            return replace(found, only=name)
-    return None
+    search = _open_search(grasps, station, source, frames)
+    return None if search is None else _find_mistake(search)
 
 
-def count_fitting(
-    grasps: Mapping[str, GraspSet], station: StationLike, source: SceneLike | ObjectLibrary
-) -> tuple[int, int]:
-    """Number of grasps that fit their object, and number of the grasps that were examined.
+def examine_grasps(
+    grasps: Mapping[str, GraspSet],
+    station: StationLike,
+    source: SceneLike | ObjectLibrary,
+    frames: Sequence[Mistake] | None = None,
+) -> tuple[tuple[int, int], MistakeFound | None]:
+    """Counts the grasps that fit, and finds the common mistake unless nearly all fit.
 
     A grasp fits if the open hand is clear of the object and the pads close on it.
 
     Args:
-        grasps, station, source: see `find_mistake`.
+        grasps, station, source, frames: see `find_mistake`.
+
+    Returns:
+        Number of grasps that fit as read and number of those that were examined, and the mistake.
     """
+    search = _open_search(grasps, station, source, frames)
+    if search is None:
+        return (0, 0), None
+    fits = search.fitting_as_read(), search.count
+    nearly_all = fits[0] >= MistakeLimits.min_share_about * fits[1]
+    return fits, None if nearly_all else _find_mistake(search)
+
+
+def _open_search(
+    grasps: Mapping[str, GraspSet],
+    station: StationLike,
+    source: SceneLike | ObjectLibrary,
+    frames: Sequence[Mistake] | None,
+) -> _MistakeSearch | None:
+    """The search over all grasps; None if there are none."""
     held = {name: part for name, part in grasps.items() if len(part)}
     if not held:
-        return 0, 0
-    from burg_drake.station import station_gripper
-
-    station = as_station(station)
+        return None
     source = source if isinstance(source, ObjectLibrary) else as_scene(source)
-    search = _MistakeSearch(held, station, source, station_gripper(station))
-    alone, _ = search.fits(())
-    return int(alone.sum()), search.count
+    return _MistakeSearch(held, as_station(station), source, frames)
+
+
+def _find_mistake(search: _MistakeSearch) -> MistakeFound | None:
+    """The mistake of all grasps, or else the likely mistake of the grasps of one object."""
+    if found := _find_common_mistake(search):
+        return found
+    for name, part in search.parts():
+        found = _find_common_mistake(part)
+        if found and found.is_likely:  # among many objects, one may show a mistake by chance
+            return replace(found, only=name)
+    return None
 
 
 def _find_common_mistake(search: _MistakeSearch) -> MistakeFound | None:
@@ -295,12 +307,14 @@ class _MistakeSearch:
         grasps: Mapping[str, GraspSet],
         station: Station,
         source: Scene | ObjectLibrary,
-        gripper: Gripper,
         frames: Sequence[Mistake] | None = None,
     ) -> None:
+        from burg_drake.station import station_gripper
+
+        self._given, self._station, self._source = grasps, station, source
         self._frames = frames
+        self._gripper = gripper = station_gripper(station)
         self._scene = source if isinstance(source, Scene) else None
-        self._gripper = gripper
         self._test = _FitTest(station, source)
         first = next(iter(grasps.values()))
         how = first.provenance
@@ -370,12 +384,27 @@ class _MistakeSearch:
         alone = alone.reshape(shape)
         return alone, None if clear is None else alone & clear.reshape(shape)
 
+    def parts(self) -> Iterator[tuple[str, _MistakeSearch]]:
+        """Searches over the grasps of each of several objects with many grasps, by its name."""
+        for name, part in self._given.items() if len(self._given) > 1 else ():
+            if len(part) >= MIN_LIKELY_GRASPS:
+                yield name, _MistakeSearch({name: part}, self._station, self._source, self._frames)
+
+    @cached_property
+    def _as_read(self) -> tuple[Owners, Array]:
+        """Instances or objects of the grasps as read, and the grasps in object frames."""
+        return self._in_object_frames(self._X_MG[None])[0]
+
+    def fitting_as_read(self) -> int:
+        """Number of grasps that fit their object as read."""
+        return int(self._test(*self._as_read)[0].sum())
+
     @cached_property
     def closing_share(self) -> float:
         """Share of the grasps as read at which the pads close on the object, regardless of
         collisions.
         """
-        return float(self._test.pads_close(*self._in_object_frames(self._X_MG[None])[0]).mean())
+        return float(self._test.pads_close(*self._as_read).mean())
 
     def keeps_closing_line(self, mistake: Mistake) -> bool:
         """Whether a correction keeps the closing line of the fingers."""
@@ -437,6 +466,8 @@ class _MistakeSearch:
             least = max(
                 MistakeLimits.min_fitting_closing, MistakeLimits.min_share_about * self.count
             )
+        elif mistake.is_known_offset and self._fit_only_after(before, n):
+            least = MistakeLimits.min_share_about * self.count
         else:
             return False
         if n < least or n >= MistakeLimits.min_gain * before.sum():

@@ -235,6 +235,11 @@ class Mistake:
         return bool(self.correction) and all(name.startswith(kinds) for name in self.correction)
 
     @property
+    def is_known_offset(self) -> bool:
+        """Whether it only moves the grasp frame of a file to the origin of another known frame."""
+        return bool(self.forward) and not self.turn and not self.step
+
+    @property
     def changes_reading(self) -> bool:
         """Whether it changes how rotations and poses are read, without a distance."""
         return bool(self.correction) and not self.forward

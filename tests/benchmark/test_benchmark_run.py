@@ -1,0 +1,179 @@
+"""Runs of benchmarks from image to verdict: what is written, repeated, resumed and verified."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import burg_drake as burg
+from burg_drake.benchmark import (
+    BenchmarkResult,
+    BenchmarkSettings,
+    Budget,
+    CameraPlacement,
+    Suite,
+    SuiteSettings,
+    compare_by_suite,
+    comparison_tables,
+    episodes,
+    load_result,
+    make_suite,
+    measure_all,
+    run_benchmark,
+    verify_result,
+    write_leaderboard,
+)
+from burg_drake.core import InvalidInputError, Outcome, Pose
+from burg_drake.scene import Board, Instance, Scene, SceneDocument
+
+pytestmark = pytest.mark.physics
+
+PLANNERS = "tests.benchmark.scripted_planners"
+DEPTH = BenchmarkSettings(depth_only=True)
+
+
+def cans(name: str, *places: tuple[float, float], board: Board = Board()) -> Scene:
+    """Standing cans at places of the board."""
+    library = burg.load_library("household")
+    height = library.entry("can").lower[2]
+    instances = tuple(
+        Instance(name=f"can_{k}", object="can", X_SO=Pose((x, y, -height)))
+        for k, (x, y) in enumerate(places)
+    )
+    document = SceneDocument(name=name, library="household", board=board, instances=instances)
+    return Scene(document, library, Path(f"{name}.yaml"))
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> Suite:
+    """Two scenes of cans, of which one has a small board."""
+    small = Board(size=(0.42, 0.297))
+    scenes = [cans("two", (0.2, 0.2), (0.4, 0.2)), cans("one", (0.2, 0.15), board=small)]
+    camera = CameraPlacement(exact_depth=True).camera(Board())
+    camera = replace(camera, size=(212, 120))
+    return make_suite(
+        tmp_path_factory.mktemp("suite") / "cans.yaml",
+        scenes,
+        cameras=[camera],
+        settings=SuiteSettings(budget=Budget(grasps=3, seconds=30.0, picks=4), engine="screening"),
+    )
+
+
+@pytest.fixture(scope="module")
+def cleared(suite: Suite, tmp_path_factory: pytest.TempPathFactory) -> BenchmarkResult:
+    folder = tmp_path_factory.mktemp("results") / "cleared"
+    settings = replace(DEPTH, protocol="clear", name="cans")
+    return run_benchmark(
+        suite, f"{PLANNERS}:plan_cans", folder, settings=settings, workers=1, progress=False
+    )
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Answers and journals of a result, which hold all that was found."""
+    patterns = ("**/answers/*.npz", "**/scenes/*.yaml")
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for pattern in patterns
+        for path in folder.glob(pattern)
+    }
+
+
+def outcomes(result: BenchmarkResult) -> list[tuple[str, list[str]]]:
+    return [
+        (one.answer.scene, [str(v and v.outcome) for v in one.verdicts]) for one in result.answers
+    ]
+
+
+def test_scenes_are_cleared_object_by_object(cleared: BenchmarkResult) -> None:
+    attempts = episodes(cleared)
+    assert [len(made) for made in attempts.values()] == [2, 1]
+    assert all(one.succeeded for made in attempts.values() for one in made)
+    measures = measure_all(cleared)
+    assert measures["cleared"].value == measures["pick_success"].value == 1.0
+    second = burg.load_scene(cleared.rounds[1].path / "scenes" / "two.yaml")
+    assert len(second.instances) == 1
+    (left,) = second.instances
+    first = burg.load_scene(cleared.rounds[0].run_folder("two") / "scene.yaml")
+    assert np.allclose(second.X_SO(left), first.X_SO(left), atol=1e-4)
+
+
+def test_a_complete_result_is_not_asked_for_again(cleared: BenchmarkResult, suite: Suite) -> None:
+    before = files(cleared.path)
+    settings = replace(DEPTH, protocol="clear", name="cans")
+    again = run_benchmark(
+        suite, f"{PLANNERS}:plan_cans", cleared.path, settings=settings, workers=1, progress=False
+    )
+    assert files(again.path) == before and outcomes(again) == outcomes(cleared)
+
+
+def test_results_can_be_shared_and_verified(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    copy = tmp_path / "moved"
+    shutil.copytree(cleared.path, copy)
+    found = verify_result(copy, count=2, workers=1, progress=False)
+    assert len(found.grasps) == 2 and not found.differing
+
+
+def test_a_changed_answer_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    copy = tmp_path / "changed"
+    shutil.copytree(cleared.path, copy)
+    shutil.copy(copy / "answers" / "two.front.npz", copy / "answers" / "one.front.npz")
+    with pytest.raises(InvalidInputError, match="not those of the answers"):
+        verify_result(copy, count=1, workers=1, progress=False)
+
+
+def test_a_planner_that_fails_costs_its_own_answer(suite: Suite, tmp_path: Path) -> None:
+    found = run_benchmark(
+        suite,
+        f"{PLANNERS}:plan_by_count",
+        tmp_path / "result",
+        settings=DEPTH,
+        workers=2,
+        progress=False,
+    )
+    assert {one.answer.scene: one.answer.error != "" for one in found.answers} == {
+        "two": False,
+        "one": True,
+    }
+    assert "KeyError" in next(one.answer.error for one in found.answers if one.answer.error)
+    assert outcomes(found)[0] == ("two", [Outcome.LIFTED.value] * 2)
+
+
+def test_tables_and_page_name_all_methods(
+    cleared: BenchmarkResult, suite: Suite, tmp_path: Path
+) -> None:
+    bad = run_benchmark(
+        suite,
+        f"{PLANNERS}:plan_in_the_air",
+        tmp_path / "air",
+        settings=replace(DEPTH, protocol="clear", name="air"),
+        workers=1,
+        progress=False,
+    )
+    assert [len(made) for made in episodes(bad).values()] == [3, 3]  # given up
+    (comparison,) = compare_by_suite([bad, cleared])
+    assert comparison.names == ["cans", "air"]
+    text = "\n".join(table.markdown() for table in comparison_tables(comparison))
+    assert "| cans | 100 (34-100) |" in text and "| air | 0 (0-66) |" in text
+    page = write_leaderboard([comparison], tmp_path / "page.html").read_text()
+    assert page.count("<table") == 5 and "no contact" in page
+
+
+def test_another_benchmark_in_the_folder_is_refused(cleared: BenchmarkResult, suite: Suite) -> None:
+    with pytest.raises(InvalidInputError, match="protocol is clear there, single here"):
+        run_benchmark(
+            suite, f"{PLANNERS}:plan_cans", cleared.path, settings=replace(DEPTH, name="cans")
+        )
+
+
+def test_an_unfinished_result_says_how_to_finish_it(
+    cleared: BenchmarkResult, tmp_path: Path
+) -> None:
+    copy = tmp_path / "open"
+    shutil.copytree(cleared.path, copy)
+    (copy / "answers" / "one.front.npz").unlink()
+    with pytest.raises(InvalidInputError, match=r"answers/one\.front\.npz is missing"):
+        measure_all(load_result(copy))
