@@ -1,6 +1,6 @@
 """Benchmarks of grasp planners: suites of scenes, planners, runs, and the comparison of methods.
 
-Read `suite` first, then `benchmark_run`; `burg_planner` is the file that is copied beside a planner.
+Read `suite` first, then `benchmark_run`. The file `burg_planner` is copied beside planners.
 """
 
 import lazy_loader

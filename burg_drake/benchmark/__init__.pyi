@@ -1,3 +1,16 @@
+from .answers import (
+    AnswerError as AnswerError,
+    FarGraspsError as FarGraspsError,
+    PlannedGrasps as PlannedGrasps,
+    frame_mistakes as frame_mistakes,
+    read_answer as read_answer,
+)
+from .baselines import (
+    antipodal as antipodal,
+    oracle as oracle,
+    random_grasps as random_grasps,
+    top_down as top_down,
+)
 from .benchmark_folder import (
     BenchmarkDocument as BenchmarkDocument,
     BenchmarkResult as BenchmarkResult,
@@ -12,7 +25,7 @@ from .benchmark_run import (
     BenchmarkSettings as BenchmarkSettings,
     run_benchmark as run_benchmark,
 )
-from .burg_planner import Observation as Observation
+from .burg_planner import Observation as Observation, observation_id as observation_id
 from .clearing import Attempt as Attempt, episodes as episodes
 from .leaderboard import write_leaderboard as write_leaderboard
 from .measures import BenchmarkMeasure as BenchmarkMeasure, measure_all as measure_all
@@ -24,9 +37,15 @@ from .method_comparison import (
     holm as holm,
     permutation_p_value as permutation_p_value,
 )
-from .method_tables import TableText as TableText, comparison_tables as comparison_tables
+from .method_tables import comparison_tables as comparison_tables
 from .observing import SceneCamera as SceneCamera
-from .planner_check import PlannerCheck as PlannerCheck, check_planner as check_planner
+from .planner_check import (
+    CheckScene as CheckScene,
+    PlannerCheck as PlannerCheck,
+    check_answer as check_answer,
+    check_planner as check_planner,
+    make_check_scene as make_check_scene,
+)
 from .planners import (
     BUILTIN_PLANNERS as BUILTIN_PLANNERS,
     REFERENCE_FORMS as REFERENCE_FORMS,

@@ -30,6 +30,10 @@ MAX_PIXEL_STEPS = 5.0
 between their points on a surface that faces the camera."""
 
 
+EDGE_PIXELS = 5
+"""Width of the strip beside an edge in which depth is a mixture of both sides [pixels]."""
+
+
 @dataclass(frozen=True, eq=False)
 class SceneCloud:
     """Points of a depth image in the scene frame, without those of the table.
@@ -59,9 +63,10 @@ class SceneCloud:
         near = (p_SP > low - SURROUNDINGS) & (p_SP < high + SURROUNDINGS)
         solid = near.all(axis=-1) & (p_SP[..., 2] > MIN_HEIGHT) & measured
         inside = solid & ((p_SP > low) & (p_SP < high)).all(axis=-1)
+        beside_fixed = ndimage.binary_dilation(solid & ~inside, iterations=EDGE_PIXELS)
         if observation.target is not None and observation.segmentation is not None:
             inside &= observation.segmentation == observation.target
-        label = _label_surfaces(depth, inside, step)
+        label = _label_surfaces(depth, inside, step, beside_fixed)
         rows = np.flatnonzero(ndimage.binary_dilation(near.all(axis=-1)).any(axis=1))
         if not len(rows):
             empty = np.empty((0, 3))
@@ -117,11 +122,12 @@ def _points_at(depth: Floats, K: Array, column: Floats, row: Floats) -> Array:
     return np.stack([x, y, depth], axis=-1)
 
 
-def _label_surfaces(depth: Array, chosen: Booleans, step: Array) -> Indices:
+def _label_surfaces(depth: Array, chosen: Booleans, step: Array, beside_fixed: Booleans) -> Indices:
     """(H, W) number of the surface of each chosen pixel, -1 for the others.
 
     Neighbouring pixels are on one surface if their depths differ by less than `step` (H, W).
-    Surfaces of a few pixels are left out.
+    Surfaces of a few pixels are left out, and those with most pixels in `beside_fixed` (H, W), which
+    are edges of walls and shelves, measured with noise.
     """
     min_pixels = 30
     label = np.full(depth.shape, -1, dtype=np.intp)
@@ -138,8 +144,10 @@ def _label_surfaces(depth: Array, chosen: Booleans, step: Array) -> Indices:
     i, j = np.concatenate(links, axis=1)
     n = int(chosen.sum())
     count, found = connected_components(sparse.coo_array((np.ones(len(i)), (i, j)), (n, n)), False)
-    large = np.bincount(found, minlength=count) >= min_pixels
-    renamed = np.where(large, np.cumsum(large) - 1, -1)
+    size = np.bincount(found, minlength=count)
+    fixed = np.bincount(found[beside_fixed[chosen]], minlength=count) > 0.5 * size
+    kept = (size >= min_pixels) & ~fixed
+    renamed = np.where(kept, np.cumsum(kept) - 1, -1)
     label[chosen] = renamed[found]
     return label
 

@@ -275,11 +275,6 @@ def _is_executed(verdict: Verdict | None) -> bool:
 class BenchmarkResult:
     """A benchmark of one planner on one suite.
 
-    Example::
-
-        result = burg.benchmark.load_result("results/antipodal")
-        print(result.measures["top_success"])
-
     Attributes:
         path: folder of the benchmark.
         document: contents of benchmark.yaml.

@@ -132,7 +132,7 @@ def run_benchmark(
     Example::
 
         result = burg.benchmark.run_benchmark("tabletop", "antipodal", "results/antipodal")
-        print(result.measures["top_success"])
+        print(burg.benchmark.measure_all(result)["top_success"])
 
     Args:
         suite: as loaded, or a reference for `load_suite`.

@@ -58,8 +58,8 @@ from burg_drake.core import (
 )
 
 if TYPE_CHECKING:
-    from burg_drake.scene import Scene
-    from burg_drake.station import Station
+    from burg_drake.scene import SceneLike
+    from burg_drake.station import StationLike
 
 LOADING_TIMEOUT = 300.0
 """Seconds to import a planner's module, with the models that it loads."""
@@ -185,8 +185,8 @@ class GraspPlanner(abc.ABC):
     def ask(
         self,
         observation: Observation,
-        scene: Scene | None = None,
-        station: Station | None = None,
+        scene: SceneLike | None = None,
+        station: StationLike | None = None,
     ) -> dict[str, Any]:
         """The planner's answer: arrays, texts and numbers by name, with `time` [s]; not checked.
 
@@ -216,7 +216,7 @@ class GraspPlanner(abc.ABC):
 
     @abc.abstractmethod
     def _answer(
-        self, observation: Observation, scene: Scene | None, station: Station | None
+        self, observation: Observation, scene: SceneLike | None, station: StationLike | None
     ) -> dict[str, Any]:
         """The answer.
 
@@ -292,7 +292,7 @@ class _FunctionPlanner(GraspPlanner):
             raise
 
     def _answer(
-        self, observation: Observation, scene: Scene | None, station: Station | None
+        self, observation: Observation, scene: SceneLike | None, station: StationLike | None
     ) -> dict[str, Any]:
         if self.knows_meshes and (scene is None or station is None):
             raise InvalidInputError(f"planner {self.reference} needs the scene and the station")
@@ -351,7 +351,7 @@ class _CommandPlanner(GraspPlanner):
         super().__init__(reference, name, time_limit)
 
     def _answer(
-        self, observation: Observation, scene: Scene | None, station: Station | None
+        self, observation: Observation, scene: SceneLike | None, station: StationLike | None
     ) -> dict[str, Any]:
         with tempfile.TemporaryDirectory(
             prefix="burg_planner_", ignore_cleanup_errors=True
@@ -485,7 +485,7 @@ class _ServedPlanner(GraspPlanner):
         super().__init__(reference, name or reference, time_limit)
 
     def _answer(
-        self, observation: Observation, scene: Scene | None, station: Station | None
+        self, observation: Observation, scene: SceneLike | None, station: StationLike | None
     ) -> dict[str, Any]:
         try:
             return self._remote.plan(observation)

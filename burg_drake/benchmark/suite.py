@@ -251,11 +251,6 @@ class SuiteDocument:
 class Suite:
     """A suite with its library, station and scenes at hand.
 
-    Example::
-
-        suite = burg.benchmark.load_suite("tabletop")
-        print(suite.hash, list(suite.scenes()))
-
     Attributes:
         document: contents of the suite file.
         library, station: library and station of the scenes.

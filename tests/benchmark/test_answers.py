@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.benchmark.answers import (
+from burg_drake.benchmark import (
     AnswerError,
     FarGraspsError,
+    Observation,
     PlannedGrasps,
     frame_mistakes,
     read_answer,
 )
-from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.core import BurgError
 from burg_drake.formats import PANDA_GRIPPER
 

@@ -10,8 +10,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.benchmark.baselines import antipodal, oracle, random_grasps, top_down
-from burg_drake.benchmark.burg_planner import Observation, observation_id
+from burg_drake.benchmark import (
+    Observation,
+    antipodal,
+    observation_id,
+    oracle,
+    random_grasps,
+    top_down,
+)
 from burg_drake.scene import load_scene
 from burg_drake.station import load_station
 

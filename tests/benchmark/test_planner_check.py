@@ -6,7 +6,6 @@ SciPy, and share nothing with the search for them.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import re
 from collections.abc import Callable, Iterator
@@ -18,15 +17,15 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from burg_drake import benchmark
-from burg_drake.apps.commands.planner_check import run_planner_check
-from burg_drake.benchmark.planner_check import (
+from burg_drake.apps import main
+from burg_drake.benchmark import (
     CheckScene,
     PlannerCheck,
+    PlannerError,
     check_answer,
     check_planner,
     make_check_scene,
 )
-from burg_drake.benchmark.planners import PlannerError
 from burg_drake.objects import ObjectLibrary
 
 Poses = np.ndarray
@@ -411,13 +410,12 @@ def test_the_command_prints_problems(
     monkeypatch.setattr(benchmark, "open_planner", open_planner, raising=False)
     monkeypatch.setattr(benchmark, "check_planner", check_planner, raising=False)
     monkeypatch.setattr("burg_drake.benchmark.planner_check.make_check_scene", lambda station: seen)
-    options = {"station": "panda_tabletop", "time_limit": 7.0}
-    assert run_planner_check(argparse.Namespace(planner="turned", **options)) == 1
+    assert main(["planner", "check", "turned", "--time-limit", "7"]) == 1
     first, second, problem, line = capsys.readouterr().out.splitlines()
     assert first == "turned: 10 grasps of a carton and a can in 250 ms"
     assert second.startswith("  0 of 10 fit as returned")
     assert problem.startswith("problem: The grasps are turned around: z points out of the scene")
     assert line.startswith("    X_SG = X_SG @ np.array([[1, 0, 0, 0],")
-    assert run_planner_check(argparse.Namespace(planner="right", **options)) == 0
+    assert main(["planner", "check", "right", "--time-limit", "7"]) == 0
     out = capsys.readouterr().out
     assert "  10 of 10 fit as returned" in out and out.endswith("  no problem found\n")
