@@ -126,7 +126,7 @@ def _label_surfaces(depth: Array, chosen: Booleans, step: Array, beside_fixed: B
     """(H, W) number of the surface of each chosen pixel, -1 for the others.
 
     Neighbouring pixels are on one surface if their depths differ by less than `step` (H, W).
-    Surfaces of a few pixels are left out, and those with most pixels in `beside_fixed` (H, W), which
+    Surfaces of a few pixels are left out, and those with most pixels in `beside_fixed` (H, W): they
     are edges of walls and shelves, measured with noise.
     """
     min_pixels = 30

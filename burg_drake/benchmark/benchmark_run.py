@@ -7,11 +7,13 @@ interrupted benchmark goes on where it stopped.
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from concurrent.futures import Future
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -339,15 +341,19 @@ class _BenchmarkCall:
             for name, wanted in missing.items()
             if wanted
         ]
+        stored: list[Future[None]] = []
         before = time.monotonic()
         for scene, observations in self._observe(work):
             rendering += time.monotonic() - before
             before = time.monotonic()
             for camera, observation in observations.items():
-                self._ask_once(scene, camera, observation).save(round.path)
+                answer = self._ask_once(scene, camera, observation, round.path)
+                stored.append(self.pool.submit(_store_answer, answer))
                 meter.step()
             planning += time.monotonic() - before
             before = time.monotonic()
+        for one in stored:
+            one.result()
         return BenchmarkTimes(rendering=rendering, planning=planning)
 
     def _observe(
@@ -361,32 +367,77 @@ class _BenchmarkCall:
                 raise observations
             yield one.scene, observations
 
-    def _ask_once(self, scene: Scene, camera: str, observation: Observation) -> StoredAnswer:
-        """Asks the planner once; an answer that cannot be used becomes one with its error."""
-        gripper, budget = station_gripper(self.suite.station), self.suite.document.budget
+    def _ask_once(
+        self, scene: Scene, camera: str, observation: Observation, folder: Path
+    ) -> _Answer:
+        """Asks the planner once."""
         begun = time.monotonic()
+        found = _Answer(
+            scene=scene,
+            station=self.suite.station,
+            camera=camera,
+            observation=replace(observation, color=None, segmentation=None),
+            count=self.suite.document.budget.grasps,
+            folder=folder,
+        )
         try:
             raw = self.planner.ask(observation, scene, self.suite.station)
-            planned = read_answer(raw, observation, gripper)
-        except (PlannerError, AnswerError) as error:
-            return StoredAnswer(
-                scene=scene.name,
-                camera=camera,
-                grasps=_with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", camera),
-                observation=observation.id,
-                seconds=time.monotonic() - begun,
-                error=str(error),
-            )
-        grasps = choose_grasps(scene, planned, gripper, budget.grasps, camera)
-        return StoredAnswer(
-            scene=scene.name,
-            camera=camera,
-            grasps=_with_friction_needed(grasps, scene, self.suite.station),
-            observation=observation.id,
-            seconds=planned.time,
-            answered=len(planned.score),
-            notes=planned.notes,
-        )
+        except PlannerError as error:
+            return replace(found, error=str(error), seconds=time.monotonic() - begun)
+        return replace(found, raw=raw)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Answer:
+    """A planner's answer to an observation, as it came.
+
+    Attributes:
+        scene, station, camera: what was observed, and by which camera.
+        observation: the observation, without colours and segmentation.
+        count: largest number of grasps that are judged.
+        folder: folder of the round.
+        raw: the answer; empty if there is none.
+        error: why there is none.
+        seconds: time until the error [s].
+    """
+
+    scene: Scene
+    station: Station
+    camera: str
+    observation: Observation
+    count: int
+    folder: Path
+    raw: Mapping[str, Any] = field(default_factory=dict)
+    error: str = ""
+    seconds: float = math.nan
+
+
+def _store_answer(answer: _Answer) -> None:
+    """Reads an answer and writes the grasps that are judged; an answer that cannot be used becomes
+    one without grasps that has its error."""
+    gripper, seconds, error = station_gripper(answer.station), answer.seconds, answer.error
+    grasps = _with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", answer.camera)
+    answered = 0
+    notes: tuple[str, ...] = ()
+    if not error:
+        try:
+            planned = read_answer(answer.raw, answer.observation, gripper)
+        except AnswerError as refused:
+            error = str(refused)
+        else:
+            seconds, answered, notes = planned.time, len(planned.score), planned.notes
+            grasps = choose_grasps(answer.scene, planned, gripper, answer.count, answer.camera)
+            grasps = _with_friction_needed(grasps, answer.scene, answer.station)
+    StoredAnswer(
+        scene=answer.scene.name,
+        camera=answer.camera,
+        grasps=grasps,
+        observation=answer.observation.id,
+        seconds=seconds,
+        answered=answered,
+        error=error,
+        notes=notes,
+    ).save(answer.folder)
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,8 @@ TURNS = 12
 """Directions in which the hand closes, over half a turn."""
 LEVELS = (0.003, 0.010, 0.018, 0.028)
 """Depths below a sampled point in which the width of the object is measured [m]."""
+MAX_RISE = 0.02
+"""Height above a sampled point from which on something is another body, such as a shelf [m]."""
 MIN_ENGAGEMENT = 0.006
 """Smallest depth of the finger tips below the top of what is between the fingers [m]."""
 RAISES = (0.0, 0.005, 0.010, 0.016, 0.024)
@@ -48,6 +50,7 @@ class Hands:
         turn: angle of the closing direction about z of V, from x [rad].
         tip: height of the finger tips in V [m].
         cluster: surface on which the placement was sampled.
+        point: height in V of the point at which it was sampled [m].
         low, high: position of the outermost solid along the closing direction [m].
         slope_low, slope_high: tangent of the angle between the closing direction and the normals
             of the two sides.
@@ -66,6 +69,7 @@ class Hands:
     turn: Array
     tip: Array
     cluster: Indices
+    point: Array
     low: Array
     high: Array
     slope_low: Array
@@ -135,8 +139,8 @@ def plan_hands(view: ApproachView, cloud: SceneCloud, rows: Indices, opening: fl
 
 def propose_hands(
     view: ApproachView, p_VP: Array, cluster: Indices, opening: float
-) -> tuple[Array, Array, Array, Indices]:
-    """Places where something near a point is narrow enough for the hand.
+) -> tuple[Array, Array, Array, Indices, Array]:
+    """Places where something near a point, but not far above it, is narrow enough for the hand.
 
     Args:
         view: the view.
@@ -145,7 +149,8 @@ def propose_hands(
         opening: largest distance between the pads [m].
 
     Returns:
-        Position x, y in V [m], turn [rad] and cluster of each place, (M,) each.
+        Position x, y in V [m], turn [rad], cluster, and height of the point in V [m] of each place,
+        (M,) each.
     """
     room = 0.004  # Smallest distance of each pad from the object [m].
     turn = np.pi * np.arange(TURNS) / TURNS
@@ -154,6 +159,7 @@ def propose_hands(
     along = CELL * np.arange(-steps, steps + 1)
     x, y = (p_VP[:, k, None, None] for k in (0, 1))
     profile = view.sample(view.height, x + c * along, y + s * along)  # (N, TURNS, K)
+    other = profile > (p_VP[:, 2] + MAX_RISE)[:, None, None]
     found = []
     for level in LEVELS:
         solid = profile > (p_VP[:, 2] - level)[:, None, None]
@@ -161,6 +167,8 @@ def propose_hands(
         left = np.argmin(solid[..., steps::-1], axis=-1)
         width = CELL * (left + right - 1)
         fits = (left > 0) & (right > 0) & (width < opening - 2.0 * room)
+        within = (along > -CELL * left[..., None]) & (along < CELL * right[..., None])
+        fits &= ~(other & within).any(axis=-1)
         row, angle = np.nonzero(fits)
         shift = 0.5 * CELL * (right - left)[row, angle]
         found.append(
@@ -168,14 +176,15 @@ def propose_hands(
                 p_VP[row, 0] + shift * c[angle, 0],
                 p_VP[row, 1] + shift * s[angle, 0],
                 angle,
-                cluster[row],
+                row,
             )
         )
-    px, py, angle, which = (np.concatenate(part) for part in zip(*found, strict=True))
+    px, py, angle, row = (np.concatenate(part) for part in zip(*found, strict=True))
     spacing = 0.005  # Places that are nearer to each other are one [m].
     key = np.stack([np.rint(px / spacing), np.rint(py / spacing), angle])
     _, first = np.unique(key.astype(np.int64), axis=1, return_index=True)
-    return px[first], py[first], turn[angle[first]], which[first]
+    row = row[first]
+    return px[first], py[first], turn[angle[first]], cluster[row], p_VP[row, 2]
 
 
 def _rectangle(
@@ -212,11 +221,12 @@ class HandFitter:
         self._near = maximum_filter(view.height, 3)
         self._around = maximum_filter(view.height, 5)
 
-    def fit(self, x: Array, y: Array, turn: Array, cluster: Indices) -> Hands:
+    def fit(self, x: Array, y: Array, turn: Array, cluster: Indices, point: Array) -> Hands:
         """Pushes hands at places (N,) forward, and measures what is between their fingers.
 
         Returns:
-            The hands that have something between their fingers, each at several heights.
+            The hands with finger tips below their point (N,) and something between their fingers,
+            each at several heights.
         """
         steps = int(self._inner / CELL)
         between = (CELL * np.arange(-steps, steps + 1)).astype(np.float32)
@@ -228,7 +238,8 @@ class HandFitter:
         profile = self._heights(self._view.height, place, grid)
         top = profile.max(axis=1)
         kept = np.flatnonzero(top - lowest > MIN_ENGAGEMENT)
-        place, lowest, top, cluster = place[kept], lowest[kept], top[kept], cluster[kept]
+        place, lowest, top, point = place[kept], lowest[kept], top[kept], point[kept]
+        cluster = cluster[kept]
         profile = profile[kept].reshape(shape)
         unseen = self._heights(self._view.hidden, place, grid).reshape(shape)
         beside = self._heights(self._view.hidden, place, self._fingers())
@@ -236,9 +247,10 @@ class HandFitter:
         above_hidden = np.maximum(beside.max(axis=1) + CLEARANCE - lowest, 0.0)
         for raised in (*RAISES, above_hidden):
             tip = lowest + raised
-            chosen = np.flatnonzero(top - tip > MIN_ENGAGEMENT)
+            chosen = np.flatnonzero((top - tip > MIN_ENGAGEMENT) & (tip < point))
             tip = tip[chosen]
             values = {
+                "point": point[chosen],
                 "depth": top[chosen] - tip,
                 "hidden": (beside[chosen] > tip[:, None]).mean(axis=1),
                 **_measure_contact(profile[chosen], unseen[chosen], tip, between, rows),
@@ -282,7 +294,7 @@ class HandFitter:
         y = hands.y + middle * np.sin(hands.turn)
         # The pads' second axis is -y of V at a turn of 0, hence the sign.
         turn = hands.turn + np.arctan(np.clip(hands.yaw, -0.3, 0.3))
-        return self.fit(x, y, turn, hands.cluster)
+        return self.fit(x, y, turn, hands.cluster, hands.point)
 
     def _hands(
         self, place: Floats, tip: Floats, cluster: Indices, values: dict[str, Floats]

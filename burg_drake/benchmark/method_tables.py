@@ -99,9 +99,8 @@ def measure_text(measure: BenchmarkMeasure) -> str:
     if np.isnan(measure.value):
         return NO_VALUE
     text = f"{_percent(measure.value)} ({_percent(measure.low)}-{_percent(measure.high)})"
-    if measure.most - measure.least > 0.0:
-        text += f" [{_percent(measure.least)}-{_percent(measure.most)}]"
-    return text
+    least, most = _percent(measure.least), _percent(measure.most)
+    return text if least == most else f"{text} [{least}-{most}]"
 
 
 def planning_time(result: BenchmarkResult) -> float:

@@ -41,8 +41,11 @@ def plan_in_the_air(observation: Observation) -> dict[str, Any]:
     return {"X_SG": grasp_in_scene(0.3, 0.2, 0.35)[None]}
 
 
-def plan_by_count(observation: Observation) -> dict[str, Any]:
-    """Fails where it sees a board of another size than A2, else as `plan_cans`."""
-    if observation.bounds[1][0] < 0.5:
-        raise KeyError("weights")
-    return plan_cans(observation)
+def plan_nothing(observation: Observation) -> dict[str, Any]:
+    """Fails."""
+    raise KeyError("weights")
+
+
+def plan_on_large_boards(observation: Observation) -> dict[str, Any]:
+    """Fails where it sees a board smaller than A2, else as `plan_cans`."""
+    return plan_nothing(observation) if observation.bounds[1][0] < 0.5 else plan_cans(observation)

@@ -32,6 +32,7 @@ from burg_drake.scene import Board, Instance, Scene, SceneDocument
 
 pytestmark = pytest.mark.physics
 
+thorough = pytest.mark.thorough
 PLANNERS = "tests.benchmark.scripted_planners"
 DEPTH = BenchmarkSettings(depth_only=True)
 
@@ -125,41 +126,59 @@ def test_a_changed_answer_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -
         verify_result(copy, count=1, workers=1, progress=False)
 
 
+def test_a_planner_that_always_fails_has_a_result(suite: Suite, tmp_path: Path) -> None:
+    found = run_benchmark(
+        suite,
+        f"{PLANNERS}:plan_nothing",
+        tmp_path / "result",
+        settings=DEPTH,
+        workers=1,
+        progress=False,
+    )
+    assert all("KeyError" in one.answer.error for one in found.answers)
+    measures = measure_all(found)
+    assert measures["answered"].value == measures["top_success"].value == 0.0
+
+
+@thorough
 def test_a_planner_that_fails_costs_its_own_answer(suite: Suite, tmp_path: Path) -> None:
     found = run_benchmark(
         suite,
-        f"{PLANNERS}:plan_by_count",
+        f"{PLANNERS}:plan_on_large_boards",
         tmp_path / "result",
         settings=DEPTH,
         workers=2,
         progress=False,
     )
-    assert {one.answer.scene: one.answer.error != "" for one in found.answers} == {
-        "two": False,
-        "one": True,
-    }
-    assert "KeyError" in next(one.answer.error for one in found.answers if one.answer.error)
+    errors = {one.answer.scene: one.answer.error for one in found.answers}
+    assert errors["two"] == "" and "KeyError" in errors["one"]
     assert outcomes(found)[0] == ("two", [Outcome.LIFTED.value] * 2)
 
 
-def test_tables_and_page_name_all_methods(
-    cleared: BenchmarkResult, suite: Suite, tmp_path: Path
-) -> None:
-    bad = run_benchmark(
+@thorough
+def test_a_scene_is_given_up_after_three_failures(suite: Suite, tmp_path: Path) -> None:
+    found = run_benchmark(
         suite,
         f"{PLANNERS}:plan_in_the_air",
         tmp_path / "air",
-        settings=replace(DEPTH, protocol="clear", name="air"),
+        settings=replace(DEPTH, protocol="clear"),
         workers=1,
         progress=False,
     )
-    assert [len(made) for made in episodes(bad).values()] == [3, 3]  # given up
-    (comparison,) = compare_by_suite([bad, cleared])
-    assert comparison.names == ["cans", "air"]
+    assert [len(made) for made in episodes(found).values()] == [3, 3]
+
+
+def test_tables_and_page_name_all_methods(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(cleared.path, other)
+    record = other / "benchmark.yaml"
+    record.write_text(record.read_text().replace("name: cans", "name: same"))
+    (comparison,) = compare_by_suite([load_result(other), cleared])
+    assert comparison.names == ["cans", "same"]
     text = "\n".join(table.markdown() for table in comparison_tables(comparison))
-    assert "| cans | 100 (34-100) |" in text and "| air | 0 (0-66) |" in text
+    assert "| cans | 100 (34-100) |" in text and "| cans - same | top grasp | +0 " in text
     page = write_leaderboard([comparison], tmp_path / "page.html").read_text()
-    assert page.count("<table") == 5 and "no contact" in page
+    assert page.count("<table") == 5 and "other/trials/scenes/two/report.html" in page
 
 
 def test_another_benchmark_in_the_folder_is_refused(cleared: BenchmarkResult, suite: Suite) -> None:
