@@ -29,7 +29,6 @@ from burg_drake.evaluation import (
     html_page,
     number_cells,
     section,
-    style_sheet,
     table,
 )
 from burg_drake.visualization import OUTCOME_GROUPS, Html, element
@@ -61,11 +60,14 @@ def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> s
     """
     methods = len({name for one in comparisons for name in one.names})
     suites = [one.results[0].suite.name for one in comparisons]
-    script = (files("burg_drake.benchmark") / "leaderboard.js").read_text(encoding="utf-8")
+    script, style = (
+        (files("burg_drake.benchmark") / f"leaderboard.{kind}").read_text(encoding="utf-8")
+        for kind in ("js", "css")
+    )
     parts = [part for one in comparisons for part in _suite_sections(one, folder)]
     return html_page(
         "Grasp planners compared",
-        element("style", style_sheet()),
+        element("style", Html(style)),
         header(
             "Benchmark",
             "Grasp planners compared",
@@ -179,6 +181,9 @@ def _best_grasp_cell(result: BenchmarkResult, answer: JudgedAnswer, folder: Path
     if (run / REPORT_FILE).exists():
         address = quote(os.path.relpath(run / REPORT_FILE, folder.resolve()).replace(os.sep, "/"))
         return element(
-            "td", element("a", label, href=address), class_=OUTCOME_CLASSES[outcome], title=id
+            "td",
+            element("a", label, href=address),
+            class_=f"outcome {OUTCOME_CLASSES[outcome]}",
+            title=id,
         )
-    return element("td", label, class_=OUTCOME_CLASSES[outcome], title=id)
+    return element("td", label, class_=f"outcome {OUTCOME_CLASSES[outcome]}", title=id)

@@ -107,7 +107,7 @@ BUILTIN_PLANNERS: Mapping[str, BuiltinPlanner] = {
 REFERENCE_FORMS: Mapping[str, str] = {
     "my_module:plan": "function of a module in the working directory or on PYTHONPATH",
     "folder/my_planner.py:plan": "function of a file",
-    "ws://127.0.0.1:9000": "server, such as python my_planner.py --port 9000",
+    "ws://127.0.0.1:9000": "server: a program that ends with burg_planner.run(plan)",
     "command:my_env/bin/python my_planner.py": (
         "program that gets two more arguments, the files of observation and answer (.npz)"
     ),
@@ -475,8 +475,8 @@ class _ServedPlanner(GraspPlanner):
         except OSError as error:
             raise PlannerError(
                 f"planner {reference}: no server answers there:"
-                f" {clean_text(str(error), 200)}; start it, for example with"
-                " python my_planner.py --port 9000"
+                f" {clean_text(str(error), 200)}; start it first, as a"
+                " program that ends with burg_planner.run(plan)"
             ).about("planner") from error
         except ValueError as error:
             raise PlannerError(f"planner {clean_text(str(error), 300)}").about("planner") from error

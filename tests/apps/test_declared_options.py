@@ -123,6 +123,8 @@ def test_units_that_files_tell_apart() -> None:
 
 
 COMMANDS = {
+    "benchmark/burg_planner.py",
+    "benchmark/leaderboard.py",
     "cameras/calibration/target_sheet.py",
     "evaluation/cluster/document.py",
     "evaluation/report/reproduction.py",
@@ -130,7 +132,8 @@ COMMANDS = {
     "evaluation/grasp_sets/pose_mistakes.py",
     "experiment/lab/protocol.py",
 }
-"""Files with commands to type, of our program and of Dask's, or texts beside such a command."""
+"""Files with commands to type, of our program and of Dask's, or texts beside such a command; and a
+file that is a program of its own."""
 OPTION = re.compile(r"(^|[ `]|(?<!var)\()(--[a-z]|-o\b)")
 
 
