@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 N ?= 100
 # Of all packages that pyproject.toml names, something that they are needed for, but for mypy, which is slow.
-LOWEST_TESTS := tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_progress.py \
+LOWEST_TESTS := tests/benchmark/test_adapters.py tests/benchmark/test_burg_planner.py tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_progress.py \
 	tests/dataset/test_coco.py tests/dataset/test_shards.py tests/dataset/test_webdataset.py \
 	tests/evaluation/test_cluster.py tests/evaluation/test_jobs.py tests/evaluation/test_table.py \
 	tests/experiment/test_agreement.py tests/export/test_mjcf.py tests/export/test_usd.py \

@@ -23,6 +23,7 @@ EXTRAS = {
     "pxr": ("export",),
     "viser": ("ui",),
     "websockets": ("ui",),
+    "msgpack": (),
     "msgspec": ("ui",),
 }
 """Packages that need not be there, and where modules may import them at their top."""

@@ -318,9 +318,12 @@ class BenchmarkResult:
         """The answers of a round with their verdicts, scene by scene.
 
         Raises:
-            InvalidInputError: an answer is missing.
+            InvalidInputError: an answer or a verdict is missing.
         """
         campaign, found = round.campaign, []
+        finish = f"finish it with the command that began it: {self.document.command}"
+        if campaign is not None and campaign.open_scenes:
+            raise InvalidInputError(f"grasps in {campaign.path} are not all judged; {finish}")
         for scene in round.scenes:
             verdicts = _scene_verdicts(campaign, scene)
             for camera in round.cameras:
@@ -328,9 +331,11 @@ class BenchmarkResult:
                 if not path.exists():
                     raise InvalidInputError(
                         f"{self.path} is not complete ({path.relative_to(self.path)} is missing);"
-                        f" finish it with the command that began it: {self.document.command}"
+                        f" {finish}"
                     )
                 answer = StoredAnswer.load(round.path, scene, camera)
+                if len(answer.grasps) and campaign is None:
+                    raise InvalidInputError(f"grasps of {self.path} are not judged; {finish}")
                 known = tuple(verdicts.get(id) for id in answer.candidate_ids)
                 found.append(JudgedAnswer(answer, known))
         return found

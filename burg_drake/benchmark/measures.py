@@ -12,7 +12,15 @@ import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import FRICTION_COLUMN, BenchmarkResult, JudgedAnswer
 from burg_drake.benchmark.clearing import episodes
-from burg_drake.core import Array, Booleans, Outcome, Stage, Verdict, clustered_interval
+from burg_drake.core import (
+    Array,
+    Booleans,
+    Outcome,
+    Stage,
+    Verdict,
+    clustered_interval,
+    mean_interval,
+)
 from burg_drake.grasping import GraspNetSettings
 from burg_drake.simulation import DEFAULT_TRIAL
 
@@ -57,10 +65,15 @@ Contested = bool | None
 
 
 class _Ratio(NamedTuple):
-    """A measure as a ratio of totals over observations."""
+    """A measure as a ratio of totals over observations.
+
+    Attributes:
+        numerator: its part of an observation, given what contested verdicts count as.
+        denominator: likewise; None for a mean over observations.
+    """
 
     numerator: Callable[[JudgedAnswer, Contested], float]
-    denominator: Callable[[JudgedAnswer], float]
+    denominator: Callable[[JudgedAnswer], float] | None = None
 
 
 def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
@@ -102,7 +115,8 @@ def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> BenchmarkMe
     scenes = [one.answer.scene for one in answers]
     numbers = {scene: k for k, scene in enumerate(dict.fromkeys(scenes))}
     group = np.array([numbers[scene] for scene in scenes], dtype=int)
-    trials = np.bincount(group, [ratio.denominator(one) for one in answers], len(numbers))
+    count = ratio.denominator or (lambda answer: 1.0)
+    trials = np.bincount(group, [count(one) for one in answers], len(numbers))
     whole = trials.sum()
     totals = [
         np.bincount(group, [ratio.numerator(one, counted) for one in answers], len(numbers))
@@ -111,7 +125,10 @@ def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> BenchmarkMe
     if not whole:
         return BenchmarkMeasure(*[float("nan")] * 5)
     value, least, most = (float(total.sum() / whole) for total in totals)
-    low, high = clustered_interval(totals[0].tolist(), trials.tolist())
+    if ratio.denominator is None:
+        low, high = mean_interval(totals[0] / trials)
+    else:
+        low, high = clustered_interval(totals[0].tolist(), trials.tolist())
     return BenchmarkMeasure(value, low, high, least, most)
 
 
@@ -150,9 +167,6 @@ def _mean_precision(good: Array | Booleans, budget: int) -> float:
 def _ratios(budget: int) -> dict[str, _Ratio]:
     """The measures for a budget of grasps."""
 
-    def per_observation(value: Callable[[JudgedAnswer, Contested], float]) -> _Ratio:
-        return _Ratio(value, lambda answer: 1.0)
-
     def per_grasp(holds: Callable[[Verdict], bool]) -> _Ratio:
         return _Ratio(
             lambda answer, _: sum(v is not None and holds(v) for v in answer.verdicts),
@@ -160,10 +174,10 @@ def _ratios(budget: int) -> dict[str, _Ratio]:
         )
 
     found = {
-        "top_success": per_observation(lambda a, c: precision_at(a, 1, c)),
-        "average_precision": per_observation(lambda a, c: trial_ap(a, budget, c)),
-        "graspnet_ap": per_observation(lambda a, _: graspnet_ap_of(a, budget)),
-        "answered": per_observation(lambda a, _: float(not a.answer.error)),
+        "top_success": _Ratio(lambda a, c: precision_at(a, 1, c)),
+        "average_precision": _Ratio(lambda a, c: trial_ap(a, budget, c)),
+        "graspnet_ap": _Ratio(lambda a, _: graspnet_ap_of(a, budget)),
+        "answered": _Ratio(lambda a, _: float(not a.answer.error)),
         "clear": per_grasp(_is_clear),
         "reachable": per_grasp(lambda v: _has_passed(v, Stage.REACHABLE)),
         "planned": per_grasp(lambda v: _has_passed(v, Stage.PLANNED)),
@@ -177,7 +191,7 @@ def _ratios(budget: int) -> dict[str, _Ratio]:
         ),
     }
     found |= {
-        f"precision_{k}": per_observation(lambda a, c, k=k: precision_at(a, k, c))  # type: ignore[misc]
+        f"precision_{k}": _Ratio(lambda a, c, k=k: precision_at(a, k, c))  # type: ignore[misc]
         for k in (3, 5)
         if k <= budget
     }

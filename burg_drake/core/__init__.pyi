@@ -221,6 +221,7 @@ from .statistics import (
     TUKEY_LIMIT as TUKEY_LIMIT,
     Z_95 as Z_95,
     clustered_interval as clustered_interval,
+    mean_interval as mean_interval,
     robust_sd as robust_sd,
     tukey_weights as tukey_weights,
     wilson_interval as wilson_interval,

@@ -62,6 +62,30 @@ def clustered_interval(successes: Sequence[float], trials: Sequence[float]) -> t
     return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
 
 
+def mean_interval(values: Array) -> tuple[float, float]:
+    """95 % interval for the mean of values between 0 and 1, such as a precision in each scene.
+
+    It is Wilson's with an effective number of trials: that at which a share would vary as much as
+    the mean does (E. L. Korn and B. I. Graubard, Survey Methodology 24, 1998). At most three for
+    each value, as a few values may lack the rare ones that matter.
+
+    Args:
+        values: (N,) independent values.
+
+    Returns:
+        Lower and upper bound in [0, 1]; all of it if there are no values.
+    """
+    n, mean = len(values), float(values.mean()) if len(values) else 0.0
+    variance = float(values.var(ddof=1)) / n if n > 1 else 0.0
+    if variance == 0.0:
+        return wilson_interval(mean * n, n)
+    from scipy.special import stdtrit
+
+    trials = min(3.0 * n, mean * (1.0 - mean) / variance)
+    trials *= (Z_95 / float(stdtrit(n - 1, 0.975))) ** 2
+    return wilson_interval(mean * trials, trials)
+
+
 def robust_sd(residuals: Array) -> float:
     """Standard deviation of normal residuals, by their median absolute value."""
     return 1.4826 * float(np.median(np.abs(residuals)))

@@ -11,6 +11,7 @@ import statsmodels.api as sm
 from burg_drake.core import (
     TUKEY_LIMIT,
     clustered_interval,
+    mean_interval,
     robust_sd,
     tukey_weights,
     wilson_interval,
@@ -82,3 +83,25 @@ def test_tukey_weights_are_those_of_statsmodels() -> None:
     residuals = np.linspace(-6.0, 6.0, 25)
     expected = sm.robust.norms.TukeyBiweight(TUKEY_LIMIT).weights(residuals)
     np.testing.assert_allclose(tukey_weights(residuals / TUKEY_LIMIT), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.3, 0.1), (5.0, 1.0), (0.05, 0.5), (2.0, 8.0)])
+@pytest.mark.parametrize("n", [10, 20])
+def test_intervals_of_means_cover_the_mean(a: float, b: float, n: int) -> None:
+    rng = np.random.default_rng(3)
+    covered = 0
+    for _ in range(1000):
+        low, high = mean_interval(rng.beta(a, b, n))
+        covered += low <= a / (a + b) <= high
+    assert covered >= 900
+
+
+def test_intervals_of_means_narrow_with_the_spread_and_the_number() -> None:
+    def width(values: list[float]) -> float:
+        low, high = mean_interval(np.array(values))
+        assert 0.0 <= low <= np.mean(values) <= high <= 1.0
+        return high - low
+
+    assert width([0.4, 0.6] * 10) < width([0.0, 1.0] * 10) < width([0.0, 1.0] * 4)
+    assert mean_interval(np.zeros(20))[1] > 0.1  # what 20 scenes lack may still occur
+    assert mean_interval(np.empty(0)) == (0.0, 1.0)

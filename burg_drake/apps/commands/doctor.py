@@ -188,6 +188,7 @@ OPTIONAL_FEATURES = (
     OptionalFeature("mujoco", "second opinion by MuJoCo", "mujoco", "mujoco"),
     OptionalFeature("ui", "scene editor (burg-drake setup)", "viser", "msgspec"),
     OptionalFeature("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
+    OptionalFeature("benchmark", "benchmarks of grasp planners", "msgpack", "websockets"),
     OptionalFeature("frame", "results in pandas", "pandas", "pandas"),
     OptionalFeature("dask", "clusters over Dask", "distributed", "msgpack"),
     OptionalFeature("jobqueue", "batch systems (SLURM, PBS)", "dask-jobqueue", "cryptography"),
