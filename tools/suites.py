@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from burg_drake.benchmark import SUITES, CameraPlacement, SuiteSettings, make_suite
 from burg_drake.core import data_root
@@ -92,12 +92,7 @@ def sample_scenes_of(name: str, plan: SuitePlan, count: int) -> list[Scene]:
             raise SystemExit(f"{name}: no scene {k} was accepted: {dict(sampled.refused)}")
         document = sampled.scene.document
         renamed = Scene(
-            type(document)(
-                name=f"{name}_{k + 1:02d}",
-                library=document.library,
-                board=document.board,
-                instances=document.instances,
-            ),
+            replace(document, name=f"{name}_{k + 1:02d}", description="", origin=None),
             library,
             sampled.scene.path,
         )

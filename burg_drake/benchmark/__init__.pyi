@@ -23,6 +23,7 @@ from .benchmark_folder import (
 )
 from .benchmark_run import (
     BenchmarkSettings as BenchmarkSettings,
+    choose_grasps as choose_grasps,
     run_benchmark as run_benchmark,
 )
 from .burg_planner import Observation as Observation, observation_id as observation_id

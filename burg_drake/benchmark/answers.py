@@ -30,7 +30,7 @@ POSE_ENTRIES = {"X_CG": "camera", "X_WG": "world", "X_SG": "scene"}
 OTHER_ENTRIES = ("score", "width", "frame", "time", "observation")
 """All other entries of an answer."""
 MAX_WORKSPACE_DISTANCE = 1.0
-"""Distance from the workspace beyond which no grasp can be meant [m]."""
+"""Grasps farther from the workspace than this are taken for errors [m]."""
 
 
 class AnswerError(InvalidInputError):
@@ -48,7 +48,7 @@ class PlannedGrasps:
     Attributes:
         X_SG: (N, 4, 4) grasps in the scene frame, of the grasp frame G of burg_drake.
         width: (N,) distance between the object's two sides [m]; NaN if not given.
-        score: (N,) higher is better; N, N - 1, ... if not given.
+        score: (N,) higher is better; N, N - 1, ... if not given. Equal scores keep their order.
         time: time that planning took [s]; NaN if not given.
         notes: what is odd about the answer, one sentence each.
     """
@@ -209,14 +209,14 @@ def frame_mistakes(entry: str, observation: Observation) -> dict[Mistake, str]:
     X_SM, X_SC = frame_pose(entry, observation), frame_pose("X_CG", observation)
     X_MC = inverse(X_SM) @ X_SC
     opengl, opengl_line = np.diag([1.0, -1.0, -1.0, 1.0]), "np.diag([1.0, -1.0, -1.0, 1.0])"
-    forth, back = "observation.X_WC", "np.linalg.inv(observation.X_WC)"
+    X_forward, X_backward = "observation.X_WC", "np.linalg.inv(observation.X_WC)"
     if entry == "X_SG":
-        forth, back = "np.linalg.inv(observation.X_CS)", "observation.X_CS"
-    X_again = X_MC
+        X_forward, X_backward = "np.linalg.inv(observation.X_CS)", "observation.X_CS"
+    X_repeated = X_MC
     if entry == "X_CG":
-        X_again, forth = inverse(observation.X_WC), back
+        X_repeated, X_forward = inverse(observation.X_WC), X_backward
     else:
-        opengl_line = f"{forth} @ {opengl_line} @ {back}"
+        opengl_line = f"{X_forward} @ {opengl_line} @ {X_backward}"
     found = {
         Mistake(
             f"measured in the {name} frame", camera=frame_pose(other, observation)
@@ -229,10 +229,10 @@ def frame_mistakes(entry: str, observation: Observation) -> dict[Mistake, str]:
         camera=X_SC @ opengl @ inverse(X_MC),
     )
     wrong_way = Mistake(
-        "moved by the pose of the camera the wrong way round", camera=X_SM @ X_again @ X_again
+        "moved by the pose of the camera the wrong way round", camera=X_SM @ X_repeated @ X_repeated
     )
     found[in_opengl] = f"{entry} = {opengl_line} @ {entry}"
-    found[wrong_way] = f"{entry} = {forth} @ {forth} @ {entry}"
+    found[wrong_way] = f"{entry} = {X_forward} @ {X_forward} @ {entry}"
     return _with_different_cameras(found, X_SM)
 
 
@@ -260,9 +260,9 @@ def _far_message(
 ) -> str:
     """Says that grasps are far away, and how they might be meant."""
     max_near = 0.2  # Distance from the workspace of grasps that are meant [m].
-    least_in_millimetres = 20.0  # Median distance from the origin of M, read as metres.
+    min_median_distance = 20.0  # Median distance from the origin of M, read as metres.
     mistakes = [*frame_mistakes(poses.entry, observation), Mistake("inverted", ("inverse",))]
-    if np.median(np.linalg.norm(poses.X_MG[:, :3, 3], axis=-1)) > least_in_millimetres:
+    if np.median(np.linalg.norm(poses.X_MG[:, :3, 3], axis=-1)) > min_median_distance:
         mistakes.insert(0, Mistake("in millimetres", ("millimetres",)))
     X_GF = poses.format.X_GF(gripper)
     near = {}
@@ -306,7 +306,7 @@ def _read_frame(value: Any) -> GraspFormat:
     """The format with the grasp frame that an answer names; ours if it names none."""
     name = "burg_drake" if value is None else _plain(value)
     if not isinstance(name, str) or name not in GRASP_FORMATS:
-        hint = suggest_names(str(name)[:100], GRASP_FORMATS)
+        hint = suggest_names(quote_value(name), GRASP_FORMATS)
         raise AnswerError(
             f"frame {quote_value(name)} of the answer is not the grasp frame of a project; {hint}"
         )
@@ -318,11 +318,11 @@ def _read_widths(value: Any, count: int, gripper: Gripper) -> tuple[Array, tuple
     if value is None:
         return np.full(count, np.nan), ()
     width = _numbers(value, "width", count)
-    if np.isinf(width).any() or (width < 0.0).any():
-        bad = int((np.isinf(width) | (width < 0.0)).sum())
+    impossible = (width < 0.0) | (width > MAX_POSE_COORDINATE)
+    if impossible.any():
         raise AnswerError(
-            f"{bad} of {count} widths are negative or infinite; a width is the distance between the"
-            " object's two sides in metres, NaN if unknown"
+            f"{int(impossible.sum())} of {count} widths are negative or infinite; a width is the"
+            " distance between the object's two sides in metres, NaN if unknown"
         )
     opening = gripper.opening[1]
     wide = width > opening + 1e-6  # rounding of single precision

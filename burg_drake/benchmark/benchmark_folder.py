@@ -1,6 +1,6 @@
 """The folder of a benchmark: its record, the suite, the planner's answers, and the judged grasps.
 
-RESULT/benchmark.yaml            who was asked on which suite, and how long it took
+RESULT/benchmark.yaml            which planner was run on which suite, and how long it took
 RESULT/suite.yaml                the suite
 RESULT/answers/SCENE.CAMERA.npz  grasps of one answer that are judged, best first
 RESULT/trials/                   run over all scenes, as `evaluate` writes it
@@ -49,13 +49,15 @@ RANK_COLUMN = "rank"
 """Column of an answer: place of the grasp, from 0."""
 CAMERA_COLUMN = "camera"
 """Column of an answer: camera of the observation."""
+SCORE_COLUMN = "planner_score"
+"""Column of an answer: score that the planner gave."""
 FRICTION_COLUMN = "friction_needed"
 """Column of an answer: smallest friction coefficient at which the grasp holds, by geometry."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchmarkTimes:
-    """Wall-clock time of the parts of a benchmark, over all calls [s].
+    """Wall-clock time of the parts of a benchmark, of calls that ran to the end [s].
 
     Attributes:
         rendering: time waited for observations.
@@ -88,8 +90,9 @@ class BenchmarkDocument:
             executed takes its object away, and the planner is asked again.
         split: the scenes that were observed: `test` or `tuning`.
         depth_only: whether the planner got no colour images.
-        settled: engine that judged contested grasps again; empty if none did.
+        settled: engine that judges contested grasps again; none if empty.
         versions: versions of the software and the machine.
+        complete: whether all scenes were observed and judged, and contested grasps settled.
         times: wall-clock times.
     """
 
@@ -105,13 +108,17 @@ class BenchmarkDocument:
     depth_only: bool = False
     settled: str = ""
     versions: dict[str, str] = field(default_factory=dict)
+    complete: bool = False
     times: BenchmarkTimes = BenchmarkTimes()
 
     def differences(self, other: BenchmarkDocument) -> list[str]:
         """Differences of two requests in words; `self` is in the folder, `other` is asked for."""
-        names = ("name", "planner", "suite", "suite_hash", "protocol", "split", "depth_only")
+        names = ["name", "planner", "suite", "suite_hash", "protocol", "split", "depth_only"]
+        if self.protocol == "clear":  # verdicts decide how a scene goes on
+            names.append("settled")
         return [
-            f"{name.replace('_', ' ')} is {getattr(self, name)} there, {getattr(other, name)} here"
+            f"{name.replace('_', ' ')} is {getattr(self, name) or 'none'} there,"
+            f" {getattr(other, name) or 'none'} here"
             for name in names
             if getattr(self, name) != getattr(other, name)
         ]
@@ -124,7 +131,7 @@ class StoredAnswer:
     Attributes:
         scene, camera: the observation.
         grasps: the grasps that are judged, best first, in the frames of their objects, with the
-            columns `instance`, `rank`, `camera` and `friction_needed`.
+            columns `instance`, `rank`, `camera`, `planner_score` and `friction_needed`.
         observation: id of the observation.
         seconds: time that planning took [s]; NaN if there was no answer.
         answered: number of grasps in the answer.
@@ -185,8 +192,8 @@ class StoredAnswer:
             )
         except (KeyError, TypeError, ValueError) as error:
             raise InvalidInputError(
-                f"{path} is not the file of an answer ({error!r}); delete it and run the benchmark"
-                " again"
+                f"{path} is not the file of an answer ({error!r}); run the benchmark again into"
+                " another folder"
             ) from error
 
 
@@ -287,6 +294,18 @@ class BenchmarkResult:
 
     def __repr__(self) -> str:
         return f"BenchmarkResult({str(self.path)!r}, {self.document.name} on {self.suite.name})"
+
+    def require_complete(self) -> None:
+        """Refuses a benchmark that was interrupted.
+
+        Raises:
+            InvalidInputError: the message has the command that finishes it.
+        """
+        if not self.document.complete:
+            raise InvalidInputError(
+                f"{self.path} is not complete; finish it with the command that began it:"
+                f" {self.document.command}"
+            )
 
     @property
     def scene_names(self) -> list[str]:

@@ -25,6 +25,8 @@ from burg_drake.benchmark.benchmark_folder import (
     FRICTION_COLUMN,
     RANK_COLUMN,
     SCENES_FOLDER,
+    SCORE_COLUMN,
+    SUITE_FILE,
     TRIALS_FOLDER,
     BenchmarkDocument,
     BenchmarkResult,
@@ -39,7 +41,7 @@ from burg_drake.benchmark.benchmark_folder import (
 )
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
-from burg_drake.benchmark.planners import GraspPlanner, PlannerError, open_planner
+from burg_drake.benchmark.planners import GraspPlanner, PlannerError, PlannerLost, open_planner
 from burg_drake.benchmark.suite import Protocol, Split, Suite, SuiteCamera, SuiteLike, as_suite
 from burg_drake.core import (
     Array,
@@ -52,10 +54,12 @@ from burg_drake.core import (
     ProgressMeter,
     Reporter,
     Task,
+    WorkerDied,
     WorkerPool,
     atomic_folder,
     default_workers,
     ensure_writable_folder,
+    one_line,
     portable_reference,
     remove_unfinished,
     setting,
@@ -127,7 +131,8 @@ def run_benchmark(
 
     Each scene is observed by each camera of the suite, and the planner is asked once for each
     observation. Of an answer the best grasps within the suite's budget are judged, without those
-    near a better one on the same object. Results do not depend on the number of workers. A planner
+    near a better one on the same object. Verdicts do not depend on the number of workers; the time
+    of an answer may, as images are rendered on other processors meanwhile. A planner
     that fails costs the answer to that observation only. The same call continues an interrupted
     one.
 
@@ -148,7 +153,8 @@ def run_benchmark(
     Raises:
         InvalidInputError: bad argument, or the folder holds something else, or another benchmark.
         UnknownNameError: a reference does not exist.
-        PlannerError: the planner cannot be opened.
+        PlannerError: the planner cannot be opened, or cannot be asked any more; all answers so far
+            are kept.
         MissingDependencyError: a renderer or package is missing.
     """
     begun, suite, folder = time.monotonic(), as_suite(suite), Path(folder)
@@ -174,18 +180,19 @@ def run_benchmark(
             protocol=settings.protocol,
             split=settings.split,
             depth_only=settings.depth_only,
+            settled=settings.settle,
             versions=software_versions(),
         )
-        _require_own_folder(folder, document)
         with (
             FolderLock(ensure_writable_folder(folder)),
             Reporter(progress) as reporter,
             WorkerPool(min(executor.workers, default_workers())) as pool,
         ):
+            _require_own_folder(folder, document)
             remove_unfinished(folder)
             result = _open_result(folder, document, suite)
             call = _BenchmarkCall(result, suite, opened, executor, reporter, begun, pool)
-            return call.run(settings.settle)
+            return call.run(settings.settle or result.document.settled)
 
 
 def _require_method_name(name: str) -> str:
@@ -208,7 +215,7 @@ def _require_own_folder(folder: Path, document: BenchmarkDocument) -> None:
                 f"{folder} already holds another benchmark ({'; '.join(differences)}); choose"
                 " another folder, or delete it"
             ).about("folder")
-    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    elif {path.name for path in folder.iterdir()} - {SUITE_FILE, ANSWERS_FOLDER}:
         raise InvalidInputError(
             f"{folder} is not empty, but has no benchmark ({BENCHMARK_FILE} is missing); choose"
             " another folder, or delete it"
@@ -219,12 +226,13 @@ def _open_result(folder: Path, document: BenchmarkDocument, suite: Suite) -> Ben
     """The benchmark in a folder, or a new one."""
     if (folder / BENCHMARK_FILE).exists():
         return load_result(folder)
-    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
     copy = replace(
         suite.document,
         library=portable_reference(suite.library.root, folder),
         station=portable_reference(suite.station.path, folder),
     )
+    (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
+    (folder / SUITE_FILE).unlink(missing_ok=True)  # of a call that was killed here
     return save_result(folder, document, copy)
 
 
@@ -242,6 +250,8 @@ class _BenchmarkCall:
 
     def run(self, settle: str) -> BenchmarkResult:
         """Goes through the rounds, and returns the complete result."""
+        document = replace(self.result.document, settled=settle, complete=False)
+        self.result = save_result(self.result.path, document, self.result.suite)
         first, times = self.result.rounds[0], BenchmarkTimes()
         scenes: Mapping[str, Scene] = self.suite.scenes(self.result.document.split)
         for number in itertools.count(1):
@@ -255,10 +265,7 @@ class _BenchmarkCall:
             if not scenes:
                 break
         times = replace(times, total=time.monotonic() - self.begun)
-        document = self.result.document
-        document = replace(
-            document, settled=settle or document.settled, times=document.times + times
-        )
+        document = replace(document, complete=True, times=document.times + times)
         return save_result(self.result.path, document, self.result.suite)
 
     def _is_last(self, number: int) -> bool:
@@ -314,7 +321,7 @@ class _BenchmarkCall:
                 for name, scene in found.items():
                     save_scene(replace(scene.document, library=library), scene_path(fresh, name))
         return {
-            name: load_scene(scene_path(folder, name))
+            name: load_scene(scene_path(folder, name), library=lambda *_: self.suite.library)
             for name in scenes
             if scene_path(folder, name).exists()
         }
@@ -341,19 +348,22 @@ class _BenchmarkCall:
             for name, wanted in missing.items()
             if wanted
         ]
-        stored: list[Future[None]] = []
+        stored: list[tuple[_Answer, Future[None]]] = []
         before = time.monotonic()
         for scene, observations in self._observe(work):
             rendering += time.monotonic() - before
             before = time.monotonic()
             for camera, observation in observations.items():
                 answer = self._ask_once(scene, camera, observation, round.path)
-                stored.append(self.pool.submit(_store_answer, answer))
+                stored.append((answer, self.pool.submit(_store_answer, answer)))
                 meter.step()
             planning += time.monotonic() - before
             before = time.monotonic()
-        for one in stored:
-            one.result()
+        for answer, future in stored:
+            try:
+                future.result()
+            except WorkerDied as error:
+                _store_answer(replace(answer, error=f"the answer cannot be read: {error}"))
         return BenchmarkTimes(rendering=rendering, planning=planning)
 
     def _observe(
@@ -376,12 +386,14 @@ class _BenchmarkCall:
             scene=scene,
             station=self.suite.station,
             camera=camera,
-            observation=replace(observation, color=None, segmentation=None),
+            observation=replace(observation, color=None, depth=None, segmentation=None),
             count=self.suite.document.budget.grasps,
             folder=folder,
         )
         try:
             raw = self.planner.ask(observation, scene, self.suite.station)
+        except PlannerLost:
+            raise
         except PlannerError as error:
             return replace(found, error=str(error), seconds=time.monotonic() - begun)
         return replace(found, raw=raw)
@@ -393,7 +405,7 @@ class _Answer:
 
     Attributes:
         scene, station, camera: what was observed, and by which camera.
-        observation: the observation, without colours and segmentation.
+        observation: the observation, without images.
         count: largest number of grasps that are judged.
         folder: folder of the round.
         raw: the answer; empty if there is none.
@@ -417,17 +429,20 @@ def _store_answer(answer: _Answer) -> None:
     one without grasps that has its error."""
     gripper, seconds, error = station_gripper(answer.station), answer.seconds, answer.error
     grasps = _with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", answer.camera)
+    for instance in answer.scene.instances.values():  # a damaged mesh is not the planner's fault
+        answer.scene.library.surface(instance.object)
     answered = 0
     notes: tuple[str, ...] = ()
     if not error:
         try:
             planned = read_answer(answer.raw, answer.observation, gripper)
+            chosen = choose_grasps(answer.scene, planned, gripper, answer.count, answer.camera)
+            grasps = _with_friction_needed(chosen, answer.scene, answer.station)
+            seconds, answered, notes = planned.time, len(planned.score), planned.notes
         except AnswerError as refused:
             error = str(refused)
-        else:
-            seconds, answered, notes = planned.time, len(planned.score), planned.notes
-            grasps = choose_grasps(answer.scene, planned, gripper, answer.count, answer.camera)
-            grasps = _with_friction_needed(grasps, answer.scene, answer.station)
+        except Exception as unexpected:  # of numbers that no grasp can have
+            error = f"the answer cannot be judged: {one_line(unexpected)}"
     StoredAnswer(
         scene=answer.scene.name,
         camera=answer.camera,
@@ -485,14 +500,21 @@ def choose_grasps(
     n = len(planned.score)
     if not n or not scene.instances:
         return _with_columns(GraspSet.create(np.empty((0, 4, 4)), object=""), "", camera)
-    poses = GraspSet.create(planned.X_SG, object="", width=planned.width, score=planned.score)
+    places = np.arange(n, 0.0, -1.0)  # equal scores keep the planner's order
+    poses = GraspSet.create(
+        planned.X_SG,
+        object="",
+        width=planned.width,
+        score=places,
+        columns={SCORE_COLUMN: planned.score},
+    )
     owner, _ = held_instances(scene, planned.X_SG, gripper)
     parts = [
         part.with_columns(**{INSTANCE_COLUMN: np.full(len(part), name)})
         for name, part in group_by_instance(scene, poses, planned.X_SG, owner).items()
     ]
     grasps = GraspSet.concatenate(parts)
-    kept = grasps.select(suppress_near_grasps(grasps)[:count])
+    kept = grasps.select(suppress_near_grasps(grasps, count)[:count])
     return _with_columns(kept, kept.columns[INSTANCE_COLUMN], camera)
 
 

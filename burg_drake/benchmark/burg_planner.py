@@ -1,4 +1,5 @@
-"""Connects a grasp planner to burg_drake. Copy this file beside your planner; it needs numpy only.
+"""Connects a grasp planner to burg_drake. Copy this file beside your planner; it needs numpy, and
+for a server msgpack and websockets.
 
 It runs in the environment of the planner: with Python from 3.8, and without burg_drake.
 
@@ -361,7 +362,10 @@ class RemotePlanner:
         except TimeoutError as error:
             raise ConnectionError(f"no connection within {connect_timeout:g} s") from error
         try:
-            greeting = self._exchange(None, connect_timeout)
+            try:
+                greeting = self._exchange(None, connect_timeout)
+            except TimeoutError as error:
+                raise ConnectionError(f"no greeting within {connect_timeout:g} s") from error
             if greeting.get("protocol") != PROTOCOL:
                 raise ValueError(f"{self.url} is not a planner: it sends no {PROTOCOL!r}")
             if greeting.get("version") != PROTOCOL_VERSION:

@@ -12,6 +12,7 @@ from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
 from burg_drake.core import (
     Array,
     InvalidInputError,
+    Outcome,
     Pose,
     SimulationError,
     Verdict,
@@ -57,7 +58,10 @@ def scene_after(work: tuple[Scene, ExecutedGrasp]) -> Scene:
     scene, grasp = work
     run = load_run(grasp.run)
     trial, station = run.trial(grasp.id), run.station()
-    origin = origin_of(run.document)
+    assert trial.verdict is not None
+    if trial.verdict.outcome is Outcome.SIMULATION_FAILED:
+        return scene
+    origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
     judge = build_judge(
         scene,
         station,
@@ -68,15 +72,15 @@ def scene_after(work: tuple[Scene, ExecutedGrasp]) -> Scene:
     verdict = judge_grasp(judge, trial.candidate)
     poses = judge.trial.final_poses()
     if verdict.outcome.held:
-        del poses[trial.instance]
+        poses.pop(trial.instance)
     return settle_after(scene, station, poses, trial.instance)
 
 
 def settle_after(scene: Scene, station: Station, X_WO: Mapping[str, Array], target: str) -> Scene:
-    """A scene at rest, with its objects at given poses at first.
+    """The scene at rest, starting from given poses.
 
     A target that was let go in contact with something may overlap it a little; it is raised until
-    it does not. If that does not help, it is put back where it stood.
+    it does not. If that does not help, it is put back where it stood, and at last all objects.
 
     Args:
         scene: the scene before.
@@ -100,7 +104,8 @@ def settle_after(scene: Scene, station: Station, X_WO: Mapping[str, Array], targ
     try:
         return _settled(_moved_scene(scene, station, standing), station)
     except (InvalidInputError, SimulationError):
-        return _moved_scene(scene, station, standing)
+        kept = {name: instance_pose(scene, station, name) for name in X_WO}
+        return _moved_scene(scene, station, kept)
 
 
 def _settled(scene: Scene, station: Station) -> Scene:

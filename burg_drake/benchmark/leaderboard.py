@@ -10,9 +10,10 @@ from urllib.parse import quote
 
 import numpy as np
 
-from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
+from burg_drake.benchmark.benchmark_folder import JudgedAnswer, Round
 from burg_drake.benchmark.method_comparison import MethodComparison
 from burg_drake.benchmark.method_tables import (
+    CLEARING_MEASURES,
     STEP_MEASURES,
     SUCCESS_MEASURES,
     TableText,
@@ -20,7 +21,7 @@ from burg_drake.benchmark.method_tables import (
     measure_text,
     planning_time,
 )
-from burg_drake.core import NO_VALUE, atomic_write, format_duration, outcome_label
+from burg_drake.core import NO_VALUE, atomic_write, count_with_noun, format_duration, outcome_label
 from burg_drake.evaluation import (
     GROUP_CLASSES,
     REPORT_FILE,
@@ -71,7 +72,8 @@ def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> s
         header(
             "Benchmark",
             "Grasp planners compared",
-            f"{methods} methods on {', '.join(suites)}; click a heading to sort by it",
+            f"{count_with_noun(methods, 'method')} on {', '.join(dict.fromkeys(suites))};"
+            " click a heading to sort by it",
         ),
         *parts,
         element("script", Html(script)),
@@ -95,6 +97,16 @@ def _suite_sections(comparison: MethodComparison, folder: Path) -> list[Html]:
             _caption(steps),
         ),
     ]
+    if comparison.results[0].document.protocol == "clear":
+        clearing = others.pop(0)
+        found.append(
+            section(
+                clearing.title,
+                "Objects that were taken away, with one executed grasp for each image.",
+                _measure_table(comparison, CLEARING_MEASURES),
+                _caption(clearing),
+            )
+        )
     found += [
         section(one.title, "Pairs of methods on the same scenes.", _text_table(one), _caption(one))
         for one in others
@@ -161,29 +173,26 @@ def _text_table(text: TableText) -> Html:
 def _scene_table(comparison: MethodComparison, folder: Path) -> Html:
     """How the best grasp of each method ended, by scene and camera."""
     rows = []
-    for k, (scene, camera) in enumerate(comparison.results[0].rounds[0].cases):
+    firsts = [result.rounds[0] for result in comparison.results]
+    for k, (scene, camera) in enumerate(firsts[0].cases):
         label = scene if len(comparison.results[0].suite.cameras) == 1 else f"{scene}, {camera}"
         cells = [
-            _best_grasp_cell(result, result.answers[k], folder) for result in comparison.results
+            _best_grasp_cell(first, result.answers[k], folder)
+            for first, result in zip(firsts, comparison.results, strict=True)
         ]
         rows.append(element("tr", element("th", label, scope="row"), *cells))
     return table(["scene", *comparison.names], rows)
 
 
-def _best_grasp_cell(result: BenchmarkResult, answer: JudgedAnswer, folder: Path) -> Html:
+def _best_grasp_cell(round: Round, answer: JudgedAnswer, folder: Path) -> Html:
     if answer.answer.error:
         return element("td", "no answer", title=answer.answer.error)
     if not answer.verdicts or answer.verdicts[0] is None:
         return element("td", NO_VALUE, title="no grasp")
     outcome, id = answer.verdicts[0].outcome, answer.ids[0]
-    run = result.rounds[0].run_folder(answer.answer.scene)
-    label = outcome_label(outcome)
-    if (run / REPORT_FILE).exists():
-        address = quote(os.path.relpath(run / REPORT_FILE, folder.resolve()).replace(os.sep, "/"))
-        return element(
-            "td",
-            element("a", label, href=address),
-            class_=f"outcome {OUTCOME_CLASSES[outcome]}",
-            title=id,
-        )
-    return element("td", label, class_=f"outcome {OUTCOME_CLASSES[outcome]}", title=id)
+    report = round.run_folder(answer.answer.scene) / REPORT_FILE
+    content: Html | str = outcome_label(outcome)
+    if report.exists():
+        address = os.path.relpath(report.resolve(), folder.resolve()).replace(os.sep, "/")
+        content = element("a", content, href=quote(address))
+    return element("td", content, class_=f"outcome {OUTCOME_CLASSES[outcome]}", title=id)

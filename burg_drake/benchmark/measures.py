@@ -60,7 +60,7 @@ MEASURES = {
 }
 """Meaning of each measure by name; the last three are of the protocol `clear`."""
 
-Contested = bool | None
+ContestedAs = bool | None
 """What contested verdicts count as: what they say if None."""
 
 
@@ -72,7 +72,7 @@ class _Ratio(NamedTuple):
         denominator: likewise; None for a mean over observations.
     """
 
-    numerator: Callable[[JudgedAnswer, Contested], float]
+    numerator: Callable[[JudgedAnswer, ContestedAs], float]
     denominator: Callable[[JudgedAnswer], float] | None = None
 
 
@@ -82,7 +82,10 @@ def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     Raises:
         InvalidInputError: the benchmark is not complete.
     """
+    result.require_complete()
     ratios = _ratios(result.suite.budget.grasps)
+    if result.suite.mode == "hand":  # reach is not judged
+        del ratios["reachable"], ratios["planned"]
     found = {name: measure_ratio(result.answers, ratio) for name, ratio in ratios.items()}
     if result.document.protocol == "clear":
         found |= _clearing_measures(result)
@@ -90,14 +93,14 @@ def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
 
 
 def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
-    """Measures of the protocol `clear`. Contested verdicts decide how a scene goes on, so their
+    """Measures of the protocol `clear`. ContestedAs verdicts decide how a scene goes on, so their
     range cannot be told."""
     counts = {one.name: len(one.instances) for one in result.suite.scenes}
     attempts = episodes(result)
     objects = [counts[name] for name in attempts]
     taken = [sum(one.succeeded for one in made) for made in attempts.values()]
     made = [len(found) for found in attempts.values()]
-    emptied = [float(n == all) for n, all in zip(taken, objects, strict=True)]
+    emptied = [float(n == count) for n, count in zip(taken, objects, strict=True)]
 
     def measure(successes: Sequence[float], trials: Sequence[float]) -> BenchmarkMeasure:
         value = sum(successes) / sum(trials)
@@ -132,12 +135,12 @@ def measure_ratio(answers: Sequence[JudgedAnswer], ratio: _Ratio) -> BenchmarkMe
     return BenchmarkMeasure(value, low, high, least, most)
 
 
-def precision_at(answer: JudgedAnswer, k: int, contested: Contested = None) -> float:
+def precision_at(answer: JudgedAnswer, k: int, contested: ContestedAs = None) -> float:
     """Share of lifted grasps among the best k; missing grasps count as failures."""
     return float(answer.lifted(contested_as=contested)[:k].sum()) / k
 
 
-def trial_ap(answer: JudgedAnswer, budget: int, contested: Contested = None) -> float:
+def trial_ap(answer: JudgedAnswer, budget: int, contested: ContestedAs = None) -> float:
     """Mean of the precisions at 1 to `budget`, by trials."""
     return _mean_precision(answer.lifted(contested_as=contested), budget)
 

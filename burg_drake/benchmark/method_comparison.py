@@ -24,9 +24,10 @@ class MethodDifference:
         first, second: names of the methods.
         measure: name of the measure.
         difference: mean of the first minus mean of the second.
-        low, high: 95 % interval of the difference over scenes (Student's t of paired differences).
+        low, high: 95 % interval of the difference over scenes (Student's t of paired differences);
+            NaN if it is the same in all of them.
         p_value: p value of the paired permutation test.
-        corrected: the same, corrected by Holm for all pairs that are compared.
+        corrected: the same, corrected by Holm for the pairs of its measure.
     """
 
     first: str
@@ -99,14 +100,16 @@ def compare_methods(results: Sequence[BenchmarkResult]) -> MethodComparison:
 
 
 def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodComparison]:
-    """Compares benchmarks suite by suite, in the order in which suites first occur.
+    """Compares benchmarks of the same suite, protocol and settings, in their order.
 
     Raises:
-        InvalidInputError: as `compare_methods`.
+        InvalidInputError: results are of several versions of a suite; and as `compare_methods`.
     """
-    by_suite: dict[str, list[BenchmarkResult]] = {}
+    by_suite: dict[tuple[object, ...], list[BenchmarkResult]] = {}
     for result in results:
-        by_suite.setdefault(result.document.suite, []).append(result)
+        known = result.document
+        key = (known.suite, known.protocol, known.split, known.depth_only, known.settled)
+        by_suite.setdefault(key, []).append(result)
     if not by_suite:
         raise InvalidInputError("no results are given; give folders that `benchmark run` wrote")
     return [compare_methods(found) for found in by_suite.values()]
@@ -130,15 +133,16 @@ def compare_pairs(
     found = []
     for (i, j), d, p, corrected in zip(pairs, paired, p_values, holm(p_values), strict=True):
         mean, n = float(d.mean()), len(d)
-        half = float(stdtrit(n - 1, 0.975) * d.std(ddof=1) / np.sqrt(n)) if n > 1 else np.inf
+        spread = float(d.std(ddof=1)) if n > 1 else 0.0
+        half = float(stdtrit(n - 1, 0.975)) * spread / np.sqrt(n) if spread else np.nan
         found.append(
             MethodDifference(
                 names[i],
                 names[j],
                 measure,
                 mean,
-                max(-1.0, mean - half),
-                min(1.0, mean + half),
+                float(np.maximum(-1.0, mean - half)),
+                float(np.minimum(1.0, mean + half)),
                 p,
                 corrected,
             )
@@ -194,13 +198,15 @@ def _require_comparable(results: Sequence[BenchmarkResult]) -> None:
             ("suite_hash", "version"),
             ("protocol", "protocol"),
             ("split", "split"),
+            ("depth_only", "depth only"),
+            ("settled", "second engine"),
         ):
             here, there = getattr(first.document, name), getattr(other.document, name)
             if here != there:
                 raise InvalidInputError(
                     f"{noun} is {here} in {first.path} (suite {first.document.suite}), but {there}"
                     f" in {other.path} (suite {other.document.suite}); only results of the same"
-                    " version of a suite, protocol and split can be compared"
+                    " version of a suite and of the same settings can be compared"
                 )
     names = [one.document.name for one in results]
     repeated = sorted({name for name in names if names.count(name) > 1})

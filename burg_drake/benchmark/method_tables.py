@@ -10,7 +10,7 @@ import numpy as np
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
 from burg_drake.benchmark.measures import MEASURES, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
-from burg_drake.core import NO_VALUE, TextTable, format_duration, format_number
+from burg_drake.core import NO_VALUE, TextTable, count_with_noun, format_duration, format_number
 
 SUCCESS_MEASURES = {
     "top_success": "top grasp",
@@ -73,15 +73,11 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     budget, scenes = first.suite.budget, len(first.scene_names)
     title = (
         f"Success on {first.suite.name}, release {first.suite.release}"
-        f" ({first.document.suite_hash[:8]}), {scenes} scenes"
+        f" ({first.document.suite_hash[:8]}), {count_with_noun(scenes, 'scene')}"
+        f"{_settings_text(first)}"
     )
-    success = {
-        name: head
-        for name, head in SUCCESS_MEASURES.items()
-        if name in comparison.measures[comparison.names[0]]
-    }
     tables = [
-        _measure_table(comparison, title, success, with_times=True),
+        _measure_table(comparison, title, SUCCESS_MEASURES, with_times=True),
         _measure_table(
             comparison, f"How far up to {budget.grasps} grasps an image get", STEP_MEASURES
         ),
@@ -92,6 +88,18 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     if pairs[0]:
         tables.append(_difference_table([*pairs[0], *pairs[1]]))
     return tables
+
+
+def _settings_text(result: BenchmarkResult) -> str:
+    """Settings of a benchmark other than the usual ones."""
+    known = result.document
+    parts = [
+        *(["first image of each"] if known.protocol == "clear" else []),
+        *(["for tuning"] if known.split == "tuning" else []),
+        *(["depth only"] if known.depth_only else []),
+        *([f"settled by {known.settled}"] if known.settled else []),
+    ]
+    return "".join(f", {part}" for part in parts)
 
 
 def measure_text(measure: BenchmarkMeasure) -> str:
@@ -117,6 +125,8 @@ def _measure_table(
     comparison: MethodComparison, title: str, heads: dict[str, str], *, with_times: bool = False
 ) -> TableText:
     rows = []
+    known = comparison.measures[comparison.names[0]]
+    heads = {name: head for name, head in heads.items() if name in known}
     for result in comparison.results:
         measures = comparison.measures[result.document.name]
         cells = [measure_text(measures[name]) for name in heads]
@@ -137,7 +147,7 @@ def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
         (
             f"{d.first} - {d.second}",
             SUCCESS_MEASURES[d.measure],
-            f"{_signed(d.difference)} ({_signed(d.low)} to {_signed(d.high)})",
+            _difference_text(d),
             format_number(d.p_value),
             format_number(d.corrected),
             "yes" if d.is_significant else "no",
@@ -150,6 +160,11 @@ def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
     )
     head = ("methods", "measure", "difference", "p", "corrected", "differ")
     return TableText("Differences", head, rows, caption)
+
+
+def _difference_text(d: MethodDifference) -> str:
+    interval = "" if np.isnan(d.low) else f" ({_signed(d.low)} to {_signed(d.high)})"
+    return f"{_signed(d.difference)}{interval}"
 
 
 def _signed(share: float) -> str:

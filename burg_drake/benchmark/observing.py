@@ -29,8 +29,6 @@ class SceneCamera:
         depth_range: nearest and farthest depth that it measures [m].
         noise: noise of the depth; None for exact depth.
         color: whether it takes colour images.
-        X_CD: (4, 4) error of the pose that the planner is told: it is told the pose of D, while the
-            images are taken from C.
         name: name of the camera, part of the seed of its noise.
     """
 
@@ -39,7 +37,6 @@ class SceneCamera:
     depth_range: tuple[float, float]
     noise: DepthNoise | None = None
     color: bool = True
-    X_CD: Array | None = None
     name: str = "camera"
 
     def observe(self, scene: SceneLike, station: StationLike, *, take: int = 0) -> Observation:
@@ -75,13 +72,12 @@ class SceneCamera:
                 normals=images.normals,
                 color=images.color,
             )
-        told = self.X_SC if self.X_CD is None else self.X_SC @ self.X_CD
         width, height = scene.board.size
         parts: dict[str, Any] = {
             "color": images.color,
             "depth": depth,
             "K": self.intrinsics.K,
-            "X_WC": station.document.X_WS.matrix() @ told,
+            "X_WC": station.document.X_WS.matrix() @ self.X_SC,
             "X_WS": station.document.X_WS.matrix(),
             "bounds": np.array([[0.0, 0.0, 0.0], [width, height, WORKSPACE_HEIGHT]]),
             "hand": hand_facts(station),

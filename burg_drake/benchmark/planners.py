@@ -71,6 +71,10 @@ class PlannerError(BurgError):
     """A planner failed: on one observation, after which it can be asked again, or at opening."""
 
 
+class PlannerLost(PlannerError):
+    """The planner cannot be asked any more, such as a server that has ended."""
+
+
 @dataclass(frozen=True)
 class BuiltinPlanner:
     """A planner that comes with burg_drake.
@@ -211,7 +215,8 @@ class GraspPlanner(abc.ABC):
                 f"planner {self.reference}, observation {observation.id[:12]}:"
                 f" {clean_text(str(error), 1000)}; `burg-drake planner check` tries it alone"
             ) from error
-        answer.setdefault("time", time.perf_counter() - begun)
+        if answer.get("time") is None:
+            answer["time"] = time.perf_counter() - begun
         return answer
 
     @abc.abstractmethod
@@ -306,7 +311,9 @@ class _FunctionPlanner(GraspPlanner):
         try:
             self._load()
         except (BurgError, TimeoutError) as error:
-            raise _AnswerFailure(f"it cannot be loaded again: {error}") from error
+            raise PlannerLost(
+                f"planner {self.reference} cannot be loaded again: {clean_text(str(error), 1000)}"
+            ) from error
         begun = time.monotonic()
         try:
             answer = self._wait(self._pool.submit_task(task), self._time_limit)
@@ -316,6 +323,10 @@ class _FunctionPlanner(GraspPlanner):
             raise _AnswerFailure(f"it crashed: {error}") from error
         except TaskCancelled as error:
             raise _AnswerFailure(f"it was closed meanwhile: {error}") from error
+        except TimeoutError:
+            raise
+        except Exception as error:  # of classes that other processes do not know
+            raise _AnswerFailure(f"its answer cannot be sent: {type(error).__name__}") from error
         if isinstance(answer, FunctionError):
             failure = _AnswerFailure(f"it raised {answer.line}")
             failure.add_note(answer.traceback_text)
@@ -362,7 +373,7 @@ class _CommandPlanner(GraspPlanner):
             write_arrays(question, observation.arrays())
             code = self._run([*self._words, str(question), str(answer)], errors)
             if code != 0:
-                reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+                reason = _signal_name(-code) if code < 0 else f"exit code {code}"
                 raise _AnswerFailure(f"the program ended with {reason}{_last_lines(errors)}")
             if not answer.exists():
                 raise _AnswerFailure(f"the program wrote no answer{_last_lines(errors)}")
@@ -410,12 +421,22 @@ def _read_answer(path: Path) -> dict[str, Any]:
     return {name: value if value.ndim else value.item() for name, value in found.items()}
 
 
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"
+
+
 def _last_lines(path: Path) -> str:
     """End of a message with the last lines that a program wrote; empty if it wrote none."""
     max_bytes, max_lines = 2000, 3
-    with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - max_bytes))
-        lines = stream.read().decode(errors="replace").split("\n")
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(0, path.stat().st_size - max_bytes))
+            lines = stream.read().decode(errors="replace").split("\n")
+    except OSError:  # the program has removed it
+        lines = []
     kept = [line.strip() for line in lines if line.strip()][-max_lines:]
     return f"; its last lines: {' | '.join(kept)}" if kept else ", and no message"
 
@@ -491,6 +512,11 @@ class _ServedPlanner(GraspPlanner):
             return self._remote.plan(observation)
         except TimeoutError:
             raise
+        except ConnectionError as error:
+            raise PlannerLost(
+                f"planner {self.reference}: no server answers there any more:"
+                f" {clean_text(str(error), 200)}; start it again, and run the same command"
+            ) from error
         except OSError as error:
             raise _AnswerFailure(f"the server cannot be reached: {error}") from error
         except ValueError as error:

@@ -38,6 +38,7 @@ from burg_drake.core import (
     setting,
 )
 from burg_drake.dataset import camera_looking_at
+from burg_drake.evaluation import mode_for
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.printout import print_board
 from burg_drake.scene import (
@@ -192,6 +193,8 @@ class SuiteScene:
 
     def __post_init__(self) -> None:
         require_name(self.name, "name")
+        if not self.instances:
+            raise FieldError("instances is empty; give one object or more", "instances")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -272,7 +275,8 @@ class Suite:
 
     @cached_property
     def hash(self) -> str:
-        """Hash of all that decides results: scenes, cameras, budget, engine, objects, station."""
+        """Hash of scenes, cameras, budget, name of the engine, objects and station. The figures of
+        sensors and engines are those of the release of burg_drake."""
         placed = replace(self.document, description="", library="", station="")
         return content_hash(dump_document(placed))[:HASH_DIGITS]
 
@@ -382,14 +386,15 @@ class SuiteSettings:
     """How a suite is made of scenes.
 
     Attributes:
-        description, release, budget, mode, engine: see `SuiteDocument`.
+        description, release, budget, engine: see `SuiteDocument`.
+        mode: likewise; `reach` if the station has an arm, else `hand`, if None.
         tuning: number of scenes, the last ones, on which planners may be tuned.
     """
 
     description: str = ""
     release: int = 1
     budget: Budget = Budget()
-    mode: Mode = "reach"
+    mode: Mode | None = None
     engine: str = DEFAULT_ENGINE
     tuning: int = 0
 
@@ -457,7 +462,7 @@ def make_suite(
         board=loaded[0].board,
         cameras=tuple(cameras),
         budget=settings.budget,
-        mode=settings.mode,
+        mode=mode_for(station, settings.mode),
         engine=settings.engine,
         objects=_used_objects(library, entries),
         station_content=station.content[:HASH_DIGITS],

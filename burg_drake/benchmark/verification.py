@@ -35,12 +35,12 @@ class VerifiedGrasp:
     """A grasp that was judged again.
 
     Attributes:
-        scene, id: scene and id of the grasp.
+        run, id: folder of the scene's run, and id of the grasp.
         text: `as recorded`, or what differs, in lines.
         same: whether all results are the same to the bit.
     """
 
-    scene: str
+    run: str
     id: str
     text: tuple[str, ...]
     same: bool
@@ -51,7 +51,7 @@ class Verification:
     """Result of `verify_result`.
 
     Attributes:
-        grasps: the grasps that were judged again, by scene.
+        grasps: the grasps that were judged again, by run.
         notes: packages whose versions differ from those of the result.
     """
 
@@ -86,10 +86,11 @@ def verify_result(
             together.
     """
     found = result if isinstance(result, BenchmarkResult) else load_result(result)
+    found.require_complete()
     judged: list[tuple[Path, str]] = []
     for round in found.rounds:
         answers = found.judged_answers(round)
-        _require_consistent(found, round, answers)
+        _require_consistent(round, answers)
         judged += [
             (round.run_folder(one.answer.scene), id)
             for one in answers
@@ -97,6 +98,7 @@ def verify_result(
             if verdict is not None
         ]
     rng = np.random.default_rng(seed)
+    judged = list(dict.fromkeys(judged))  # cameras may share a grasp
     chosen = sorted(rng.permutation(len(judged))[:count].tolist())
     work = [judged[k] for k in chosen]
     again: list[VerifiedGrasp] = []
@@ -107,30 +109,22 @@ def verify_result(
                 raise grasp
             again.append(grasp)
             meter.step()
-    again.sort(key=lambda grasp: (grasp.scene, grasp.id))
+    again.sort(key=lambda grasp: (grasp.run, grasp.id))
     return Verification(tuple(again), tuple(_version_notes(found)))
 
 
-def _require_consistent(
-    result: BenchmarkResult, round: Round, answers: Sequence[JudgedAnswer]
-) -> None:
+def _require_consistent(round: Round, answers: Sequence[JudgedAnswer]) -> None:
     """Refuses verdicts of other answers, and missing verdicts.
 
     Raises:
         InvalidInputError: the message says which.
     """
     campaign = round.campaign
-    if campaign is not None:
-        if campaign.document.grasps.content != round.stored_grasps().content:
-            raise InvalidInputError(
-                f"{campaign.path}: the verdicts are not those of the answers, which have changed"
-                " since"
-            )
-        if campaign.open_scenes:
-            raise InvalidInputError(
-                f"{result.path} is not complete; finish it with the command that began it:"
-                f" {result.document.command}"
-            )
+    content = round.stored_grasps().content
+    if campaign is not None and campaign.document.grasps.content != content:
+        raise InvalidInputError(
+            f"{campaign.path}: the verdicts are not those of the answers, which have changed since"
+        )
     failed = {} if campaign is None else campaign.failed
     for one in answers:
         if None in one.verdicts and one.answer.scene not in failed:
@@ -149,7 +143,7 @@ def _judge_again(work: tuple[Path, str]) -> VerifiedGrasp:
     origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
     now, _ = rerun(run.scene(), run.station(), trial, origin)
     found = differences(trial.verdict, now)
-    return VerifiedGrasp(folder.name, id, tuple(comparison(found, origin)), not found)
+    return VerifiedGrasp(str(folder), id, tuple(comparison(found, origin)), not found)
 
 
 def _version_notes(result: BenchmarkResult) -> Sequence[str]:

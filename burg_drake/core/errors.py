@@ -107,7 +107,11 @@ def quote_value(value: object) -> str:
 
     Long texts are reduced to beginning and end, structures to the first few items.
     """
-    return shorten_text(_VALUE_REPR.repr(value), 2 * MAX_VALUE_LENGTH)
+    try:
+        text = _VALUE_REPR.repr(value)
+    except ValueError:  # Python does not print whole numbers of more than 4300 digits
+        text = "a number with thousands of digits"
+    return shorten_text(text, 2 * MAX_VALUE_LENGTH)
 
 
 def shorten_text(text: str, length: int = MAX_VALUE_LENGTH) -> str:

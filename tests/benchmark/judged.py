@@ -56,7 +56,13 @@ def result(
         scenes=tuple(SuiteScene(name=n, instances=(Instance(object="mug"),)) for n in scenes),
     )
     document = BenchmarkDocument(
-        command="", name=name, planner=name, suite="made_up", release=1, suite_hash=suite_hash
+        command="",
+        complete=True,
+        name=name,
+        planner=name,
+        suite="made_up",
+        release=1,
+        suite_hash=suite_hash,
     )
     found = BenchmarkResult(Path("nowhere", name), document, suite)
     found.__dict__["answers"] = list(answers)

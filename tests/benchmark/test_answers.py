@@ -152,6 +152,8 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "inf score": ({"X_SG": GRASPS, "score": [1, 2, 3, 4, 5, np.inf]}, "1 of 6 scores are NaN or"),
     "count of widths": ({"X_SG": GRASPS, "width": 0.05}, r"width has shape \(\), but there are 6"),
     "negative width": ({"X_SG": GRASPS, "width": -np.ones(6)}, "6 of 6 widths are negative"),
+    "giant width": ({"X_SG": GRASPS, "width": np.full(6, 1e39)}, "6 of 6 widths are negative or"),
+    "giant number": ({"X_SG": GRASPS, "frame": 10**5000}, "a number with thousands of digits"),
     "frame": ({"X_SG": GRASPS, "frame": "acronyms"}, "did you mean 'acronym'"),
     "number as frame": ({"X_SG": GRASPS, "frame": 3}, "frame 3 of the answer is not"),
     "time": ({"X_SG": GRASPS, "time": "fast"}, "time 'fast' of the answer is not a number"),

@@ -15,8 +15,10 @@ from burg_drake.benchmark import (
     BenchmarkSettings,
     Budget,
     CameraPlacement,
+    PlannedGrasps,
     Suite,
     SuiteSettings,
+    choose_grasps,
     compare_by_suite,
     comparison_tables,
     episodes,
@@ -29,6 +31,8 @@ from burg_drake.benchmark import (
 )
 from burg_drake.core import InvalidInputError, Outcome, Pose
 from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station import station_gripper
+from tests.benchmark.scripted_planners import grasp_in_scene
 
 pytestmark = pytest.mark.physics
 
@@ -60,7 +64,9 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Suite:
         tmp_path_factory.mktemp("suite") / "cans.yaml",
         scenes,
         cameras=[camera],
-        settings=SuiteSettings(budget=Budget(grasps=3, seconds=30.0, picks=4), engine="screening"),
+        settings=SuiteSettings(
+            budget=Budget(grasps=3, seconds=30.0, picks=4), mode="hand", engine="screening"
+        ),
     )
 
 
@@ -73,14 +79,12 @@ def cleared(suite: Suite, tmp_path_factory: pytest.TempPathFactory) -> Benchmark
     )
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    """Answers and journals of a result, which hold all that was found."""
-    patterns = ("**/answers/*.npz", "**/scenes/*.yaml")
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for pattern in patterns
-        for path in folder.glob(pattern)
-    }
+def written(folder: Path) -> dict[Path, int]:
+    """When the answers, scenes and journals of a result were written [ns]."""
+    patterns = ("**/answers/*.npz", "**/scenes/*.yaml", "**/journal.jsonl")
+    found = [path for pattern in patterns for path in folder.glob(pattern)]
+    assert len(found) > 5
+    return {path: path.stat().st_mtime_ns for path in found}
 
 
 def outcomes(result: BenchmarkResult) -> list[tuple[str, list[str]]]:
@@ -103,12 +107,12 @@ def test_scenes_are_cleared_object_by_object(cleared: BenchmarkResult) -> None:
 
 
 def test_a_complete_result_is_not_asked_for_again(cleared: BenchmarkResult, suite: Suite) -> None:
-    before = files(cleared.path)
+    before = written(cleared.path)
     settings = replace(DEPTH, protocol="clear", name="cans")
     again = run_benchmark(
         suite, f"{PLANNERS}:plan_cans", cleared.path, settings=settings, workers=1, progress=False
     )
-    assert files(again.path) == before and outcomes(again) == outcomes(cleared)
+    assert written(again.path) == before and outcomes(again) == outcomes(cleared)
 
 
 def test_results_can_be_shared_and_verified(cleared: BenchmarkResult, tmp_path: Path) -> None:
@@ -138,6 +142,17 @@ def test_a_planner_that_always_fails_has_a_result(suite: Suite, tmp_path: Path) 
     assert all("KeyError" in one.answer.error for one in found.answers)
     measures = measure_all(found)
     assert measures["answered"].value == measures["top_success"].value == 0.0
+
+
+def test_equal_scores_keep_the_order_of_the_planner(suite: Suite) -> None:
+    scene, gripper = suite.scenes()["two"], station_gripper(suite.station)
+    X_SG = np.array([grasp_in_scene(x, 0.2, 0.05) for x in (0.4, 0.2, 0.38, 0.22)])
+    X_SG[2:, 2, 3] += 0.05  # not near the others
+    for score in (np.ones(4), np.array([1.0, 1.0, 0.5, 0.5])):
+        planned = PlannedGrasps(X_SG, np.full(4, np.nan), score, 0.0)
+        chosen = choose_grasps(scene, planned, gripper, 4, "front")
+        assert chosen.columns["instance"].tolist() == ["can_1", "can_0", "can_1", "can_0"]
+        assert chosen.columns["planner_score"].tolist() == score.tolist()
 
 
 @thorough
@@ -193,6 +208,7 @@ def test_an_unfinished_result_says_how_to_finish_it(
 ) -> None:
     copy = tmp_path / "open"
     shutil.copytree(cleared.path, copy)
-    (copy / "answers" / "one.front.npz").unlink()
-    with pytest.raises(InvalidInputError, match=r"answers/one\.front\.npz is missing"):
+    record = copy / "benchmark.yaml"
+    record.write_text(record.read_text().replace("complete: true", "complete: false"))
+    with pytest.raises(InvalidInputError, match="is not complete; finish it with the command"):
         measure_all(load_result(copy))

@@ -47,7 +47,7 @@ def test_a_suite_has_the_scenes_it_was_made_of(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "same"),
     [
-        ("name: mine", "name: mine\ndescription: for people", True),
+        ("description: ''", "description: for people", True),
         ("grasps: 10", "grasps: 11", False),
         ("sensor: d435", "sensor: d455", False),
         ("translation: [0.115, 0.115", "translation: [0.116, 0.115", False),

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake import benchmark, core, evaluation
+from burg_drake import benchmark, core
 from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark, show_progress
 
@@ -133,7 +133,7 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
 
 
 def run_benchmark_run(arguments: argparse.Namespace) -> int:
-    """Benchmarks a planner; returns 1 if scenes or grasps could not be judged."""
+    """Benchmarks a planner; returns 1 if scenes could not be judged."""
     with options.cluster_from_options(arguments) as executor:
         result = benchmark.run_benchmark(
             arguments.suite,
@@ -144,7 +144,7 @@ def run_benchmark_run(arguments: argparse.Namespace) -> int:
             executor=executor,
             progress=not arguments.quiet,
         )
-    _print_tables([result])
+    _print_tables(benchmark.compare_by_suite([result]))
     times = result.document.times
     print(
         f"time      {core.format_duration(times.total)}: rendering"
@@ -188,10 +188,9 @@ def add_benchmark_compare_options(parser: options.Parser) -> None:
 
 def run_benchmark_compare(arguments: argparse.Namespace) -> int:
     """Prints and writes the comparison of results."""
-    results = [benchmark.load_result(folder) for folder in arguments.results]
-    _print_tables(results)
+    comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
+    _print_tables(comparisons)
     if arguments.html is not None:
-        comparisons = benchmark.compare_by_suite(results)
         benchmark.write_leaderboard(comparisons, arguments.html)
         print(f"wrote {arguments.html}")
     return 0
@@ -206,11 +205,11 @@ def add_benchmark_table_options(parser: options.Parser) -> None:
 
 def run_benchmark_table(arguments: argparse.Namespace) -> int:
     """Prints the tables of results."""
-    results = [benchmark.load_result(folder) for folder in arguments.results]
+    comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
     if not arguments.markdown:
-        _print_tables(results)
+        _print_tables(comparisons)
         return 0
-    for comparison in benchmark.compare_by_suite(results):
+    for comparison in comparisons:
         for table in benchmark.comparison_tables(comparison):
             print(table.markdown())
     return 0
@@ -249,7 +248,7 @@ def run_benchmark_verify(arguments: argparse.Namespace) -> int:
     )
     print_note_lines(found.notes)
     for grasp in found.differing:
-        print("\n    ".join([f"{grasp.scene} {grasp.id}", *grasp.text]))
+        print("\n    ".join([f"{grasp.run} {grasp.id}", *grasp.text]))
     same = len(found.grasps) - len(found.differing)
     print(f"{same} of {core.count_with_noun(len(found.grasps), 'grasp')} judged again as recorded")
     return 1 if found.differing else 0
@@ -306,7 +305,6 @@ def run_benchmark_new(arguments: argparse.Namespace) -> int:
         station=station,
         settings=benchmark.SuiteSettings(
             budget=options.settings_from(arguments, benchmark.Budget),
-            mode=evaluation.mode_for(station),
             tuning=arguments.tuning_scenes,
         ),
     )
@@ -367,8 +365,8 @@ def _add_results(parser: Any) -> None:
     )
 
 
-def _print_tables(results: Iterable[benchmark.BenchmarkResult]) -> None:
+def _print_tables(comparisons: Iterable[benchmark.MethodComparison]) -> None:
     """Prints the tables of results, suite by suite."""
-    for comparison in benchmark.compare_by_suite(list(results)):
+    for comparison in comparisons:
         for table in benchmark.comparison_tables(comparison):
             table.text_table().show()
