@@ -79,7 +79,9 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     tables = [
         _measure_table(comparison, title, SUCCESS_MEASURES, with_times=True),
         _measure_table(
-            comparison, f"How far up to {budget.grasps} grasps an image get", STEP_MEASURES
+            comparison,
+            f"Stages passed, up to {budget.grasps} grasps an image",
+            STEP_MEASURES,
         ),
     ]
     if first.document.protocol == "clear":
@@ -150,7 +152,7 @@ def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
             _difference_text(d),
             format_number(d.p_value),
             format_number(d.corrected),
-            "yes" if d.is_significant else "no",
+            "yes" if d.is_significant else "not shown",
         )
         for d in differences
     )

@@ -37,7 +37,7 @@ def test_success_counts_missing_grasps_and_answers_as_failures() -> None:
     first = np.mean([1, 1 / 2, 2 / 3, 3 / 4])
     second = np.mean([0, 1 / 2, 1 / 3, 1 / 4])
     assert found["average_precision"].value == pytest.approx((first + second) / 4)
-    assert found["answered"].value == 3 / 4
+    assert found["answered"].value == 2 / 4
     assert "precision_5" not in found  # the budget is four grasps
 
 

@@ -479,7 +479,7 @@ def test_a_server_goes_down_and_comes_back(tmp_path: Path) -> None:
             planner.ask(observation(1))
         with pytest.raises(PlannerError, match="no answer within 1 s"):
             planner.ask(observation(3))
-    with pytest.raises(PlannerError, match=r"no server answers there any more: .*Connection refused"):
+    with pytest.raises(PlannerError, match=r"no server answers .*Connection refused"):
         planner.ask(observation())
     with planner, served(path, int(url.rpartition(":")[2])) as (again, process):
         assert again == url

@@ -292,6 +292,11 @@ def run_benchmark_new(arguments: argparse.Namespace) -> int:
     from burg_drake.scene import load_scene, scene_references
     from burg_drake.station import load_station
 
+    if Path(arguments.suite).exists():
+        raise core.InvalidInputError(
+            f"{arguments.suite} exists already; choose another name, or delete it: interrupted"
+            " results of a suite cannot be continued on another one"
+        )
     station = load_station(arguments.station)
     if arguments.sample is None:
         scenes = [load_scene(reference) for reference in scene_references(arguments.scenes)]
