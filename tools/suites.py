@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from burg_drake.benchmark import SUITES, CameraPlacement, SuiteSettings, make_suite
+from burg_drake.benchmark import SUITE_FOLDER, CameraPlacement, SuiteSettings, make_suite
 from burg_drake.core import data_root
 from burg_drake.generation import sample_scene
 from burg_drake.objects import load_library
@@ -107,7 +107,7 @@ def write_suite(name: str, count: int = 20) -> None:
     scenes = sample_scenes_of(name, plan, count + TUNING)
     placement = CameraPlacement(elevation_deg=plan.elevation_deg, distance=plan.distance)
     make_suite(
-        data_root() / SUITES / f"{name}.yaml",
+        data_root() / SUITE_FOLDER / f"{name}.yaml",
         scenes,
         cameras=[placement.camera(scenes[0].board)],
         station=plan.station,

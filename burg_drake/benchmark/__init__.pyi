@@ -57,7 +57,7 @@ from .planners import (
     serve_planner as serve_planner,
 )
 from .suite import (
-    SUITES as SUITES,
+    SUITE_FOLDER as SUITE_FOLDER,
     Budget as Budget,
     CameraPlacement as CameraPlacement,
     Suite as Suite,

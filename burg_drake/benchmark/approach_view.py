@@ -19,9 +19,9 @@ from burg_drake.core import Array, Booleans, Indices, Single, inverse, transform
 
 Floats = NDArray[np.floating[Any]]
 """Numbers of single or double precision."""
-CELL = 0.002
+CELL_SIZE = 0.002
 """Size of a cell of a height map [m]."""
-SURROUNDINGS = 0.15
+MAX_OVERHANG = 0.15
 """Distance around the bounds of the objects within which the hand may meet something [m]."""
 MIN_HEIGHT = 0.008
 """Points that are lower above the table may be the table, measured with noise [m]."""
@@ -60,7 +60,7 @@ class SceneCloud:
         X_SC = inverse(observation.X_CS)
         p_SP = transform_points(X_SC, _points_at(depth, observation.K, *_pixels(depth)))
         low, high = np.asarray(observation.bounds, dtype=float)
-        near = (p_SP > low - SURROUNDINGS) & (p_SP < high + SURROUNDINGS)
+        near = (p_SP > low - MAX_OVERHANG) & (p_SP < high + MAX_OVERHANG)
         solid = near.all(axis=-1) & (p_SP[..., 2] > MIN_HEIGHT) & measured
         inside = solid & ((p_SP > low) & (p_SP < high)).all(axis=-1)
         beside_fixed = ndimage.binary_dilation(solid & ~inside, iterations=EDGE_PIXELS)
@@ -75,7 +75,7 @@ class SceneCloud:
         pixel, value, nearest = _refine(depth, solid, step, cut)
         dense = transform_points(X_SC, _points_at(value, observation.K, *pixel))
         hidden = transform_points(X_SC, _hidden_points(depth, observation.K, step, cut))
-        hidden = hidden[((hidden > low - SURROUNDINGS) & (hidden < high + SURROUNDINGS)).all(-1)]
+        hidden = hidden[((hidden > low - MAX_OVERHANG) & (hidden < high + MAX_OVERHANG)).all(-1)]
         cluster = label[nearest]
         return cls(dense, cluster, hidden, _middles(dense, cluster))
 
@@ -155,7 +155,7 @@ def _label_surfaces(depth: Array, chosen: Booleans, step: Array, beside_fixed: B
 def _refine(
     depth: Array, solid: Booleans, step: Array, rows: slice
 ) -> tuple[tuple[Array, Array], Array, tuple[Indices, Indices]]:
-    """Solid pixels and, within surfaces, positions between them about `CELL / 2` apart.
+    """Solid pixels and, within surfaces, positions between them about `CELL_SIZE / 2` apart.
 
     Returns:
         Columns and rows (N,) of the positions, their depth (N,), and their nearest pixels as an
@@ -167,8 +167,8 @@ def _refine(
     whole = s[:-1, :-1] & s[:-1, 1:] & s[1:, :-1] & s[1:, 1:]
     r, c = np.nonzero(smooth & whole)
     corners = four[:, r, c]
-    distance = float(np.median(step[rows][s])) / MAX_PIXEL_STEPS if s.any() else CELL
-    parts = int(np.clip(np.ceil(2.0 * distance / CELL), 1, 4))
+    distance = float(np.median(step[rows][s])) / MAX_PIXEL_STEPS if s.any() else CELL_SIZE
+    parts = int(np.clip(np.ceil(2.0 * distance / CELL_SIZE), 1, 4))
     found = [(np.nonzero(s)[1].astype(float), np.nonzero(s)[0].astype(float), d[s])]
     for i in range(parts):
         for j in range(parts):
@@ -193,10 +193,10 @@ def _hidden_points(depth: Array, K: Array, step: Array, rows: slice) -> Array:
         near = np.minimum(depth[rows][a], depth[rows][b])
         jump = np.abs(depth[rows][a] - depth[rows][b])
         r, c = np.nonzero((jump > step[rows][a]) & (near > 0.0))
-        count = np.minimum(np.ceil(jump[r, c] / CELL), 300).astype(np.intp)
+        count = np.minimum(np.ceil(jump[r, c] / CELL_SIZE), 300).astype(np.intp)
         which = np.repeat(np.arange(len(r)), count)
         along = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        z = near[r, c][which] + (along + 0.5) * CELL
+        z = near[r, c][which] + (along + 0.5) * CELL_SIZE
         row = r[which] + (rows.start or 0) + middle[1]
         found.append(_points_at(z, K, c[which] + middle[0], row))
     return np.concatenate(found)
@@ -210,7 +210,7 @@ def _middles(p_SP: Array, cluster: Indices) -> Array:
     ends = np.searchsorted(cluster[order], np.arange(count + 1))
     for k in range(count):
         points = p_SP[order[ends[k] : ends[k + 1]]]
-        cells = np.round(points[:, :2] / CELL).astype(np.int64)
+        cells = np.round(points[:, :2] / CELL_SIZE).astype(np.int64)
         by_height = np.lexsort((-points[:, 2], cells[:, 1], cells[:, 0]))
         _, first = np.unique(cells[by_height], axis=0, return_index=True)
         top = points[by_height[first]]
@@ -244,9 +244,11 @@ class ApproachView:
         """The view of a cloud along -z of V; `bounds` are those of the observation."""
         low, high = np.asarray(bounds, dtype=float)
         corners = np.array(np.meshgrid(*np.stack([low, high], axis=1))).reshape(3, -1).T @ R_SV
-        origin = corners[:, :2].min(axis=0) - SURROUNDINGS
-        shape = np.ceil((corners[:, :2].max(axis=0) + SURROUNDINGS - origin) / CELL).astype(int)
-        x, y = (origin[k] + CELL * np.arange(shape[k]) for k in (0, 1))
+        origin = corners[:, :2].min(axis=0) - MAX_OVERHANG
+        shape = np.ceil((corners[:, :2].max(axis=0) + MAX_OVERHANG - origin) / CELL_SIZE).astype(
+            int
+        )
+        x, y = (origin[k] + CELL_SIZE * np.arange(shape[k]) for k in (0, 1))
         table = -(R_SV[2, 0] * x[:, None] + R_SV[2, 1] * y) / R_SV[2, 2]
         seen = _highest(cloud.p_SP @ R_SV, origin, shape)
         hidden = _highest(cloud.p_SH @ R_SV, origin, shape)
@@ -264,8 +266,8 @@ class ApproachView:
 
     def sample(self, values: Floats, x: Floats, y: Floats) -> Floats:
         """Values (...) of a map (A, B) at positions (...) in V [m]; at the border outside of it."""
-        i = np.rint((x - self.origin[0]) * (1.0 / CELL)).astype(np.int32)
-        j = np.rint((y - self.origin[1]) * (1.0 / CELL)).astype(np.int32)
+        i = np.rint((x - self.origin[0]) * (1.0 / CELL_SIZE)).astype(np.int32)
+        j = np.rint((y - self.origin[1]) * (1.0 / CELL_SIZE)).astype(np.int32)
         np.clip(i, 0, values.shape[0] - 1, out=i)
         np.clip(j, 0, values.shape[1] - 1, out=j)
         return np.asarray(values.ravel()[i * values.shape[1] + j])
@@ -274,7 +276,7 @@ class ApproachView:
 def _highest(p_VP: Array, origin: Array, shape: Indices) -> Array:
     """Largest z of the points (N, 3) in each cell; -inf in cells without points."""
     found = np.full(int(shape[0] * shape[1]), -np.inf)
-    i = np.rint((p_VP[:, :2] - origin) / CELL).astype(np.intp)
+    i = np.rint((p_VP[:, :2] - origin) / CELL_SIZE).astype(np.intp)
     inside = ((i >= 0) & (i < shape)).all(axis=1)
     np.maximum.at(found, i[inside, 0] * shape[1] + i[inside, 1], p_VP[inside, 2])
     return found.reshape(shape)

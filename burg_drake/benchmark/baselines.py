@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from burg_drake.benchmark.approach_view import CELL, ApproachView, SceneCloud
+from burg_drake.benchmark.approach_view import CELL_SIZE, ApproachView, SceneCloud
 from burg_drake.benchmark.burg_planner import Observation
-from burg_drake.benchmark.depth_grasps import CLEARANCE, plan_hands, score_hands
+from burg_drake.benchmark.depth_grasps import MIN_CLEARANCE, plan_hands, score_hands
 from burg_drake.core import Array, Booleans, GraspSet, Indices, make_pose, perpendicular_axes
 from burg_drake.evaluation import INSTANCE_COLUMN, SamplingSettings, sample_grasps, scored_set
 from burg_drake.grasping import (
@@ -79,7 +79,7 @@ def top_down(observation: Observation) -> dict[str, Any]:
         if width >= opening:
             continue
         top = float(np.percentile(p_SP[:, 2], 98.0))
-        depth = min(TIP_DEPTH, top - CLEARANCE)
+        depth = min(TIP_DEPTH, top - MIN_CLEARANCE)
         x = np.array([*across, 0.0])
         p_SG = np.array([*(center + 0.5 * (low + high) * across), top - depth + tip])
         X_SG = make_pose(np.stack([x, np.cross(z, x), z], axis=1), p_SG)
@@ -97,7 +97,7 @@ def _height_clusters(cloud: SceneCloud) -> list[Array]:
     if not len(p_SP):
         return []
     border = 3  # Cells around the map, as many as closing needs.
-    cell = np.rint(p_SP[:, :2] / CELL).astype(np.intp)
+    cell = np.rint(p_SP[:, :2] / CELL_SIZE).astype(np.intp)
     first = cell.min(axis=0) - border
     cell -= first
     height = np.zeros(cell.max(axis=0) + border + 1)
@@ -108,7 +108,7 @@ def _height_clusters(cloud: SceneCloud) -> list[Array]:
     for k in range(1, count + 1):
         i, j = np.nonzero((label == k) & (height > 0.0))
         if len(i) >= min_cells:
-            xy = CELL * (first + np.stack([i, j], axis=1))
+            xy = CELL_SIZE * (first + np.stack([i, j], axis=1))
             found.append(np.column_stack([xy, height[i, j]]))
     return found
 

@@ -51,7 +51,7 @@ from typing import Any, Callable, Mapping  # noqa: UP035  # Python 3.8
 
 import numpy as np
 
-PROTOCOL = "burg_drake.planner"
+PROTOCOL_NAME = "burg_drake.planner"
 PROTOCOL_VERSION = 1
 MAX_OBSERVATION_BYTES = 1 << 28
 """Colour, depth and segmentation of 20 million pixels fit in."""
@@ -366,8 +366,8 @@ class RemotePlanner:
                 greeting = self._exchange(None, connect_timeout)
             except TimeoutError as error:
                 raise ConnectionError(f"no greeting within {connect_timeout:g} s") from error
-            if greeting.get("protocol") != PROTOCOL:
-                raise ValueError(f"{self.url} is not a planner: it sends no {PROTOCOL!r}")
+            if greeting.get("protocol") != PROTOCOL_NAME:
+                raise ValueError(f"{self.url} is not a planner: it sends no {PROTOCOL_NAME!r}")
             if greeting.get("version") != PROTOCOL_VERSION:
                 raise ValueError(
                     f"{self.url} has version {greeting.get('version')!r} of the protocol, this is"
@@ -439,7 +439,7 @@ def serve(plan: PlanFunction, port: int, host: str = "127.0.0.1", name: str = ""
         replies: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         try:
             client.send(
-                pack_message({"protocol": PROTOCOL, "version": PROTOCOL_VERSION, "name": name})
+                pack_message({"protocol": PROTOCOL_NAME, "version": PROTOCOL_VERSION, "name": name})
             )
             for data in client:
                 questions.put((client, data, replies))

@@ -20,11 +20,9 @@ from burg_drake.core import (
     make_pose,
 )
 from burg_drake.evaluation import (
-    build_judge,
-    decisive_mode,
     judge_grasp,
+    judge_of_trial,
     load_run,
-    mode_for,
     origin_of,
 )
 from burg_drake.scene import Instance, Scene
@@ -62,13 +60,7 @@ def scene_after(work: tuple[Scene, ExecutedGrasp]) -> Scene:
     if trial.verdict.outcome is Outcome.SIMULATION_FAILED:
         return scene
     origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
-    judge = build_judge(
-        scene,
-        station,
-        engine=origin.engine,
-        mode=mode_for(station, decisive_mode(trial, origin)),
-        settings=origin.settings(),
-    )
+    judge = judge_of_trial(scene, station, trial, origin)
     verdict = judge_grasp(judge, trial.candidate)
     poses = judge.trial.final_poses()
     if verdict.outcome.held:

@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from burg_drake.benchmark.approach_view import CELL, ApproachView, Floats, SceneCloud
+from burg_drake.benchmark.approach_view import CELL_SIZE, ApproachView, Floats, SceneCloud
 from burg_drake.core import Array, Booleans, Indices, make_pose
 
 PAD_HALF_WIDTH = 0.00875
@@ -27,17 +27,17 @@ ROOT_THICKNESS, ROOT_HEIGHT = 0.026, 0.018
 PALM_HALF_SIZE = (0.102, 0.032)
 PALM_HEIGHT = 0.0465
 """Height of the palm above the finger tips [m]."""
-CLEARANCE = 0.003
+MIN_CLEARANCE = 0.003
 """Smallest distance of the hand from what the camera measured [m]."""
-TURNS = 12
+TURN_COUNT = 12
 """Directions in which the hand closes, over half a turn."""
-LEVELS = (0.003, 0.010, 0.018, 0.028)
+WIDTH_SAMPLE_DEPTHS = (0.003, 0.010, 0.018, 0.028)
 """Depths below a sampled point in which the width of the object is measured [m]."""
 MAX_RISE = 0.02
 """Height above a sampled point from which on something is another body, such as a shelf [m]."""
 MIN_ENGAGEMENT = 0.006
 """Smallest depth of the finger tips below the top of what is between the fingers [m]."""
-RAISES = (0.0, 0.005, 0.010, 0.016, 0.024)
+HEIGHT_STEPS = (0.0, 0.005, 0.010, 0.016, 0.024)
 """Heights above the lowest clear one at which the hand is tried [m]."""
 
 
@@ -153,24 +153,24 @@ def propose_hands(
         (M,) each.
     """
     room = 0.004  # Smallest distance of each pad from the object [m].
-    turn = np.pi * np.arange(TURNS) / TURNS
+    turn = np.pi * np.arange(TURN_COUNT) / TURN_COUNT
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
-    steps = int(opening / CELL)
-    along = CELL * np.arange(-steps, steps + 1)
+    steps = int(opening / CELL_SIZE)
+    along = CELL_SIZE * np.arange(-steps, steps + 1)
     x, y = (p_VP[:, k, None, None] for k in (0, 1))
-    profile = view.sample(view.height, x + c * along, y + s * along)  # (N, TURNS, K)
+    profile = view.sample(view.height, x + c * along, y + s * along)  # (N, TURN_COUNT, K)
     other = profile > (p_VP[:, 2] + MAX_RISE)[:, None, None]
     found = []
-    for level in LEVELS:
+    for level in WIDTH_SAMPLE_DEPTHS:
         solid = profile > (p_VP[:, 2] - level)[:, None, None]
         right = np.argmin(solid[..., steps:], axis=-1)
         left = np.argmin(solid[..., steps::-1], axis=-1)
-        width = CELL * (left + right - 1)
+        width = CELL_SIZE * (left + right - 1)
         fits = (left > 0) & (right > 0) & (width < opening - 2.0 * room)
-        within = (along > -CELL * left[..., None]) & (along < CELL * right[..., None])
+        within = (along > -CELL_SIZE * left[..., None]) & (along < CELL_SIZE * right[..., None])
         fits &= ~(other & within).any(axis=-1)
         row, angle = np.nonzero(fits)
-        shift = 0.5 * CELL * (right - left)[row, angle]
+        shift = 0.5 * CELL_SIZE * (right - left)[row, angle]
         found.append(
             (
                 p_VP[row, 0] + shift * c[angle, 0],
@@ -202,7 +202,7 @@ def _rectangle(
 
 def _two_sides(low: float, high: float, half_width: float) -> tuple[Array, Array]:
     """Positions (K,) in two rectangles from `low` to `high` on both sides of the middle."""
-    x, y = _rectangle((low, -half_width), (high, half_width), 3.0 * CELL)
+    x, y = _rectangle((low, -half_width), (high, half_width), 3.0 * CELL_SIZE)
     return np.concatenate([x, -x]), np.concatenate([y, y])
 
 
@@ -228,8 +228,8 @@ class HandFitter:
             The hands with finger tips below their point (N,) and something between their fingers,
             each at several heights.
         """
-        steps = int(self._inner / CELL)
-        between = (CELL * np.arange(-steps, steps + 1)).astype(np.float32)
+        steps = int(self._inner / CELL_SIZE)
+        between = (CELL_SIZE * np.arange(-steps, steps + 1)).astype(np.float32)
         rows = np.linspace(-PAD_HALF_WIDTH, PAD_HALF_WIDTH, 5, dtype=np.float32)
         grid = tuple(offsets.ravel() for offsets in np.meshgrid(between, rows))
         shape = (-1, len(rows), len(between))
@@ -244,8 +244,8 @@ class HandFitter:
         unseen = self._heights(self._view.hidden, place, grid).reshape(shape)
         beside = self._heights(self._view.hidden, place, self._fingers())
         found = [self._hands(place[:0], lowest[:0], cluster[:0], {})]
-        above_hidden = np.maximum(beside.max(axis=1) + CLEARANCE - lowest, 0.0)
-        for raised in (*RAISES, above_hidden):
+        above_hidden = np.maximum(beside.max(axis=1) + MIN_CLEARANCE - lowest, 0.0)
+        for raised in (*HEIGHT_STEPS, above_hidden):
             tip = lowest + raised
             chosen = np.flatnonzero((top - tip > MIN_ENGAGEMENT) & (tip < point))
             tip = tip[chosen]
@@ -269,13 +269,13 @@ class HandFitter:
     def _lowest_tips(self, place: Floats) -> Floats:
         """(N,) lowest heights of the finger tips at which hands at places (N, 3) are clear [m]."""
         a, b = PALM_HALF_SIZE
-        palm = _rectangle((-a, -b), (a, b), 5.0 * CELL)
+        palm = _rectangle((-a, -b), (a, b), 5.0 * CELL_SIZE)
         parts = [
             self._heights(self._near, place, self._fingers()).max(axis=1),
             self._heights(self._near, place, self._roots()).max(axis=1) - ROOT_HEIGHT,
             self._heights(self._around, place, palm).max(axis=1) - PALM_HEIGHT,
         ]
-        return np.asarray(np.max(parts, axis=0) + CLEARANCE)
+        return np.asarray(np.max(parts, axis=0) + MIN_CLEARANCE)
 
     def _fingers(self) -> tuple[Array, Array]:
         """Positions along x and y of the grasp below both fingers (K,) [m]."""
@@ -349,7 +349,7 @@ def _measure_contact(
         _fit_slopes(between[side], 1.0 / (1.0 + (gap / near) ** 2), levels, rows)
         for side, gap in zip((first, last), gaps, strict=True)
     ]
-    shadow = (unseen[:, None] > heights + CLEARANCE) & ~solid
+    shadow = (unseen[:, None] > heights + MIN_CLEARANCE) & ~solid
     k = np.arange(n)
     before = (shadow & (k < np.where(full, first, n)[..., None])).mean(axis=(1, 2, 3))
     behind = (shadow & (k > np.where(full, last, -1)[..., None])).mean(axis=(1, 2, 3))

@@ -41,7 +41,7 @@ class BenchmarkMeasure(NamedTuple):
     most: float
 
 
-MEASURES = {
+MEASURE_MEANINGS = {
     "top_success": "share of observations whose best grasp lifted its object",
     "precision_3": "mean share of lifted grasps among the best 3",
     "precision_5": "mean share of lifted grasps among the best 5",
@@ -77,7 +77,7 @@ class _Ratio(NamedTuple):
 
 
 def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
-    """All measures of a complete benchmark by name; see `MEASURES`.
+    """All measures of a complete benchmark by name; see `MEASURE_MEANINGS`.
 
     Raises:
         InvalidInputError: the benchmark is not complete.
@@ -89,7 +89,7 @@ def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     found = {name: measure_ratio(result.answers, ratio) for name, ratio in ratios.items()}
     if result.document.protocol == "clear":
         found |= _clearing_measures(result)
-    return {name: found[name] for name in MEASURES if name in found}
+    return {name: found[name] for name in MEASURE_MEANINGS if name in found}
 
 
 def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:

@@ -12,7 +12,7 @@ from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
 from burg_drake.benchmark.measures import BenchmarkMeasure, measure_all, precision_at, trial_ap
 from burg_drake.core import Array, InvalidInputError, list_names
 
-SIGNIFICANCE = 0.05
+SIGNIFICANCE_LEVEL = 0.05
 """Two methods differ if the corrected p value is below this."""
 
 
@@ -42,7 +42,7 @@ class MethodDifference:
     @property
     def is_significant(self) -> bool:
         """Whether the methods differ."""
-        return self.corrected < SIGNIFICANCE
+        return self.corrected < SIGNIFICANCE_LEVEL
 
 
 @dataclass(frozen=True, eq=False)

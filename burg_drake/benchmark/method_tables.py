@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
-from burg_drake.benchmark.measures import MEASURES, BenchmarkMeasure
+from burg_drake.benchmark.measures import MEASURE_MEANINGS, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
 from burg_drake.core import NO_VALUE, TextTable, count_with_noun, format_duration, format_number
 
@@ -134,7 +134,7 @@ def _measure_table(
         cells = [measure_text(measures[name]) for name in heads]
         times = [format_duration(planning_time(result))] if with_times else []
         rows.append((result.document.name, *cells, *times))
-    meanings = [f"{head}: {MEASURES[name]}" for name, head in heads.items()]
+    meanings = [f"{head}: {MEASURE_MEANINGS[name]}" for name, head in heads.items()]
     if with_times:
         meanings.append(
             "in percent, with the 95 % interval if scenes were drawn again; in brackets the range"

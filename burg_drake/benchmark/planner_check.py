@@ -52,6 +52,8 @@ from burg_drake.station import Station, StationLike, as_station, station_gripper
 
 MAX_CHECKED_GRASPS = 200
 """Number of the best grasps of an answer that are looked at."""
+MIN_HIDDEN_GRASPS = 4
+"""Number of grasps, all of one object, that have to show a mistake that other grasps do not."""
 
 Ask = Callable[[Observation, Scene, Station], Mapping[str, Any]]
 """Asks a planner; returns its answer, unread."""
@@ -208,8 +210,33 @@ class _PlannerSearch:
 
     def examine(self) -> tuple[tuple[int, int], MistakeFound | None]:
         """Number of grasps that fit as returned and of those tried, and the mistake in poses."""
+        fits, found = self._examine(self._as_returned)
+        if found is not None:
+            return fits, found
+        return fits, self._hidden_mistake(fits)
+
+    def _examine(
+        self, grasps: Mapping[str, GraspSet]
+    ) -> tuple[tuple[int, int], MistakeFound | None]:
         frames = [*frame_mistakes(self._poses.entry, self._seen.observation)]
-        return examine_grasps(self._as_returned, self._seen.station, self._seen.scene, frames)
+        return examine_grasps(grasps, self._seen.station, self._seen.scene, frames)
+
+    def _hidden_mistake(self, fits: tuple[int, int]) -> MistakeFound | None:
+        """A mistake that grasps of one object do not show, as turned ones of a can fit as well: it
+        is that of the others if nearly all grasps fit after its correction.
+
+        Args:
+            fits: number of grasps that fit as returned, and of those tried.
+        """
+        fitting, tried = fits
+        for name, grasps in self._as_returned.items():
+            _, found = self._examine({name: grasps})
+            if found is None or found.after < MIN_HIDDEN_GRASPS:
+                continue
+            (after, _), _ = self._examine(self._by_instance(self._corrected(found.mistake)))
+            if after >= max(0.9 * tried, fitting + MIN_HIDDEN_GRASPS):
+                return replace(found, before=fitting, after=after, count=tried, only="")
+        return None
 
     def width_problems(self, found: MistakeFound | None) -> list[str]:
         """What is wrong with the widths, after the correction of the poses."""

@@ -61,7 +61,7 @@ from burg_drake.station import (
     require_valid_scene,
 )
 
-SUITES = "scenes/suites"
+SUITE_FOLDER = "scenes/suites"
 """Kind of the built-in suites, for `resolve_reference`."""
 HASH_DIGITS = 16
 """Digits of the hashes in suites and results."""
@@ -314,7 +314,7 @@ SuiteLike = Suite | str | Path
 
 def suite_names() -> list[str]:
     """Names of the built-in suites."""
-    return builtin_names(SUITES)
+    return builtin_names(SUITE_FOLDER)
 
 
 def load_suite(reference: str | Path) -> Suite:
@@ -332,7 +332,7 @@ def load_suite(reference: str | Path) -> Suite:
         DocumentError: the file does not fit the schema.
         InvalidInputError: objects or the station have changed since the suite was made.
     """
-    path = resolve_reference(reference, SUITES)
+    path = resolve_reference(reference, SUITE_FOLDER)
     document = load_document(path, SuiteDocument)
     library = load_library(document.library, path.parent)
     station = load_station(resolve_reference(document.station, "stations", path.parent))

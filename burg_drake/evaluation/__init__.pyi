@@ -198,6 +198,7 @@ from .replay import (
     decisive_mode as decisive_mode,
     differences as differences,
     find_inputs as find_inputs,
+    judge_of_trial as judge_of_trial,
     motion_figures as motion_figures,
     rerun as rerun,
 )

@@ -24,7 +24,7 @@ from burg_drake.core import (
     resolve_reference,
     software_versions,
 )
-from burg_drake.evaluation.judge import build_judge, judge_grasp, mode_for
+from burg_drake.evaluation.judge import StationJudge, build_judge, judge_grasp, mode_for
 from burg_drake.evaluation.results_table import RecordedTrial
 from burg_drake.evaluation.run_document import HASH_DIGITS
 from burg_drake.evaluation.run_folder import RUN_FILE, load_run
@@ -177,15 +177,22 @@ def rerun(
     Raises:
         InvalidInputError: this release lacks a setting, or the scene is invalid.
     """
-    judge = build_judge(
+    judge = judge_of_trial(scene, station, trial, origin)
+    verdict = judge_grasp(judge, trial.candidate)
+    return verdict, judge.plan
+
+
+def judge_of_trial(
+    scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
+) -> StationJudge:
+    """The cheapest judge that gives a recorded trial its verdict again."""
+    return build_judge(
         scene,
         station,
         engine=origin.engine,
         mode=mode_for(station, decisive_mode(trial, origin)),
         settings=origin.settings(),
     )
-    verdict = judge_grasp(judge, trial.candidate)
-    return verdict, judge.plan
 
 
 def decisive_mode(trial: RecordedTrial, origin: TrialOrigin) -> Mode:

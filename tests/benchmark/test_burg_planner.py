@@ -342,7 +342,11 @@ def misbehaving(talk: Callable[[ServerConnection], None], **options: Any) -> Ite
 
 
 GREETING = burg_planner.pack_message(
-    {"protocol": burg_planner.PROTOCOL, "version": burg_planner.PROTOCOL_VERSION, "name": "bad"}
+    {
+        "protocol": burg_planner.PROTOCOL_NAME,
+        "version": burg_planner.PROTOCOL_VERSION,
+        "name": "bad",
+    }
 )
 
 
@@ -355,7 +359,7 @@ GREETING = burg_planner.pack_message(
             "is not a planner: it sends no 'burg_drake.planner'",
         ),
         (
-            burg_planner.pack_message({"protocol": burg_planner.PROTOCOL, "version": 99}),
+            burg_planner.pack_message({"protocol": burg_planner.PROTOCOL_NAME, "version": 99}),
             "has version 99 of the protocol, this is 1; copy burg_planner.py again",
         ),
         (b"\xc1", "the message cannot be read"),

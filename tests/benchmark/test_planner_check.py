@@ -383,6 +383,18 @@ def test_answers_that_are_refused_are_problems(seen: CheckScene) -> None:
     assert found.problems[0].startswith("There are no grasps") and found.time == 0.5
 
 
+def test_grasps_that_fit_either_way_do_not_hide_turned_ones(seen: CheckScene) -> None:
+    turned = from_above(12) @ pose((0, 0, 90))
+    found = check_answer({"X_SG": turned}, seen)
+    (problem,) = found.problems
+    assert (
+        problem.startswith("The grasps are")
+        and "turned by 90 degrees about the approach" in problem
+    )
+    assert found.fits[0] == 6 and "6 of the 12 that were tried fit" in problem
+    assert check_answer({"X_SG": from_above(12)}, seen).problems == ()
+
+
 def test_asking_tells_the_time_and_failures(
     seen: CheckScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
