@@ -7,7 +7,6 @@ from .answers import (
 )
 from .baselines import (
     antipodal as antipodal,
-    oracle as oracle,
     random_grasps as random_grasps,
     top_down as top_down,
 )
@@ -40,6 +39,7 @@ from .method_comparison import (
 )
 from .method_tables import comparison_tables as comparison_tables
 from .observing import SceneCamera as SceneCamera
+from .oracle_planner import oracle as oracle
 from .planner_check import (
     CheckScene as CheckScene,
     PlannerCheck as PlannerCheck,

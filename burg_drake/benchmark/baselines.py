@@ -1,4 +1,4 @@
-"""The planners that the benchmark brings along, from random grasps to one that knows the meshes."""
+"""The built-in planners that see an image alone; `oracle_planner` has the one that knows more."""
 
 from __future__ import annotations
 
@@ -10,18 +10,13 @@ from scipy import ndimage
 from burg_drake.benchmark.approach_view import CELL_SIZE, ApproachView, SceneCloud
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.depth_grasps import MIN_CLEARANCE, plan_hands, score_hands
-from burg_drake.core import Array, Booleans, GraspSet, Indices, make_pose, perpendicular_axes
-from burg_drake.evaluation import INSTANCE_COLUMN, SamplingSettings, sample_grasps, scored_set
+from burg_drake.core import Array, Indices, make_pose, perpendicular_axes
 from burg_drake.grasping import (
     GraspNetSettings,
-    HandClearance,
     grasp_components,
     pair_angle,
     pair_translation,
 )
-from burg_drake.motion import ArmReach, ReachSettings
-from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.station import Station, StationLike, as_station, build_station_diagram
 
 MAX_GRASPS = 50
 """Largest number of grasps in an answer."""
@@ -42,7 +37,7 @@ def antipodal(observation: Observation) -> dict[str, Any]:
     opening, tip = float(observation.hand["opening"][1]), float(observation.hand["tip"])
     graspable = np.flatnonzero(cloud.cluster >= 0)
     if not len(graspable):
-        return _answer(observation)
+        return make_answer(observation)
     # Small surfaces get more than their share of the points.
     weight = np.bincount(cloud.cluster[graspable])[cloud.cluster[graspable]] ** -0.5
     weight /= weight.sum()
@@ -54,9 +49,9 @@ def antipodal(observation: Observation) -> dict[str, Any]:
         hands = plan_hands(view, cloud, rows, opening)
         found.append((hands.poses(R_SV, tip), hands.width, score_hands(hands, opening)))
     X_SG, width, score = (np.concatenate(part) for part in zip(*found, strict=True))
-    kept = _best_apart(X_SG, score)
+    kept = best_apart(X_SG, score)
     kept = kept[score[kept] > MIN_SCORE]
-    return _answer(observation, X_SG[kept], width[kept], score[kept])
+    return make_answer(observation, X_SG[kept], width[kept], score[kept])
 
 
 def top_down(observation: Observation) -> dict[str, Any]:
@@ -85,9 +80,9 @@ def top_down(observation: Observation) -> dict[str, Any]:
         X_SG = make_pose(np.stack([x, np.cross(z, x), z], axis=1), p_SG)
         found.append((X_SG, width, (1.0 - width / opening) * depth / TIP_DEPTH))
     if not found:
-        return _answer(observation)
+        return make_answer(observation)
     X, widths, scores = (np.array(part) for part in zip(*found, strict=True))
-    return _answer(observation, X, widths, scores)
+    return make_answer(observation, X, widths, scores)
 
 
 def _height_clusters(cloud: SceneCloud) -> list[Array]:
@@ -123,7 +118,7 @@ def random_grasps(observation: Observation) -> dict[str, Any]:
     cloud, rng = SceneCloud.of(observation), observation.rng()
     graspable = np.flatnonzero(cloud.cluster >= 0)
     if not len(graspable):
-        return _answer(observation)
+        return make_answer(observation)
     p_SG = cloud.p_SP[rng.choice(graspable, MAX_GRASPS)]
     cosine = rng.uniform(np.cos(max_tilt), 1.0, MAX_GRASPS)
     azimuth, turn = rng.uniform(0.0, 2.0 * np.pi, (2, MAX_GRASPS))
@@ -132,10 +127,10 @@ def random_grasps(observation: Observation) -> dict[str, Any]:
     u, v = perpendicular_axes(z)
     x = np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v
     X_SG = make_pose(np.stack([x, np.cross(z, x), z], axis=2), p_SG)
-    return _answer(observation, X_SG, np.full(MAX_GRASPS, np.nan), rng.uniform(size=MAX_GRASPS))
+    return make_answer(observation, X_SG, np.full(MAX_GRASPS, np.nan), rng.uniform(size=MAX_GRASPS))
 
 
-def _answer(
+def make_answer(
     observation: Observation,
     X_SG: Array | None = None,
     width: Array | None = None,
@@ -163,7 +158,7 @@ def _approach_frames() -> list[Array]:
     return found
 
 
-def _best_apart(X_SG: Array, score: Array) -> Indices:
+def best_apart(X_SG: Array, score: Array) -> Indices:
     """Indices of the best grasps that are not near a better one, as in `suppress_near_grasps`."""
     order = np.argsort(-score, kind="stable")[:5000]
     parts = grasp_components(X_SG[order])
@@ -177,95 +172,3 @@ def _best_apart(X_SG: Array, score: Array) -> Indices:
         near[near] = pair_angle(parts[:, left[near]], one) < GraspNetSettings.suppression_angle
         left = left[~near]
     return np.array(kept, dtype=np.intp)
-
-
-def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> dict[str, Any]:
-    """Plans with the objects' meshes and the arm, which no planner can know from an image.
-
-    Grasps are antipodal, the open hand is clear, and the arm can execute them. The best grasp of
-    each object comes first, then the second best of each, and so on; grasps that do not bear the
-    object's weight come last.
-
-    Args:
-        observation: names the target, if any.
-        scene: the scene that was observed.
-        station: station with the hand; without an arm, reach is not checked.
-
-    Returns:
-        An answer, see `burg_planner`.
-    """
-    checked = 12  # Grasps of each object whose reach is checked.
-    last = 100.0  # Subtracted from the scores of grasps that come last.
-    scene, station = as_scene(scene), as_station(station)
-    names = list(scene.instances)
-    if observation.target is not None:
-        names = [names[observation.target - 1]]
-    grasps = _clear_grasps(scene, station, names) if names else None
-    if grasps is None or not len(grasps):
-        return _answer(observation)
-    grasps = scored_set(grasps, scene.library, station, scene)
-    quality, firm = _quality(grasps)
-    X_SG = _poses_in_scene(scene, grasps)
-    arm = _arm_reach(scene, station)
-    rows: list[int] = []
-    scores: list[float] = []
-    for name in names:
-        own = np.flatnonzero(grasps.column(INSTANCE_COLUMN) == name)
-        own = own[_best_apart(X_SG[own], quality[own])[:checked]]
-        if arm is not None and len(own):
-            X_WG = station.document.X_WS.matrix() @ X_SG[own]
-            verdicts = arm.check_all([name] * len(own), X_WG, grasps.width[own])
-            own = own[[verdict.outcome is None for verdict in verdicts]]
-        rows += own.tolist()
-        scores += [quality[row] - k - last * (not firm[row]) for k, row in enumerate(own)]
-    return _answer(observation, X_SG[rows], grasps.width[rows], np.array(scores))
-
-
-def _arm_reach(scene: Scene, station: Station) -> ArmReach | None:
-    """The arm in the scene; None without an arm."""
-    if station.document.arm is None:
-        return None
-    return ArmReach(
-        scene, station, settings=ReachSettings(motion=station.document.motion, exact=False)
-    )
-
-
-def _poses_in_scene(scene: Scene, grasps: GraspSet) -> Array:
-    """(N, 4, 4) `X_SG` of grasps on instances."""
-    names = grasps.column(INSTANCE_COLUMN).tolist()
-    X_SO = {name: scene.X_SO(name) for name in set(names)}
-    return np.asarray(np.array([X_SO[name] for name in names]).reshape(-1, 4, 4) @ grasps.X_OG)
-
-
-def _clear_grasps(scene: Scene, station: Station, names: list[str]) -> GraspSet:
-    """Antipodal grasps at which the open hand is clear; more are sampled where few are clear."""
-    counts, wanted, kept = (300, 1000), 20, 60  # Grasps of each object.
-    clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
-    X_WS = station.document.X_WS.matrix()
-    settings = SamplingSettings(blind=True, approach_angle_deg=60.0, approaches=2)
-    parts: list[GraspSet] = []
-    for seed, n in enumerate(counts):
-        if not names:
-            break
-        grasps = sample_grasps(scene, station, n, seed=seed, settings=settings, only=names)
-        clear = clearance.is_clear(X_WS @ _poses_in_scene(scene, grasps))
-        owner = grasps.column(INSTANCE_COLUMN)
-        found = {name: np.flatnonzero(clear & (owner == name))[:kept] for name in names}
-        parts += [grasps.select(rows) for rows in found.values()]
-        names = [name for name in names if len(found[name]) < wanted]
-    return GraspSet.concatenate(parts)
-
-
-def _quality(scored: GraspSet) -> tuple[Array, Booleans]:
-    """(N,) quality of grasps between 0 and 1 by analytic metrics and clearance, and (N,) whether
-    the pads hold the object as it is, without slip or turn."""
-
-    def share(name: str, full: float) -> Array:
-        """(N,) a metric in units of its value that is good enough, at most 1."""
-        values = np.nan_to_num(scored.column(name).astype(float), posinf=full)
-        return np.asarray(np.clip(values / full, 0.0, 1.0))
-
-    margin = np.nan_to_num(scored.column("gravity_margin"))
-    firm = (margin > 1.2) & (scored.column("slide") == 0.0)
-    clearance = 0.2 + 0.8 * share("clearance", 0.005)
-    return share("gravity_margin", 3.0) * share("patch_area", 1e-4) ** 0.5 * clearance, firm

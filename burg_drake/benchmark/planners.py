@@ -80,7 +80,7 @@ class BuiltinPlanner:
     """A planner that comes with burg_drake.
 
     Attributes:
-        function: its function in `burg_drake.benchmark.baselines`.
+        function: its module in `burg_drake.benchmark`, and its function.
         uses: what of an observation it uses.
         summary: what it does.
     """
@@ -92,18 +92,22 @@ class BuiltinPlanner:
 
 BUILTIN_PLANNERS: Mapping[str, BuiltinPlanner] = {
     "antipodal": BuiltinPlanner(
-        "antipodal", "depth", "antipodal grasps on the visible surfaces, in the manner of GPD"
+        "baselines:antipodal",
+        "depth",
+        "antipodal grasps on the visible surfaces, in the manner of GPD",
     ),
     "top_down": BuiltinPlanner(
-        "top_down", "depth", "straight down, across the shorter axis of each object"
+        "baselines:top_down", "depth", "straight down, across the shorter axis of each object"
     ),
     "random": BuiltinPlanner(
-        "random_grasps", "depth", "random hands at visible points, tilted by up to 60 degrees"
+        "baselines:random_grasps",
+        "depth",
+        "random hands at visible points, tilted by up to 60 degrees",
     ),
     "oracle": BuiltinPlanner(
-        "oracle",
-        "meshes, poses, arm",
-        "the best grasps on the true objects: a bound for planners, not a planner for a robot",
+        "oracle_planner:oracle",
+        "meshes, arm, physics",
+        "grasps that were tried in simulation: a bound for planners, not a planner for a robot",
     ),
 }
 """Built-in planners by name."""
@@ -146,8 +150,8 @@ def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
     if re.match("wss?://", reference):
         return _ServedPlanner(reference, time_limit)
     if reference in BUILTIN_PLANNERS:
-        function = BUILTIN_PLANNERS[reference].function
-        loader = FunctionLoader(reference, "burg_drake.benchmark.baselines", function)
+        module, _, function = BUILTIN_PLANNERS[reference].function.partition(":")
+        loader = FunctionLoader(reference, f"burg_drake.benchmark.{module}", function)
         return _FunctionPlanner(loader, reference, time_limit, knows_meshes=reference == "oracle")
     module, _, function = reference.rpartition(":")
     if not module or not all(part.isidentifier() for part in function.split(".")):
