@@ -21,9 +21,9 @@ from burg_drake.benchmark import (
     BenchmarkResult,
     BenchmarkSettings,
     JudgedAnswer,
+    all_tables,
     compare_by_suite,
     compare_methods,
-    comparison_tables,
     measure_all,
     run_benchmark,
 )
@@ -92,9 +92,8 @@ def main() -> None:
             folder = Path(given.output) / f"{suite}.{name}"
             settings = BenchmarkSettings(depth_only=True)
             results[name] = run_benchmark(suite, name, folder, settings=settings, progress=False)
-        for comparison in compare_by_suite(list(results.values())):
-            for table in comparison_tables(comparison):
-                table.text_table().show()
+        for table in all_tables(compare_by_suite(list(results.values()))):
+            table.text_table().show()
         for result in results.values():
             print_costs(result)
         print_order(results)

@@ -27,6 +27,7 @@ from .benchmark_run import (
 )
 from .burg_planner import Observation as Observation, observation_id as observation_id
 from .clearing import Attempt as Attempt, episodes as episodes
+from .conditions import Conditions as Conditions
 from .leaderboard import write_leaderboard as write_leaderboard
 from .measures import BenchmarkMeasure as BenchmarkMeasure, measure_all as measure_all
 from .method_comparison import (
@@ -37,7 +38,7 @@ from .method_comparison import (
     holm as holm,
     permutation_p_value as permutation_p_value,
 )
-from .method_tables import comparison_tables as comparison_tables
+from .method_tables import all_tables as all_tables
 from .observing import SceneCamera as SceneCamera
 from .oracle_planner import oracle as oracle
 from .planner_check import (
@@ -55,6 +56,10 @@ from .planners import (
     open_planner as open_planner,
     require_websocket_packages as require_websocket_packages,
     serve_planner as serve_planner,
+)
+from .robustness import (
+    ConditionEffect as ConditionEffect,
+    condition_effects as condition_effects,
 )
 from .suite import (
     SUITE_FOLDER as SUITE_FOLDER,

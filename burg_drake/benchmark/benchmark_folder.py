@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.suite import Protocol, Split, SuiteDocument
 from burg_drake.core import (
     Array,
@@ -32,6 +33,7 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation import (
     INSTANCE_COLUMN,
+    TRIAL_FRICTION_COLUMN,
     Campaign,
     is_campaign,
     load_campaign,
@@ -91,6 +93,7 @@ class BenchmarkDocument:
         split: the scenes that were observed: `test` or `tuning`.
         depth_only: whether the planner got no colour images.
         settled: engine that judges contested grasps again; none if empty.
+        conditions: how sensor, calibration and friction differ from the suite.
         versions: versions of the software and the machine.
         complete: whether all scenes were observed and judged, and contested grasps settled.
         times: wall-clock times.
@@ -107,6 +110,7 @@ class BenchmarkDocument:
     split: Split = "test"
     depth_only: bool = False
     settled: str = ""
+    conditions: Conditions = field(default_factory=Conditions)
     versions: dict[str, str] = field(default_factory=dict)
     complete: bool = False
     times: BenchmarkTimes = BenchmarkTimes()
@@ -114,6 +118,7 @@ class BenchmarkDocument:
     def differences(self, other: BenchmarkDocument) -> list[str]:
         """Differences of two requests in words; `self` is in the folder, `other` is asked for."""
         names = ["name", "planner", "suite", "suite_hash", "protocol", "split", "depth_only"]
+        names.append("conditions")
         if self.protocol == "clear":  # verdicts decide how a scene goes on
             names.append("settled")
         return [
@@ -393,7 +398,11 @@ class Round:
         """Grasps of all answers of the round."""
         found = [StoredAnswer.load(self.path, *case).grasps for case in self.cases]
         content = content_hash(
-            [[one.id.tolist(), one.columns[INSTANCE_COLUMN].tolist()] for one in found]
+            [
+                [one.id.tolist(), one.columns[INSTANCE_COLUMN].tolist()]
+                + [one.columns[n].tolist() for n in (TRIAL_FRICTION_COLUMN,) if n in one.columns]
+                for one in found
+            ]
         )
         return StoredGrasps(self.path, self.cameras, content, sum(map(len, found)))
 

@@ -41,6 +41,7 @@ from burg_drake.benchmark.benchmark_folder import (
 )
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
+from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.planners import GraspPlanner, PlannerError, PlannerLost, open_planner
 from burg_drake.benchmark.suite import Protocol, Split, Suite, SuiteCamera, SuiteLike, as_suite
 from burg_drake.core import (
@@ -67,6 +68,7 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation import (
     INSTANCE_COLUMN,
+    TRIAL_FRICTION_COLUMN,
     EvaluationSettings,
     Executor,
     LocalExecutor,
@@ -97,6 +99,7 @@ class BenchmarkSettings:
         split: the scenes that are observed: those for the `test`, or for `tuning`.
         depth_only: give the planner no colour images, which need a renderer.
         settle: engine that judges contested grasps again; none if empty.
+        conditions: how sensor, calibration and friction differ from the suite.
     """
 
     name: str = setting("", "name of the method in tables (default: the planner's)", metavar="NAME")
@@ -115,6 +118,7 @@ class BenchmarkSettings:
         "judge contested grasps again with this engine, such as reference (default: none)",
         metavar="ENGINE",
     )
+    conditions: Conditions = field(default_factory=Conditions)
 
 
 def run_benchmark(
@@ -167,6 +171,12 @@ def run_benchmark(
         )
     if not suite.scenes(settings.split):
         raise InvalidInputError(f"{suite.path} has no scenes of split {settings.split!r}")
+    changes = settings.conditions.changes
+    if "depth_noise" in changes and not all(camera.noise for camera in suite.document.cameras):
+        raise InvalidInputError(
+            f"the depth of suite {suite.name} has no noise that could be multiplied by"
+            f" {changes['depth_noise']:g}; choose a suite whose cameras have noise"
+        ).about("depth_noise")
     if settings.settle:
         require_second_engine(settings.settle, ENGINES[suite.document.engine], suite.document.mode)
     with open_planner(planner, time_limit=suite.document.budget.seconds) as opened:
@@ -181,6 +191,7 @@ def run_benchmark(
             split=settings.split,
             depth_only=settings.depth_only,
             settled=settings.settle,
+            conditions=settings.conditions,
             versions=software_versions(),
         )
         with (
@@ -342,9 +353,16 @@ class _BenchmarkCall:
         done = total - sum(map(len, missing.values()))
         progress = Progress(phase, done, total, unit="images")
         meter = ProgressMeter(self.reporter.show, progress, phase)
-        station, depth_only = self.suite.station, self.result.document.depth_only
+        station, document = self.suite.station, self.result.document
         work = [
-            _Rendering(scenes[name], station, tuple(wanted), number - 1, depth_only)
+            _Rendering(
+                scenes[name],
+                station,
+                tuple(wanted),
+                number - 1,
+                document.depth_only,
+                document.conditions,
+            )
             for name, wanted in missing.items()
             if wanted
         ]
@@ -388,6 +406,7 @@ class _BenchmarkCall:
             camera=camera,
             observation=replace(observation, color=None, depth=None, segmentation=None),
             count=self.suite.document.budget.grasps,
+            friction=self.result.document.conditions.friction,
             folder=folder,
         )
         try:
@@ -407,6 +426,7 @@ class _Answer:
         scene, station, camera: what was observed, and by which camera.
         observation: the observation, without images.
         count: largest number of grasps that are judged.
+        friction: friction coefficient of the objects, as a multiple of their own.
         folder: folder of the round.
         raw: the answer; empty if there is none.
         error: why there is none.
@@ -418,6 +438,7 @@ class _Answer:
     camera: str
     observation: Observation
     count: int
+    friction: float
     folder: Path
     raw: Mapping[str, Any] = field(default_factory=dict)
     error: str = ""
@@ -438,6 +459,8 @@ def _store_answer(answer: _Answer) -> None:
             planned = read_answer(answer.raw, answer.observation, gripper)
             chosen = choose_grasps(answer.scene, planned, gripper, answer.count, answer.camera)
             grasps = _with_friction_needed(chosen, answer.scene, answer.station)
+            if answer.friction != 1.0:
+                grasps = _with_trial_friction(grasps, answer.scene, answer.friction)
             seconds, answered, notes = planned.time, len(planned.score), planned.notes
         except AnswerError as refused:
             error = str(refused)
@@ -464,6 +487,7 @@ class _Rendering:
         cameras: the cameras.
         take: number of the image.
         depth_only: whether no colours are rendered.
+        conditions: how sensor and calibration differ from the suite.
     """
 
     scene: Scene
@@ -471,6 +495,7 @@ class _Rendering:
     cameras: tuple[SuiteCamera, ...]
     take: int
     depth_only: bool
+    conditions: Conditions
 
 
 def _render(work: _Rendering) -> dict[str, Observation]:
@@ -478,7 +503,9 @@ def _render(work: _Rendering) -> dict[str, Observation]:
     found = {}
     for camera in work.cameras:
         camera = replace(camera, color=camera.color and not work.depth_only)
-        seen = camera.scene_camera().observe(work.scene, work.station, take=work.take)
+        seen = camera.scene_camera(work.conditions).observe(
+            work.scene, work.station, take=work.take
+        )
         found[camera.name] = seen
     return found
 
@@ -540,3 +567,9 @@ def _with_friction_needed(grasps: GraspSet, scene: Scene, station: Station) -> G
         surface = Surface.of(scene.library.surface(name))
         needed[rows] = friction_needed(grasp_contacts(surface, grasps.X_OG[rows], jaws))
     return grasps.with_columns(**{FRICTION_COLUMN: needed})
+
+
+def _with_trial_friction(grasps: GraspSet, scene: Scene, factor: float) -> GraspSet:
+    """Grasps with the friction coefficient of their objects times a factor, for their trials."""
+    own = [scene.entry(name).friction for name in grasps.columns[INSTANCE_COLUMN].tolist()]
+    return grasps.with_columns(**{TRIAL_FRICTION_COLUMN: factor * np.array(own, dtype=float)})

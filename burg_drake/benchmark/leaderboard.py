@@ -20,7 +20,9 @@ from burg_drake.benchmark.method_tables import (
     comparison_tables,
     measure_text,
     planning_time,
+    robustness_table,
 )
+from burg_drake.benchmark.robustness import condition_effects, without_effects
 from burg_drake.core import NO_VALUE, atomic_write, count_with_noun, format_duration, outcome_label
 from burg_drake.evaluation import (
     GROUP_CLASSES,
@@ -65,7 +67,18 @@ def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> s
         (files("burg_drake.benchmark") / f"leaderboard.{kind}").read_text(encoding="utf-8")
         for kind in ("js", "css")
     )
-    parts = [part for one in comparisons for part in _suite_sections(one, folder)]
+    parts = [part for one in without_effects(comparisons) for part in _suite_sections(one, folder)]
+    effects = condition_effects(comparisons)
+    if effects:
+        robustness = robustness_table(effects)
+        parts.append(
+            section(
+                robustness.title,
+                "What noise of the depth, errors of the camera's pose and other friction cost.",
+                _text_table(robustness),
+                _caption(robustness),
+            )
+        )
     return html_page(
         "Grasp planners compared",
         element("style", Html(style)),

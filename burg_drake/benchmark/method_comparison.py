@@ -89,8 +89,8 @@ def compare_methods(results: Sequence[BenchmarkResult]) -> MethodComparison:
     )
     budget = order[0].suite.budget.grasps
     values = {
-        "top_success": [_scene_means(one, lambda a: precision_at(a, 1)) for one in order],
-        "average_precision": [_scene_means(one, lambda a: trial_ap(a, budget)) for one in order],
+        "top_success": [scene_means(one, lambda a: precision_at(a, 1)) for one in order],
+        "average_precision": [scene_means(one, lambda a: trial_ap(a, budget)) for one in order],
     }
     names = [one.document.name for one in order]
     differences = {
@@ -108,7 +108,10 @@ def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodCompariso
     by_suite: dict[tuple[object, ...], list[BenchmarkResult]] = {}
     for result in results:
         known = result.document
-        key = (known.suite, known.protocol, known.split, known.depth_only, known.settled)
+        key = (
+            *(known.suite, known.protocol, known.split, known.depth_only, known.settled),
+            known.conditions,
+        )
         by_suite.setdefault(key, []).append(result)
     if not by_suite:
         raise InvalidInputError("no results are given; give folders that `benchmark run` wrote")
@@ -116,18 +119,22 @@ def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodCompariso
 
 
 def compare_pairs(
-    names: Sequence[str], means: Sequence[Array], measure: str
+    names: Sequence[str],
+    means: Sequence[Array],
+    measure: str,
+    pairs: Sequence[tuple[int, int]] | None = None,
 ) -> list[MethodDifference]:
-    """All pairs of methods.
+    """Differences of pairs of methods, corrected for their number.
 
     Args:
         names: names of M methods.
         means: (S,) mean of the measure in each scene, for each method, scenes in the same order.
         measure: name of the measure.
+        pairs: indices of the methods of each pair; all pairs if None.
     """
     from scipy.special import stdtrit
 
-    pairs = list(itertools.combinations(range(len(names)), 2))
+    pairs = list(itertools.combinations(range(len(names)), 2)) if pairs is None else pairs
     paired = [means[i] - means[j] for i, j in pairs]
     p_values = [permutation_p_value(d) for d in paired]
     found = []
@@ -182,7 +189,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(p) for p in corrected]
 
 
-def _scene_means(result: BenchmarkResult, value: Callable[[JudgedAnswer], float]) -> Array:
+def scene_means(result: BenchmarkResult, value: Callable[[JudgedAnswer], float]) -> Array:
     """(S,) mean over the cameras of each scene."""
     by_scene: dict[str, list[float]] = {}
     for answer in result.answers:
@@ -200,6 +207,7 @@ def _require_comparable(results: Sequence[BenchmarkResult]) -> None:
             ("split", "split"),
             ("depth_only", "depth only"),
             ("settled", "second engine"),
+            ("conditions", "conditions"),
         ):
             here, there = getattr(first.document, name), getattr(other.document, name)
             if here != there:

@@ -10,6 +10,7 @@ import numpy as np
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
 from burg_drake.benchmark.measures import MEASURE_MEANINGS, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
+from burg_drake.benchmark.robustness import ConditionEffect, condition_effects, without_effects
 from burg_drake.core import NO_VALUE, TextTable, count_with_noun, format_duration, format_number
 
 SUCCESS_MEASURES = {
@@ -92,6 +93,38 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     return tables
 
 
+def all_tables(comparisons: Sequence[MethodComparison]) -> list[TableText]:
+    """The tables of comparisons, suite by suite, and that of the effects of conditions."""
+    tables = [t for one in without_effects(comparisons) for t in comparison_tables(one)]
+    effects = condition_effects(comparisons)
+    return [*tables, robustness_table(effects)] if effects else tables
+
+
+def robustness_table(effects: Sequence[ConditionEffect]) -> TableText:
+    """The table of the effects of conditions on methods."""
+    rows = []
+    for effect in effects:
+        known = effect.result.document
+        rows.append(
+            (
+                f"{known.name} on {known.suite}",
+                str(known.conditions),
+                measure_text(effect.measures["top_success"]),
+                measure_text(effect.measures["average_precision"]),
+                measure_text(effect.usual["average_precision"]),
+                _difference_text(effect.difference),
+                format_number(effect.difference.corrected),
+            )
+        )
+    caption = (
+        "AP before: under the conditions of the suite\n"
+        "change: of AP in percentage points with its 95 % confidence interval, on the same scenes\n"
+        "p: paired permutation test over scenes, corrected by Holm for the rows of this table"
+    )
+    head = ("method", "conditions", "top grasp", "AP", "AP before", "change", "p")
+    return TableText("Robustness", head, tuple(rows), caption)
+
+
 def _settings_text(result: BenchmarkResult) -> str:
     """Settings of a benchmark other than the usual ones."""
     known = result.document
@@ -100,6 +133,7 @@ def _settings_text(result: BenchmarkResult) -> str:
         *(["for tuning"] if known.split == "tuning" else []),
         *(["depth only"] if known.depth_only else []),
         *([f"settled by {known.settled}"] if known.settled else []),
+        *([str(known.conditions)] if known.conditions.changes else []),
     ]
     return "".join(f", {part}" for part in parts)
 

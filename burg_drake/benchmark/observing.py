@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from burg_drake.benchmark.burg_planner import Observation, observation_id
 from burg_drake.cameras import DepthNoise, Intrinsics, noisy_depth
-from burg_drake.core import Array, content_hash
+from burg_drake.core import Array, content_hash, make_pose
 from burg_drake.dataset import ImageKind, SceneRenderer, View
-from burg_drake.scene import SceneLike, as_scene
+from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import StationLike, as_station, station_gripper
 
 WORKSPACE_HEIGHT = 0.4
@@ -29,6 +30,8 @@ class SceneCamera:
         depth_range: nearest and farthest depth that it measures [m].
         noise: noise of the depth; None for exact depth.
         color: whether it takes colour images.
+        shift, turn: standard deviations of the error of the pose that a planner is told: of the
+            position along each axis [m], and of the orientation about each axis [rad].
         name: name of the camera, part of the seed of its noise.
     """
 
@@ -37,6 +40,8 @@ class SceneCamera:
     depth_range: tuple[float, float]
     noise: DepthNoise | None = None
     color: bool = True
+    shift: float = 0.0
+    turn: float = 0.0
     name: str = "camera"
 
     def observe(self, scene: SceneLike, station: StationLike, *, take: int = 0) -> Observation:
@@ -77,13 +82,22 @@ class SceneCamera:
             "color": images.color,
             "depth": depth,
             "K": self.intrinsics.K,
-            "X_WC": station.document.X_WS.matrix() @ self.X_SC,
+            "X_WC": station.document.X_WS.matrix() @ self.X_SC @ self._pose_error(scene, take),
             "X_WS": station.document.X_WS.matrix(),
             "bounds": np.array([[0.0, 0.0, 0.0], [width, height, WORKSPACE_HEIGHT]]),
             "hand": hand_facts(station),
             "segmentation": images.labels,
         }
         return Observation(id=observation_id(**parts), **parts)
+
+    def _pose_error(self, scene: Scene, take: int) -> Array:
+        """(4, 4) the told pose in the true one: the same for all planners, and for larger errors
+        the same direction."""
+        if not self.shift and not self.turn:
+            return np.eye(4)
+        rng = np.random.default_rng(int(content_hash([scene.content, self.name, take])[:16], 16))
+        shift, turn = rng.standard_normal((2, 3))
+        return make_pose(Rotation.from_rotvec(self.turn * turn).as_matrix(), self.shift * shift)
 
 
 def hand_facts(station: StationLike) -> Mapping[str, Any]:

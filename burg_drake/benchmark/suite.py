@@ -15,6 +15,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.observing import SceneCamera
 from burg_drake.cameras import depth_noise, sensor
 from burg_drake.core import (
@@ -101,15 +102,21 @@ class SuiteCamera:
                 "sensor",
             )
 
-    def scene_camera(self) -> SceneCamera:
-        """The camera, with the figures of its sensor."""
-        preset = sensor(self.sensor)
+    def scene_camera(self, conditions: Conditions | None = None) -> SceneCamera:
+        """The camera, with the figures of its sensor.
+
+        Args:
+            conditions: how noise and pose differ from them.
+        """
+        preset, conditions = sensor(self.sensor), conditions or Conditions()
         return SceneCamera(
             intrinsics=preset.depth_camera(self.size),
             X_SC=self.X_SC.matrix(),
             depth_range=preset.depth_range,
-            noise=depth_noise(self.sensor) if self.noise else None,
+            noise=depth_noise(self.sensor).scaled(conditions.depth_noise) if self.noise else None,
             color=self.color,
+            shift=conditions.camera_shift,
+            turn=conditions.camera_turn,
             name=self.name,
         )
 

@@ -364,6 +364,18 @@ class DepthNoise:
                     name,
                 )
 
+    def scaled(self, factor: float) -> DepthNoise:
+        """The noise with all standard deviations multiplied; holes and flying pixels stay.
+
+        Raises:
+            FieldError: a standard deviation would be out of its range.
+        """
+        names = (
+            *("axial_base", "axial_square", "axial_angle", "disparity_sigma"),
+            *("lateral_base", "lateral_angle"),
+        )
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
+
     @property
     def uses_angles(self) -> bool:
         """Whether some effect depends on the angle of incidence."""

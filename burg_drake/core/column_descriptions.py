@@ -56,8 +56,8 @@ COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
         **_verdict_columns(MarginsField),
         "friction": Column(
             "1",
-            "friction coefficient of the target; empty in results of `evaluate`, which takes the"
-            " library's",
+            "friction coefficient of the target; empty if it is the library's, as it is unless the"
+            " grasps have a column `trial_friction`",
         ),
         "mass": Column(
             "kg", "mass of the target; empty in results of `evaluate`, which takes the library's"

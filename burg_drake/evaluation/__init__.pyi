@@ -11,6 +11,7 @@ from .campaign_folder import (
 )
 from .candidates import (
     INSTANCE_COLUMN as INSTANCE_COLUMN,
+    TRIAL_FRICTION_COLUMN as TRIAL_FRICTION_COLUMN,
     Candidate as Candidate,
     Candidates as Candidates,
     chosen_instances as chosen_instances,

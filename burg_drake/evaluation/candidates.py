@@ -31,6 +31,8 @@ from burg_drake.scene import Scene
 
 INSTANCE_COLUMN = "instance"
 """Column of a grasp file: the placed object that each grasp belongs to."""
+TRIAL_FRICTION_COLUMN = "trial_friction"
+"""Column of grasps: friction coefficient of the target in the trial, in place of the library's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,19 @@ class Candidates:
 
     def __getitem__(self, row: int) -> Candidate:
         instance, width = str(self.instance[row]), float(self.grasps.width[row])
-        return Candidate(self.id[row], instance, self.grasps.X_OG[row], width=width)
+        friction = self.friction
+        return Candidate(
+            self.id[row],
+            instance,
+            self.grasps.X_OG[row],
+            friction=None if friction is None else float(friction[row]),
+            width=width,
+        )
+
+    @property
+    def friction(self) -> Array | None:
+        """(N,) friction coefficient of the target in the trial; None for the library's."""
+        return self.grasps.columns.get(TRIAL_FRICTION_COLUMN)
 
     @property
     def id(self) -> Sequence[str]:
@@ -164,8 +178,9 @@ class Candidates:
 
     @cached_property
     def content(self) -> str:
-        """Hash of poses, widths and instances."""
-        return content_hash(self.grasps.X_OG, self.grasps.width, self.id)
+        """Hash of poses, widths, instances, and friction if it is not the library's."""
+        friction = [] if self.friction is None else [self.friction]
+        return content_hash(self.grasps.X_OG, self.grasps.width, self.id, *friction)
 
     def save(self, path: Path) -> None:
         """Writes a grasp file that `load` and `GraspSet.load` read back bit for bit."""

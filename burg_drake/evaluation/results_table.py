@@ -263,6 +263,9 @@ def grasp_columns(
         "X_OG": lambda: _text_column([pose_text(X) for X in X_OG]),
         **{INPUT_PREFIX + name: partial(input_column, name) for name in grasps.columns},
     }
+    friction = candidates.friction
+    if friction is not None:
+        known["friction"] = lambda: friction[rows]
     return {name: known[name]() for name in names or known}
 
 

@@ -278,6 +278,7 @@ class Run:
             instance=candidate.instance,
             X_OG=candidate.X_OG,
             width=candidate.width,
+            friction=candidate.friction,
             verdict=found[0] if found else None,
         )
 

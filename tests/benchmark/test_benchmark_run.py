@@ -15,12 +15,13 @@ from burg_drake.benchmark import (
     BenchmarkSettings,
     Budget,
     CameraPlacement,
+    Conditions,
     PlannedGrasps,
     Suite,
     SuiteSettings,
+    all_tables,
     choose_grasps,
     compare_by_suite,
-    comparison_tables,
     episodes,
     load_result,
     make_suite,
@@ -155,6 +156,26 @@ def test_equal_scores_keep_the_order_of_the_planner(suite: Suite) -> None:
         assert chosen.columns["planner_score"].tolist() == score.tolist()
 
 
+def test_slippery_objects_are_not_lifted(suite: Suite, tmp_path: Path) -> None:
+    settings = replace(DEPTH, conditions=Conditions(friction=0.05))
+    found = run_benchmark(
+        suite,
+        f"{PLANNERS}:plan_cans",
+        tmp_path / "slippery",
+        settings=settings,
+        workers=1,
+        progress=False,
+    )
+    held = {verdict.outcome.held for one in found.answers for verdict in one.verdicts}
+    assert held == {False}
+    campaign = found.rounds[0].campaign
+    own = burg.load_library("household").entry("can").friction
+    assert campaign.run("two").results["friction"] == pytest.approx(0.05 * own)
+    assert not verify_result(found, count=1, workers=1, progress=False).differing
+    with pytest.raises(InvalidInputError, match="conditions is friction x 0.05 there"):
+        run_benchmark(suite, f"{PLANNERS}:plan_cans", found.path, settings=DEPTH)
+
+
 @thorough
 def test_a_planner_that_fails_costs_its_own_answer(suite: Suite, tmp_path: Path) -> None:
     found = run_benchmark(
@@ -190,7 +211,7 @@ def test_tables_and_page_name_all_methods(cleared: BenchmarkResult, tmp_path: Pa
     record.write_text(record.read_text().replace("name: cans", "name: same"))
     (comparison,) = compare_by_suite([load_result(other), cleared])
     assert comparison.names == ["cans", "same"]
-    text = "\n".join(table.markdown() for table in comparison_tables(comparison))
+    text = "\n".join(table.markdown() for table in all_tables([comparison]))
     assert "| cans | 100 (34-100) |" in text and "| cans - same | top grasp | +0 " in text
     page = write_leaderboard([comparison], tmp_path / "page.html").read_text()
     assert page.count("<table") == 5 and "other/trials/scenes/two/report.html" in page

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,6 +126,14 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
         benchmark.BenchmarkSettings,
         *("name", "protocol", "split", "depth_only", "settle"),
     )
+    group = parser.add_argument_group(
+        "robustness", "Change one at a time; `compare` shows what it costs."
+    )
+    options.add_settings_options(
+        group,
+        benchmark.Conditions,
+        *("depth_noise", "camera_shift", "camera_turn", "friction"),
+    )
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)
     options.add_cluster(workers_group)
@@ -139,7 +147,11 @@ def run_benchmark_run(arguments: argparse.Namespace) -> int:
             arguments.suite,
             arguments.planner,
             arguments.output,
-            settings=options.settings_from(arguments, benchmark.BenchmarkSettings),
+            settings=options.settings_from(
+                arguments,
+                benchmark.BenchmarkSettings,
+                conditions=options.settings_from(arguments, benchmark.Conditions),
+            ),
             workers=arguments.workers,
             executor=executor,
             progress=not arguments.quiet,
@@ -209,9 +221,8 @@ def run_benchmark_table(arguments: argparse.Namespace) -> int:
     if not arguments.markdown:
         _print_tables(comparisons)
         return 0
-    for comparison in comparisons:
-        for table in benchmark.comparison_tables(comparison):
-            print(table.markdown())
+    for table in benchmark.all_tables(comparisons):
+        print(table.markdown())
     return 0
 
 
@@ -370,8 +381,7 @@ def _add_results(parser: Any) -> None:
     )
 
 
-def _print_tables(comparisons: Iterable[benchmark.MethodComparison]) -> None:
+def _print_tables(comparisons: Sequence[benchmark.MethodComparison]) -> None:
     """Prints the tables of results, suite by suite."""
-    for comparison in comparisons:
-        for table in benchmark.comparison_tables(comparison):
-            table.text_table().show()
+    for table in benchmark.all_tables(comparisons):
+        table.text_table().show()

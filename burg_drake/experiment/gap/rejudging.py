@@ -524,6 +524,7 @@ def _trial_columns(trial: Rejudged, rejudging: Rejudging) -> Columns | None:
         object=trial.object,
         X_OG=trial.candidate.X_OG,
         width=trial.candidate.width,
+        friction=trial.candidate.friction,
         verdict=trial.verdict,
     )
     joints = len(trial.verdict.q_grasp)
