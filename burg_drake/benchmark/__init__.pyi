@@ -21,7 +21,6 @@ from .benchmark_folder import (
     load_result as load_result,
 )
 from .benchmark_run import (
-    BenchmarkSettings as BenchmarkSettings,
     choose_grasps as choose_grasps,
     run_benchmark as run_benchmark,
 )
@@ -61,12 +60,14 @@ from .robustness import (
     ConditionEffect as ConditionEffect,
     condition_effects as condition_effects,
 )
+from .settings import (
+    VERIFIED_GRASPS as VERIFIED_GRASPS,
+    BenchmarkSettings as BenchmarkSettings,
+    Budget as Budget,
+)
 from .suite import (
     SUITE_FOLDER as SUITE_FOLDER,
-    Budget as Budget,
-    CameraPlacement as CameraPlacement,
     Suite as Suite,
-    SuiteCamera as SuiteCamera,
     SuiteDocument as SuiteDocument,
     SuiteLike as SuiteLike,
     SuiteScene as SuiteScene,
@@ -76,8 +77,8 @@ from .suite import (
     suite_names as suite_names,
     write_suite_scene as write_suite_scene,
 )
+from .suite_camera import CameraPlacement as CameraPlacement, SuiteCamera as SuiteCamera
 from .verification import (
-    VERIFIED_GRASPS as VERIFIED_GRASPS,
     Verification as Verification,
     VerifiedGrasp as VerifiedGrasp,
     verify_result as verify_result,

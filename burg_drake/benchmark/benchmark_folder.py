@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from burg_drake.benchmark.conditions import Conditions
-from burg_drake.benchmark.suite import Protocol, Split, SuiteDocument
+from burg_drake.benchmark.settings import Protocol, Split
+from burg_drake.benchmark.suite import SuiteDocument
 from burg_drake.core import (
     Array,
     GraspSet,

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +43,9 @@ from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
 from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.planners import GraspPlanner, PlannerError, PlannerLost, open_planner
-from burg_drake.benchmark.suite import Protocol, Split, Suite, SuiteCamera, SuiteLike, as_suite
+from burg_drake.benchmark.settings import BenchmarkSettings
+from burg_drake.benchmark.suite import Suite, SuiteLike, as_suite
+from burg_drake.benchmark.suite_camera import SuiteCamera
 from burg_drake.core import (
     Array,
     FolderLock,
@@ -63,7 +65,6 @@ from burg_drake.core import (
     one_line,
     portable_reference,
     remove_unfinished,
-    setting,
     software_versions,
 )
 from burg_drake.evaluation import (
@@ -84,41 +85,6 @@ from burg_drake.geometry import Surface
 from burg_drake.grasping import friction_needed, grasp_contacts, jaws_of, suppress_near_grasps
 from burg_drake.scene import Scene, load_scene, save_scene
 from burg_drake.station import ENGINES, Station, station_gripper
-
-
-@dataclass(frozen=True, kw_only=True)
-class BenchmarkSettings:
-    """Settings of a benchmark.
-
-    Attributes:
-        name: name of the method in tables; the planner's own if empty.
-        protocol: `single`: the answer to each observation is judged. `clear`: of each answer the
-            best grasp that can be executed is executed in simulation; an object that is held is
-            taken away, the others come to rest, and the planner is asked again; until a scene is
-            empty, three attempts in a row fail, or the suite's budget of picks ends.
-        split: the scenes that are observed: those for the `test`, or for `tuning`.
-        depth_only: give the planner no colour images, which need a renderer.
-        settle: engine that judges contested grasps again; none if empty.
-        conditions: how sensor, calibration and friction differ from the suite.
-    """
-
-    name: str = setting("", "name of the method in tables (default: the planner's)", metavar="NAME")
-    protocol: Protocol = setting(
-        "single",
-        "single: judge one answer for each image; clear: execute the best feasible grasp, take the"
-        " object away, look again, until the scene is empty",
-        choices=get_args(Protocol),
-    )
-    split: Split = setting(
-        "test", "scenes that count, or those for tuning a planner", choices=get_args(Split)
-    )
-    depth_only: bool = setting(False, "give the planner no colour images, which need a renderer")
-    settle: str = setting(
-        "",
-        "judge contested grasps again with this engine, such as reference (default: none)",
-        metavar="ENGINE",
-    )
-    conditions: Conditions = field(default_factory=Conditions)
 
 
 def run_benchmark(

@@ -6,24 +6,18 @@ whose objects have changed is refused rather than judged.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar
 
-import numpy as np
-
-from burg_drake.benchmark.conditions import Conditions
-from burg_drake.benchmark.observing import SceneCamera
-from burg_drake.cameras import depth_noise, sensor
+from burg_drake.benchmark.settings import Budget, Split
+from burg_drake.benchmark.suite_camera import SuiteCamera
 from burg_drake.core import (
     FieldError,
     InvalidInputError,
     Mode,
-    Pose,
-    Ranges,
     atomic_write,
     builtin_names,
     content_hash,
@@ -33,12 +27,9 @@ from burg_drake.core import (
     load_document,
     portable_reference,
     require_name,
-    require_ranges,
     resolve_reference,
     save_document,
-    setting,
 )
-from burg_drake.dataset import camera_looking_at
 from burg_drake.evaluation import mode_for
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.printout import print_board
@@ -66,118 +57,6 @@ SUITE_FOLDER = "scenes/suites"
 """Kind of the built-in suites, for `resolve_reference`."""
 HASH_DIGITS = 16
 """Digits of the hashes in suites and results."""
-
-Split = Literal["tuning", "test"]
-Protocol = Literal["single", "clear"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SuiteCamera:
-    """A depth camera at a fixed place.
-
-    Attributes:
-        name: name of the camera.
-        X_SC: pose of the optical frame in the scene frame: z forward, x right, y down.
-        sensor: name of the depth camera, whose intrinsics, depth range and noise it has.
-        size: width and height of its images [pixels]; the usual ones of the sensor if left out.
-        noise: whether depth has the sensor's noise.
-        color: whether it takes colour images, which need a renderer.
-    """
-
-    WRITTEN_WHOLE: ClassVar[bool] = True
-
-    name: str = "front"
-    X_SC: Pose
-    sensor: str = "d435"
-    size: tuple[int, int] | None = None
-    noise: bool = True
-    color: bool = True
-
-    def __post_init__(self) -> None:
-        require_name(self.name, "name")
-        if not sensor(self.sensor).depth_camera(self.size).is_pinhole:
-            raise FieldError(
-                f"images of sensor {self.sensor!r} have lens distortion, which planners are not"
-                " told of; choose another sensor",
-                "sensor",
-            )
-
-    def scene_camera(self, conditions: Conditions | None = None) -> SceneCamera:
-        """The camera, with the figures of its sensor.
-
-        Args:
-            conditions: how noise and pose differ from them.
-        """
-        preset, conditions = sensor(self.sensor), conditions or Conditions()
-        return SceneCamera(
-            intrinsics=preset.depth_camera(self.size),
-            X_SC=self.X_SC.matrix(),
-            depth_range=preset.depth_range,
-            noise=depth_noise(self.sensor).scaled(conditions.depth_noise) if self.noise else None,
-            color=self.color,
-            shift=conditions.camera_shift,
-            turn=conditions.camera_turn,
-            name=self.name,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraPlacement:
-    """A camera that looks at the middle of the board.
-
-    Attributes:
-        sensor: see `SuiteCamera`.
-        distance: distance of the camera from the point it looks at [m].
-        elevation_deg: angle of the camera above the board [degrees].
-        azimuth_deg: angle of the camera about the vertical, from the board's x axis,
-            counter-clockwise from above [degrees]; -90 looks from the lower edge of the sheet.
-        exact_depth: whether depth has no noise.
-    """
-
-    sensor: str = setting("d435", "depth camera: d435, d455, zivid_two, kinect", metavar="NAME")
-    distance: float = setting(0.75, "distance from the board's middle", metavar="M", above=0)
-    elevation_deg: float = setting(60.0, "angle above the board", metavar="DEG", low=0, high=90)
-    azimuth_deg: float = setting(
-        -90.0, "direction of the camera; -90: from the sheet's lower edge", metavar="DEG"
-    )
-    exact_depth: bool = setting(False, "no noise of the depth")
-
-    def camera(self, board: Board) -> SuiteCamera:
-        """The camera for scenes on a board."""
-        width, height = board.size
-        X_SC = camera_looking_at(
-            np.array([width / 2.0, height / 2.0, 0.03]),
-            self.distance,
-            math.radians(self.elevation_deg),
-            math.radians(self.azimuth_deg),
-        )
-        return SuiteCamera(X_SC=Pose.readable(X_SC), sensor=self.sensor, noise=not self.exact_depth)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Budget:
-    """What a planner may use for one observation.
-
-    Attributes:
-        grasps: number of grasps that are judged: the best of the answer, without those that are
-            near a better one.
-        seconds: time for the answer [s].
-        picks: number of grasps that are executed to clear a scene.
-    """
-
-    WRITTEN_WHOLE: ClassVar[bool] = True
-    RANGES: ClassVar[Ranges] = {
-        "grasps": (1, 10_000),
-        "seconds": (0.001, 86_400.0),
-        "picks": (1, 99),
-    }
-
-    grasps: int = setting(10, "grasps of each answer that are judged", low=1)
-    seconds: float = setting(60.0, "time for an answer [s]", above=0)
-    picks: int = setting(20, "grasps executed to clear a scene", low=1, high=99)
-
-    def __post_init__(self) -> None:
-        require_ranges(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,7 +113,7 @@ class SuiteDocument:
     station: str = "panda_tabletop"
     board: Board = Board()
     cameras: tuple[SuiteCamera, ...]
-    budget: Budget = Budget()
+    budget: Budget = field(default_factory=Budget)
     mode: Mode = "reach"
     engine: str = DEFAULT_ENGINE
     objects: dict[str, str] = field(default_factory=dict)
@@ -400,7 +279,7 @@ class SuiteSettings:
 
     description: str = ""
     release: int = 1
-    budget: Budget = Budget()
+    budget: Budget = field(default_factory=Budget)
     mode: Mode | None = None
     engine: str = DEFAULT_ENGINE
     tuning: int = 0

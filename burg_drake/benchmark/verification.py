@@ -14,6 +14,7 @@ from burg_drake.benchmark.benchmark_folder import (
     Round,
     load_result,
 )
+from burg_drake.benchmark.settings import VERIFIED_GRASPS
 from burg_drake.core import (
     InvalidInputError,
     Listener,
@@ -25,9 +26,6 @@ from burg_drake.core import (
     worker_count,
 )
 from burg_drake.evaluation import comparison, differences, load_run, origin_of, rerun
-
-VERIFIED_GRASPS = 20
-"""Number of grasps that are judged again by default."""
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def test_help_imports_no_other_command() -> None:
     code = """
 import contextlib, importlib, io, os, sys
 from burg_drake.apps.cli import COMMANDS, main
-from burg_drake.printout import PrintSettings  # imports once what many commands need
+from burg_drake.dataset import SceneRenderer  # imports once what many commands need
 
 def command_modules():
     return {name for name in sys.modules if name.startswith("burg_drake.apps.commands.")}

@@ -172,7 +172,7 @@ def test_slippery_objects_are_not_lifted(suite: Suite, tmp_path: Path) -> None:
     own = burg.load_library("household").entry("can").friction
     assert campaign.run("two").results["friction"] == pytest.approx(0.05 * own)
     assert not verify_result(found, count=1, workers=1, progress=False).differing
-    with pytest.raises(InvalidInputError, match="conditions is friction x 0.05 there"):
+    with pytest.raises(InvalidInputError, match=r"conditions is friction x 0\.05 there"):
         run_benchmark(suite, f"{PLANNERS}:plan_cans", found.path, settings=DEPTH)
 
 
