@@ -158,6 +158,7 @@ COMMANDS = {
         Verb("benchmark list", "benchmark", "list the built-in suites"),
         Verb("benchmark show", "benchmark", "print a suite; write its scenes and boards"),
         Verb("benchmark run", "benchmark", "ask a planner about each scene, and judge its grasps"),
+        Verb("benchmark trials", "benchmark", "plan trials of the best grasps on your robot"),
         Verb("benchmark compare", "benchmark", "compare planners; write a leaderboard"),
         Verb("benchmark table", "benchmark", "print the tables of results, also as Markdown"),
         Verb("benchmark verify", "benchmark", "judge a sample of a result again, to the bit"),

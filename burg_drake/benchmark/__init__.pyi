@@ -43,7 +43,7 @@ from .oracle_planner import oracle as oracle
 from .planner_check import (
     CheckScene as CheckScene,
     PlannerCheck as PlannerCheck,
-    check_answer as check_answer,
+    check_answers as check_answers,
     check_planner as check_planner,
     make_check_scene as make_check_scene,
 )
@@ -55,6 +55,12 @@ from .planners import (
     open_planner as open_planner,
     require_websocket_packages as require_websocket_packages,
     serve_planner as serve_planner,
+)
+from .real_images import RealImages as RealImages
+from .robot_trials import (
+    RobotSuccess as RobotSuccess,
+    plan_robot_trials as plan_robot_trials,
+    robot_successes as robot_successes,
 )
 from .robustness import (
     ConditionEffect as ConditionEffect,

@@ -95,6 +95,8 @@ class BenchmarkDocument:
         depth_only: whether the planner got no colour images.
         settled: engine that judges contested grasps again; none if empty.
         conditions: how sensor, calibration and friction differ from the suite.
+        images: hash of the images of a real camera; empty if images were rendered.
+        photographed: names of the scenes that have images of a real camera.
         versions: versions of the software and the machine.
         complete: whether all scenes were observed and judged, and contested grasps settled.
         times: wall-clock times.
@@ -112,6 +114,8 @@ class BenchmarkDocument:
     depth_only: bool = False
     settled: str = ""
     conditions: Conditions = field(default_factory=Conditions)
+    images: str = ""
+    photographed: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=dict)
     complete: bool = False
     times: BenchmarkTimes = BenchmarkTimes()
@@ -119,7 +123,7 @@ class BenchmarkDocument:
     def differences(self, other: BenchmarkDocument) -> list[str]:
         """Differences of two requests in words; `self` is in the folder, `other` is asked for."""
         names = ["name", "planner", "suite", "suite_hash", "protocol", "split", "depth_only"]
-        names.append("conditions")
+        names += ["conditions", "images"]
         if self.protocol == "clear":  # verdicts decide how a scene goes on
             names.append("settled")
         return [
@@ -315,14 +319,17 @@ class BenchmarkResult:
 
     @property
     def scene_names(self) -> list[str]:
-        """Names of the scenes of the split, in order."""
+        """Names of the scenes that are observed, in order: those of the split, or those that were
+        photographed."""
+        if self.document.images:
+            return list(self.document.photographed)
         return [one.name for one in self.suite.scenes if one.split == self.document.split]
 
     @property
     def rounds(self) -> list[Round]:
         """The rounds: one, or with the protocol `clear` as many as were begun."""
         cameras = [camera.name for camera in self.suite.cameras]
-        if self.document.protocol == "clear":
+        if self.document.protocol == "clear" or self.document.images:
             cameras = cameras[:1]
         found = [Round(self.path, tuple(self.scene_names), tuple(cameras))]
         while (folder := round_folder(self.path, len(found) + 1)).is_dir():

@@ -43,8 +43,9 @@ from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
 from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.planners import GraspPlanner, PlannerError, PlannerLost, open_planner
+from burg_drake.benchmark.real_images import RealImages
 from burg_drake.benchmark.settings import BenchmarkSettings
-from burg_drake.benchmark.suite import Suite, SuiteLike, as_suite
+from burg_drake.benchmark.suite import HASH_DIGITS, Suite, SuiteLike, as_suite
 from burg_drake.benchmark.suite_camera import SuiteCamera
 from burg_drake.core import (
     Array,
@@ -62,6 +63,7 @@ from burg_drake.core import (
     atomic_folder,
     default_workers,
     ensure_writable_folder,
+    list_names,
     one_line,
     portable_reference,
     remove_unfinished,
@@ -93,6 +95,7 @@ def run_benchmark(
     folder: str | Path,
     *,
     settings: BenchmarkSettings | None = None,
+    images: str | Path | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: bool | Listener = True,
@@ -116,6 +119,8 @@ def run_benchmark(
         planner: see `open_planner`.
         folder: folder of the result; made if need be.
         settings: the defaults if None.
+        images: folder of images that a real camera took of the scenes, see `real_images`; only
+            these scenes are observed, by one camera. Images are rendered if None.
         workers: number of processes; one per processor if None.
         executor: executor that judges, instead of `workers` processes of this machine.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
@@ -137,6 +142,7 @@ def run_benchmark(
         )
     if not suite.scenes(settings.split):
         raise InvalidInputError(f"{suite.path} has no scenes of split {settings.split!r}")
+    photos = None if images is None else _open_images(images, suite, settings)
     changes = settings.conditions.changes
     if "depth_noise" in changes and not all(camera.noise for camera in suite.document.cameras):
         raise InvalidInputError(
@@ -158,6 +164,8 @@ def run_benchmark(
             depth_only=settings.depth_only,
             settled=settings.settle,
             conditions=settings.conditions,
+            images="" if photos is None else photos.content[:HASH_DIGITS],
+            photographed=() if photos is None else photos.scenes,
             versions=software_versions(),
         )
         with (
@@ -168,8 +176,31 @@ def run_benchmark(
             _require_own_folder(folder, document)
             remove_unfinished(folder)
             result = _open_result(folder, document, suite)
-            call = _BenchmarkCall(result, suite, opened, executor, reporter, begun, pool)
+            call = _BenchmarkCall(result, suite, opened, executor, reporter, begun, pool, photos)
             return call.run(settings.settle or result.document.settled)
+
+
+def _open_images(folder: str | Path, suite: Suite, settings: BenchmarkSettings) -> RealImages:
+    """The images of a real camera.
+
+    Raises:
+        InvalidInputError: they cannot be read, or the settings need rendered images.
+    """
+    if settings.protocol == "clear":
+        raise InvalidInputError(
+            "scenes are cleared in simulation, of which a real camera has no images; choose the"
+            " protocol single"
+        ).about("images")
+    rendered = sorted(
+        {"depth_noise", "camera_shift", "camera_turn"} & {*settings.conditions.changes}
+    )
+    if rendered:
+        raise InvalidInputError(
+            f"{list_names(rendered)} can be changed in rendered images only; leave it as it is with"
+            " images of a real camera"
+        ).about("images")
+    names = list(suite.scenes(settings.split))
+    return RealImages.open(folder, names, depth_unit=settings.depth_unit)
 
 
 def _require_method_name(name: str) -> str:
@@ -224,13 +255,15 @@ class _BenchmarkCall:
     reporter: Reporter
     begun: float
     pool: WorkerPool
+    photos: RealImages | None
 
     def run(self, settle: str) -> BenchmarkResult:
         """Goes through the rounds, and returns the complete result."""
         document = replace(self.result.document, settled=settle, complete=False)
         self.result = save_result(self.result.path, document, self.result.suite)
         first, times = self.result.rounds[0], BenchmarkTimes()
-        scenes: Mapping[str, Scene] = self.suite.scenes(self.result.document.split)
+        known = self.suite.scenes(self.result.document.split)
+        scenes = {name: known[name] for name in self.result.scene_names}
         for number in itertools.count(1):
             folder = round_folder(self.result.path, number)
             round = replace(first, path=folder, scenes=tuple(scenes))
@@ -328,6 +361,7 @@ class _BenchmarkCall:
                 number - 1,
                 document.depth_only,
                 document.conditions,
+                self.photos,
             )
             for name, wanted in missing.items()
             if wanted
@@ -454,6 +488,7 @@ class _Rendering:
         take: number of the image.
         depth_only: whether no colours are rendered.
         conditions: how sensor and calibration differ from the suite.
+        photos: images of a real camera; they are rendered if None.
     """
 
     scene: Scene
@@ -462,17 +497,19 @@ class _Rendering:
     take: int
     depth_only: bool
     conditions: Conditions
+    photos: RealImages | None
 
 
 def _render(work: _Rendering) -> dict[str, Observation]:
     """Observations of a scene by camera."""
     found = {}
     for camera in work.cameras:
-        camera = replace(camera, color=camera.color and not work.depth_only)
-        seen = camera.scene_camera(work.conditions).observe(
-            work.scene, work.station, take=work.take
-        )
-        found[camera.name] = seen
+        color = camera.color and not work.depth_only
+        if work.photos is not None:
+            found[camera.name] = work.photos.observe(work.scene, work.station, color=color)
+            continue
+        rendering = replace(camera, color=color).scene_camera(work.conditions)
+        found[camera.name] = rendering.observe(work.scene, work.station, take=work.take)
     return found
 
 

@@ -18,11 +18,11 @@ from burg_drake.benchmark.method_tables import (
     SUCCESS_MEASURES,
     TableText,
     comparison_tables,
+    further_tables,
     measure_text,
     planning_time,
-    robustness_table,
 )
-from burg_drake.benchmark.robustness import condition_effects, without_effects
+from burg_drake.benchmark.robustness import without_effects
 from burg_drake.core import NO_VALUE, atomic_write, count_with_noun, format_duration, outcome_label
 from burg_drake.evaluation import (
     GROUP_CLASSES,
@@ -34,6 +34,7 @@ from burg_drake.evaluation import (
     section,
     table,
 )
+from burg_drake.experiment import TrialSheet
 from burg_drake.visualization import OUTCOME_GROUPS, Html, element
 
 OUTCOME_CLASSES = {
@@ -42,24 +43,33 @@ OUTCOME_CLASSES = {
 """CSS class of each outcome."""
 
 
-def write_leaderboard(comparisons: Sequence[MethodComparison], path: str | Path) -> Path:
+def write_leaderboard(
+    comparisons: Sequence[MethodComparison],
+    path: str | Path,
+    *,
+    sheets: Sequence[TrialSheet] = (),
+) -> Path:
     """Writes the leaderboard; links to reports are relative to the page.
 
     Args:
         comparisons: methods of each suite.
         path: file to write (.html).
+        sheets: contents of trials files, for success on a robot.
     """
     path = Path(path)
-    atomic_write(path, leaderboard_page(comparisons, path.parent))
+    atomic_write(path, leaderboard_page(comparisons, path.parent, sheets))
     return path
 
 
-def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> str:
+def leaderboard_page(
+    comparisons: Sequence[MethodComparison], folder: Path, sheets: Sequence[TrialSheet] = ()
+) -> str:
     """The page as HTML.
 
     Args:
         comparisons: methods of each suite.
         folder: folder of the page.
+        sheets: contents of trials files.
     """
     methods = len({name for one in comparisons for name in one.names})
     suites = [one.results[0].suite.name for one in comparisons]
@@ -68,17 +78,10 @@ def leaderboard_page(comparisons: Sequence[MethodComparison], folder: Path) -> s
         for kind in ("js", "css")
     )
     parts = [part for one in without_effects(comparisons) for part in _suite_sections(one, folder)]
-    effects = condition_effects(comparisons)
-    if effects:
-        robustness = robustness_table(effects)
-        parts.append(
-            section(
-                robustness.title,
-                "What noise of the depth, errors of the camera's pose and other friction cost.",
-                _text_table(robustness),
-                _caption(robustness),
-            )
-        )
+    parts += [
+        section(one.title, summary, _text_table(one), _caption(one))
+        for one, summary in further_tables(comparisons, sheets)
+    ]
     return html_page(
         "Grasp planners compared",
         element("style", Html(style)),

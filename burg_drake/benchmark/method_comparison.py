@@ -110,7 +110,7 @@ def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodCompariso
         known = result.document
         key = (
             *(known.suite, known.protocol, known.split, known.depth_only, known.settled),
-            known.conditions,
+            *(known.conditions, known.images),
         )
         by_suite.setdefault(key, []).append(result)
     if not by_suite:
@@ -208,6 +208,7 @@ def _require_comparable(results: Sequence[BenchmarkResult]) -> None:
             ("depth_only", "depth only"),
             ("settled", "second engine"),
             ("conditions", "conditions"),
+            ("images", "images"),
         ):
             here, there = getattr(first.document, name), getattr(other.document, name)
             if here != there:

@@ -10,8 +10,10 @@ import numpy as np
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
 from burg_drake.benchmark.measures import MEASURE_MEANINGS, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
+from burg_drake.benchmark.robot_trials import RobotSuccess, robot_successes
 from burg_drake.benchmark.robustness import ConditionEffect, condition_effects, without_effects
 from burg_drake.core import NO_VALUE, TextTable, count_with_noun, format_duration, format_number
+from burg_drake.experiment import TrialSheet
 
 SUCCESS_MEASURES = {
     "top_success": "top grasp",
@@ -93,11 +95,65 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
     return tables
 
 
-def all_tables(comparisons: Sequence[MethodComparison]) -> list[TableText]:
-    """The tables of comparisons, suite by suite, and that of the effects of conditions."""
+def all_tables(
+    comparisons: Sequence[MethodComparison], sheets: Sequence[TrialSheet] = ()
+) -> list[TableText]:
+    """The tables of comparisons, suite by suite, of the effects of conditions, and of trials on a
+    robot.
+
+    Args:
+        comparisons: methods of each suite.
+        sheets: contents of trials files.
+
+    Raises:
+        InvalidInputError: the trials are of other grasps.
+    """
     tables = [t for one in without_effects(comparisons) for t in comparison_tables(one)]
+    return [*tables, *(table for table, _ in further_tables(comparisons, sheets))]
+
+
+def further_tables(
+    comparisons: Sequence[MethodComparison], sheets: Sequence[TrialSheet]
+) -> list[tuple[TableText, str]]:
+    """The tables beyond those of each suite, with what each is about; see `all_tables`."""
+    found = []
     effects = condition_effects(comparisons)
-    return [*tables, robustness_table(effects)] if effects else tables
+    if effects:
+        about = "What noise of the depth, errors of the camera's pose and other friction cost."
+        found.append((robustness_table(effects), about))
+    if sheets:
+        results = [result for one in comparisons for result in one.results]
+        table = robot_table(robot_successes(results, sheets))
+        found.append((table, "The best grasp of each image, in simulation and on the robot."))
+    return found
+
+
+def robot_table(successes: Sequence[RobotSuccess]) -> TableText:
+    """The table of methods on a robot and in simulation."""
+    rows = [
+        (
+            one.name,
+            NO_VALUE if one.rendered is None else measure_text(one.rendered),
+            measure_text(one.simulated),
+            measure_text(one.real),
+            NO_VALUE if np.isnan(one.agreement) else _percent(one.agreement),
+            str(one.tried),
+            str(one.infeasible),
+            str(one.open),
+        )
+        for one in successes
+    ]
+    caption = (
+        "success of the best grasp of each image in percent, with the 95 % confidence interval over"
+        " scenes\n"
+        "rendered: planned on rendered images of the same scenes, in simulation\n"
+        "simulated, robot: planned on the given images, in simulation and on the robot\n"
+        "agree: tried grasps that ended alike in simulation and on the robot\n"
+        "infeasible: images without a grasp, or whose best one the arm cannot execute; failures\n"
+        "open: still to be tried, and not counted"
+    )
+    head = ("method", "rendered", "simulated", "robot", "agree", "tried", "infeasible", "open")
+    return TableText("Simulation and robot", head, tuple(rows), caption)
 
 
 def robustness_table(effects: Sequence[ConditionEffect]) -> TableText:
@@ -134,6 +190,7 @@ def _settings_text(result: BenchmarkResult) -> str:
         *(["depth only"] if known.depth_only else []),
         *([f"settled by {known.settled}"] if known.settled else []),
         *([str(known.conditions)] if known.conditions.changes else []),
+        *(["images of a real camera"] if known.images else []),
     ]
     return "".join(f", {part}" for part in parts)
 

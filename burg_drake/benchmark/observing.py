@@ -14,7 +14,7 @@ from burg_drake.cameras import DepthNoise, Intrinsics, noisy_depth
 from burg_drake.core import Array, content_hash, make_pose
 from burg_drake.dataset import ImageKind, SceneRenderer, View
 from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.station import StationLike, as_station, station_gripper
+from burg_drake.station import Station, StationLike, as_station, station_gripper
 
 WORKSPACE_HEIGHT = 0.4
 """Height of `Observation.bounds` above the board [m]: of every object, and of the shelf's roof."""
@@ -77,18 +77,15 @@ class SceneCamera:
                 normals=images.normals,
                 color=images.color,
             )
-        width, height = scene.board.size
-        parts: dict[str, Any] = {
-            "color": images.color,
-            "depth": depth,
-            "K": self.intrinsics.K,
-            "X_WC": station.document.X_WS.matrix() @ self.X_SC @ self._pose_error(scene, take),
-            "X_WS": station.document.X_WS.matrix(),
-            "bounds": np.array([[0.0, 0.0, 0.0], [width, height, WORKSPACE_HEIGHT]]),
-            "hand": hand_facts(station),
-            "segmentation": images.labels,
-        }
-        return Observation(id=observation_id(**parts), **parts)
+        return make_observation(
+            scene,
+            station,
+            X_SC=self.X_SC @ self._pose_error(scene, take),
+            K=self.intrinsics.K,
+            depth=depth,
+            color=images.color,
+            segmentation=images.labels,
+        )
 
     def _pose_error(self, scene: Scene, take: int) -> Array:
         """(4, 4) the told pose in the true one: the same for all planners, and for larger errors
@@ -98,6 +95,30 @@ class SceneCamera:
         rng = np.random.default_rng(int(content_hash([scene.content, self.name, take])[:16], 16))
         shift, turn = rng.standard_normal((2, 3))
         return make_pose(Rotation.from_rotvec(self.turn * turn).as_matrix(), self.shift * shift)
+
+
+def make_observation(
+    scene: Scene, station: Station, *, X_SC: Array, K: Array, **images: Any
+) -> Observation:
+    """The observation of a scene on a station.
+
+    Args:
+        scene, station: what is observed.
+        X_SC: (4, 4) pose of the camera in the scene frame, as far as it is known.
+        K: (3, 3) intrinsics of the images.
+        images: `depth`, `color` and `segmentation`, see `Observation`; those that are there.
+    """
+    width, height = scene.board.size
+    X_WS = station.document.X_WS.matrix()
+    parts: dict[str, Any] = {
+        **images,
+        "K": K,
+        "X_WC": X_WS @ X_SC,
+        "X_WS": X_WS,
+        "bounds": np.array([[0.0, 0.0, 0.0], [width, height, WORKSPACE_HEIGHT]]),
+        "hand": hand_facts(station),
+    }
+    return Observation(id=observation_id(**parts), color=parts.pop("color", None), **parts)
 
 
 def hand_facts(station: StationLike) -> Mapping[str, Any]:

@@ -88,7 +88,7 @@ def _has_usual(result: BenchmarkResult, usual: Mapping[tuple[str, ...], object])
 def _key(result: BenchmarkResult) -> tuple[str, ...]:
     """What has to be equal for results that differ in their conditions alone."""
     known = result.document
-    settings = (known.protocol, known.split, str(known.depth_only), known.settled)
+    settings = (known.protocol, known.split, str(known.depth_only), known.settled, known.images)
     return (known.suite, known.suite_hash, *settings, known.name)
 
 

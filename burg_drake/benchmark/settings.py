@@ -54,6 +54,8 @@ class BenchmarkSettings:
         depth_only: give the planner no colour images, which need a renderer.
         settle: engine that judges contested grasps again; none if empty.
         conditions: how sensor, calibration and friction differ from the suite.
+        depth_unit: unit of the depth images of a real camera [m]; if None, whole numbers are
+            millimetres, others metres.
     """
 
     name: str = setting("", "name of the method in tables (default: the planner's)", metavar="NAME")
@@ -73,3 +75,4 @@ class BenchmarkSettings:
         metavar="ENGINE",
     )
     conditions: Conditions = field(default_factory=Conditions)
+    depth_unit: float | None = None

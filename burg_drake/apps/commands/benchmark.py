@@ -14,6 +14,7 @@ from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark, show_progress
 
 if TYPE_CHECKING:
+    from burg_drake.experiment import TrialSheet
     from burg_drake.scene import Scene
     from burg_drake.station import Station
 
@@ -108,6 +109,7 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
         "burg-drake benchmark run packed --planner antipodal --protocol clear -o results/clear",
         "burg-drake benchmark run my_suite.yaml --planner random -o results/random --settle"
         " reference",
+        "burg-drake benchmark run tabletop --planner antipodal --images photos/ -o results/real",
         "",
         "The same command continues where an interrupted one stopped.",
     )
@@ -126,6 +128,16 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
         benchmark.BenchmarkSettings,
         *("name", "protocol", "split", "depth_only", "settle"),
     )
+    group = parser.add_argument_group(
+        "images of a real camera", "In place of rendered ones; see the tutorial."
+    )
+    group.add_argument(
+        "--images",
+        metavar="FOLDER",
+        help="for each scene SCENE.png and SCENE.depth.png or .npy; intrinsics.yaml; camera.yaml,"
+        " unless the board is in view",
+    )
+    options.add_depth_unit(group)
     group = parser.add_argument_group(
         "robustness", "Change one at a time; `compare` shows what it costs."
     )
@@ -151,7 +163,9 @@ def run_benchmark_run(arguments: argparse.Namespace) -> int:
                 arguments,
                 benchmark.BenchmarkSettings,
                 conditions=options.settings_from(arguments, benchmark.Conditions),
+                depth_unit=arguments.depth_unit,
             ),
+            images=arguments.images,
             workers=arguments.workers,
             executor=executor,
             progress=not arguments.quiet,
@@ -188,22 +202,60 @@ def _report_failures(result: benchmark.BenchmarkResult) -> int:
     return 1 if unjudged else 0
 
 
+def add_benchmark_trials_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake benchmark trials`."""
+    parser.epilog = options.examples_text(
+        "burg-drake benchmark trials results/mine_real results/other_real -o trials.yaml",
+        "",
+        "The methods' grasps are in random order. `burg-drake trials` has the sheet, the page for"
+        " the lab and the motions; `burg-drake benchmark compare --trials` the result.",
+    )
+    _add_results(parser)
+    options.add_output(parser, "FILE", "trials file to write (.yaml)")
+    parser.add_argument(
+        "-n",
+        dest="count",
+        metavar="N",
+        type=options.positive_int,
+        default=1,
+        help="number of grasps of each image, the best ones (default: %(default)d)",
+    )
+    parser.add_argument(
+        "--seed", type=options.seed, default=0, help="seed of the order (default: %(default)d)"
+    )
+
+
+def run_benchmark_trials(arguments: argparse.Namespace) -> int:
+    """Plans trials of the best grasps on a robot."""
+    results = list(map(benchmark.load_result, arguments.results))
+    sheet = benchmark.plan_robot_trials(
+        results, arguments.output, count=arguments.count, seed=arguments.seed
+    )
+    print_note_lines(sheet.notes)
+    count = core.count_with_noun(len(sheet.trials), "trial")
+    print(f"wrote {arguments.output}: {count} on {core.count_with_noun(len(sheet.runs), 'scene')}")
+    return 0
+
+
 def add_benchmark_compare_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake benchmark compare`."""
     parser.epilog = options.examples_text(
         "burg-drake benchmark compare results/*",
         "burg-drake benchmark compare results/* --html leaderboard.html",
+        "burg-drake benchmark compare results/* --trials trials.yaml",
     )
     _add_results(parser)
+    _add_trials(parser)
     parser.add_argument("--html", metavar="PAGE", help="write a leaderboard as a page (.html)")
 
 
 def run_benchmark_compare(arguments: argparse.Namespace) -> int:
     """Prints and writes the comparison of results."""
     comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
-    _print_tables(comparisons)
+    sheets = _load_sheets(arguments)
+    _print_tables(comparisons, sheets)
     if arguments.html is not None:
-        benchmark.write_leaderboard(comparisons, arguments.html)
+        benchmark.write_leaderboard(comparisons, arguments.html, sheets=sheets)
         print(f"wrote {arguments.html}")
     return 0
 
@@ -212,16 +264,18 @@ def add_benchmark_table_options(parser: options.Parser) -> None:
     """Adds the options of `burg-drake benchmark table`."""
     parser.epilog = options.examples_text("burg-drake benchmark table results/* --markdown")
     _add_results(parser)
+    _add_trials(parser)
     parser.add_argument("--markdown", action="store_true", help="print GitHub's Markdown")
 
 
 def run_benchmark_table(arguments: argparse.Namespace) -> int:
     """Prints the tables of results."""
     comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
+    sheets = _load_sheets(arguments)
     if not arguments.markdown:
-        _print_tables(comparisons)
+        _print_tables(comparisons, sheets)
         return 0
-    for table in benchmark.all_tables(comparisons):
+    for table in benchmark.all_tables(comparisons, sheets):
         print(table.markdown())
     return 0
 
@@ -381,7 +435,28 @@ def _add_results(parser: Any) -> None:
     )
 
 
-def _print_tables(comparisons: Sequence[benchmark.MethodComparison]) -> None:
+def _add_trials(parser: Any) -> None:
+    parser.add_argument(
+        "--trials",
+        metavar="FILE",
+        nargs="+",
+        default=[],
+        help="trials files of `benchmark trials`, to compare with the robot",
+    )
+
+
+def _load_sheets(arguments: argparse.Namespace) -> list[TrialSheet]:
+    """The trials files of --trials."""
+    if not arguments.trials:
+        return []
+    from burg_drake.experiment import load_trials
+
+    return [load_trials(path) for path in arguments.trials]
+
+
+def _print_tables(
+    comparisons: Sequence[benchmark.MethodComparison], sheets: Sequence[TrialSheet] = ()
+) -> None:
     """Prints the tables of results, suite by suite."""
-    for table in benchmark.all_tables(comparisons):
+    for table in benchmark.all_tables(comparisons, sheets):
         table.text_table().show()

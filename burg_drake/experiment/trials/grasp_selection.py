@@ -7,7 +7,7 @@ depend on the order of the runs, and a smaller selection is a part of a larger o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -400,6 +400,30 @@ def select_grasps(
         else []
     )
     return strata, chosen, notes + shortfall_notes(short) + _rare_class_note(chosen, selection)
+
+
+def take_grasps(
+    pools: Sequence[EligibleGrasps], grasps: Mapping[Path, Collection[str]]
+) -> tuple[dict[str, Stratum], Chosen]:
+    """Takes all grasps with given ids, by the folder of their run; returns strata and grasps."""
+    strata: dict[str, Stratum] = {}
+    chosen: Chosen = []
+    for pool in pools:
+        objects = pool.cells("object")
+        wanted = np.isin(pool.cells("id"), [*grasps.get(pool.run.path, ())])
+        for object_name in np.unique(objects[wanted]).tolist():
+            rows = np.flatnonzero(wanted & (objects == object_name)).tolist()
+            key = f"{pool.key}/{object_name}/given"
+            strata[key] = Stratum(
+                run=pool.key,
+                object=object_name,
+                label="given",
+                population=len(rows),
+                selected=len(rows),
+                wanted=len(rows),
+            )
+            chosen += [(pool, k, key) for k in rows]
+    return strata, chosen
 
 
 def _rare_class_note(chosen: Chosen, selection: Selection) -> list[str]:

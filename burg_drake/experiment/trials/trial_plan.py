@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
@@ -34,6 +34,7 @@ from burg_drake.experiment.trials.grasp_selection import (
     gather_runs,
     list_eligible_grasps,
     select_grasps,
+    take_grasps,
 )
 from burg_drake.experiment.trials.source_runs import grasp_contents, make_source_run
 from burg_drake.experiment.trials.trial_book import (
@@ -145,6 +146,7 @@ def plan_trials(
     *,
     settings: SelectionSettings | None = None,
     robustness: str | Path | None = None,
+    grasps: Mapping[Path, Collection[str]] | None = None,
     out: str | Path | None = None,
 ) -> TrialSheet:
     """Chooses grasps for trials on the robot.
@@ -160,6 +162,8 @@ def plan_trials(
         settings: number, choice and order of the grasps; the defaults if None.
         robustness: table with probabilities, for a single run; tables in the folders of the runs
             if None.
+        grasps: ids of grasps by the folder of their run; all of these that are eligible are tried,
+            whatever the settings say of their number and balance.
         out: trials file to write; none if None.
 
     Returns:
@@ -179,7 +183,11 @@ def plan_trials(
     pools, notes = list_eligible_grasps(gathered, selection.among)
     pools = draw_scenes(pools, selection)
     table = None if robustness is None else Path(robustness)
-    strata, chosen, more = select_grasps(pools, selection, table)
+    if grasps is None:
+        strata, chosen, more = select_grasps(pools, selection, table)
+    else:
+        strata, chosen = take_grasps(pools, grasps)
+        more = []
     if not chosen:
         raise InvalidInputError(
             f"{', '.join(str(run.path) for run in gathered.values())}: there is no grasp to choose"

@@ -1,0 +1,232 @@
+"""Trials of a planner's best grasps on a robot: which are tried, and how they ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
+from burg_drake.benchmark.measures import BenchmarkMeasure, precision_at
+from burg_drake.core import (
+    InvalidInputError,
+    RealOutcome,
+    Stage,
+    count_with_noun,
+    mean_interval,
+)
+from burg_drake.experiment import (
+    SelectionSettings,
+    Success,
+    TrialSheet,
+    grasp_contents,
+    is_success,
+    plan_trials,
+)
+
+NO_INFORMATION = (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
+"""Outcomes that say nothing about a grasp."""
+
+
+def plan_robot_trials(
+    results: Sequence[BenchmarkResult], out: str | Path, *, count: int = 1, seed: int = 0
+) -> TrialSheet:
+    """Plans trials of the best grasps of each image, in random order over all methods.
+
+    Grasps that the arm cannot execute are left out; `robot_successes` counts them as failures.
+
+    Args:
+        results: complete benchmarks.
+        out: trials file to write.
+        count: number of grasps of each image.
+        seed: random seed of the order.
+
+    Raises:
+        InvalidInputError: a benchmark is not complete, the file has entries already, or no grasp
+            can be executed.
+    """
+    chosen: dict[Path, set[str]] = {}
+    for result in results:
+        result.require_complete()
+        (first, *_) = result.rounds
+        for answer in result.judged_answers(first):
+            folder = first.run_folder(answer.answer.scene)
+            for id, verdict in list(zip(answer.ids, answer.verdicts, strict=True))[:count]:
+                if verdict is not None and verdict.stage is Stage.EXECUTED:
+                    chosen.setdefault(folder, set()).add(id)
+    if not chosen:
+        raise InvalidInputError(
+            f"none of the best grasps of {count_with_noun(len(results), 'result')} can be executed"
+            " by the arm; there is nothing to try on the robot"
+        )
+    settings = SelectionSettings(per_object=count, balance="none", seed=seed)
+    return plan_trials(list(chosen), settings=settings, grasps=chosen, out=out)
+
+
+@dataclass(frozen=True)
+class RobotSuccess:
+    """Success of a method's best grasp of each image on the robot, and in simulation.
+
+    Attributes:
+        name: name of the method.
+        real: share of images whose best grasp succeeded on the robot; without those that are still
+            to be tried.
+        simulated: the same in simulation, of the same images.
+        agreement: share of tried grasps that ended alike, NaN if none was tried.
+        rendered: success of the best grasp on rendered images of the same scenes; None if there is
+            no such benchmark of the method.
+        tried: number of grasps that were tried.
+        infeasible: number of images without a grasp that the arm can execute: failures.
+        open: number of grasps that are still to be tried.
+    """
+
+    name: str
+    real: BenchmarkMeasure
+    simulated: BenchmarkMeasure
+    agreement: float
+    rendered: BenchmarkMeasure | None
+    tried: int
+    infeasible: int
+    open: int
+
+
+def robot_successes(
+    results: Sequence[BenchmarkResult], sheets: Sequence[TrialSheet]
+) -> list[RobotSuccess]:
+    """Success on the robot of each method with grasps in trials files.
+
+    A trial belongs to a grasp if scene, instance, pose and width are the same.
+
+    Args:
+        results: complete benchmarks, also those on rendered images.
+        sheets: contents of trials files.
+
+    Raises:
+        InvalidInputError: the trials have none of the grasps of the results.
+    """
+    trials = {
+        (sheet.runs[trial.run].scene.content, trial.content): _RobotTrial(
+            trial.outcome, sheet.selection.success
+        )
+        for sheet in sheets
+        for trial in sheet.trials
+    }
+    found = []
+    for result in results:
+        tops = [_top_grasp(result, answer, trials) for answer in result.answers]
+        if any(one.trial is not None for one in tops):
+            found.append(_robot_success(result, tops, _rendered_twin(result, results)))
+    if not found:
+        raise InvalidInputError(
+            "the trials have none of the best grasps of the results; give the trials files that"
+            " were planned of them"
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _RobotTrial:
+    """A trial: how it ended, None if it is open, and what counts as success."""
+
+    outcome: RealOutcome | None
+    success: Success
+
+    @property
+    def is_open(self) -> bool:
+        return self.outcome is None or self.outcome in NO_INFORMATION
+
+    @property
+    def succeeded(self) -> bool:
+        return self.outcome is not None and is_success(self.outcome, self.success)
+
+
+@dataclass(frozen=True)
+class _TopGrasp:
+    """The best grasp of an answer.
+
+    Attributes:
+        answer: the answer.
+        feasible: whether there is one that the arm can execute.
+        trial: its trial; None if it is in no trials file.
+    """
+
+    answer: JudgedAnswer
+    feasible: bool
+    trial: _RobotTrial | None
+
+    @property
+    def is_open(self) -> bool:
+        return self.feasible and (self.trial is None or self.trial.is_open)
+
+    @property
+    def real(self) -> bool:
+        return self.trial is not None and self.trial.succeeded
+
+    @property
+    def simulated(self) -> bool:
+        """Success in simulation, as the trials count it."""
+        verdict = self.answer.verdicts[0] if self.feasible else None
+        if verdict is None:
+            return False
+        return is_success(verdict.outcome, self.trial.success if self.trial else "lifted")
+
+
+def _top_grasp(
+    result: BenchmarkResult,
+    answer: JudgedAnswer,
+    trials: Mapping[tuple[str, str], _RobotTrial],
+) -> _TopGrasp:
+    if answer.executed != 0:
+        return _TopGrasp(answer, False, None)
+    campaign = result.rounds[0].campaign
+    assert campaign is not None
+    run = campaign.run(answer.answer.scene)
+    (content,) = grasp_contents(run, [answer.ids[0]]).values()
+    return _TopGrasp(answer, True, trials.get((run.document.scene.content, content)))
+
+
+def _robot_success(
+    result: BenchmarkResult, tops: Sequence[_TopGrasp], rendered: BenchmarkResult | None
+) -> RobotSuccess:
+    known = [one for one in tops if not one.is_open]
+    scenes = {one.answer.answer.scene for one in known}
+    tried = [one for one in known if one.feasible]
+    alike = [one.real == one.simulated for one in tried]
+    return RobotSuccess(
+        name=result.document.name,
+        real=_share([one.real for one in known]),
+        simulated=_share([one.simulated for one in known]),
+        agreement=float(np.mean(alike)) if alike else math.nan,
+        rendered=None
+        if rendered is None
+        else _share([precision_at(a, 1) for a in rendered.answers if a.answer.scene in scenes]),
+        tried=len(tried),
+        infeasible=len(known) - len(tried),
+        open=len(tops) - len(known),
+    )
+
+
+def _share(values: Sequence[float]) -> BenchmarkMeasure:
+    """Mean over images of different scenes with its interval; NaN without any."""
+    if not values:
+        return BenchmarkMeasure(*[math.nan] * 5)
+    mean = float(np.mean(values))
+    return BenchmarkMeasure(mean, *mean_interval(np.array(values, dtype=float)), mean, mean)
+
+
+def _rendered_twin(
+    result: BenchmarkResult, results: Sequence[BenchmarkResult]
+) -> BenchmarkResult | None:
+    """The benchmark of the same method on rendered images of the same suite, if there is one."""
+    if not result.document.images:
+        return None
+    known = result.document
+    for other in results:
+        one = other.document
+        same = (one.name, one.suite_hash, one.protocol) == (known.name, known.suite_hash, "single")
+        if same and not one.images and not one.conditions.changes:
+            return other
+    return None
