@@ -114,11 +114,13 @@ def robot_successes(
         for sheet in sheets
         for trial in sheet.trials
     }
+    twins = {result.path: _rendered_twin(result, results) for result in results}
+    shown = [result for result in results if all(result is not twin for twin in twins.values())]
     found = []
-    for result in results:
+    for result in shown:
         tops = [_top_grasp(result, answer, trials) for answer in result.answers]
         if any(one.trial is not None for one in tops):
-            found.append(_robot_success(result, tops, _rendered_twin(result, results)))
+            found.append(_robot_success(result, tops, twins[result.path]))
     if not found:
         raise InvalidInputError(
             "the trials have none of the best grasps of the results; give the trials files that"

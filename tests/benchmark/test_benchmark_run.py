@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
+from burg_drake.apps import main
 from burg_drake.benchmark import (
     BenchmarkResult,
     BenchmarkSettings,
@@ -30,9 +31,10 @@ from burg_drake.benchmark import (
     verify_result,
     write_leaderboard,
 )
-from burg_drake.core import InvalidInputError, Outcome, Pose
-from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.core import InvalidInputError, Outcome
+from burg_drake.scene import Board
 from burg_drake.station import station_gripper
+from tests.benchmark.can_scenes import cans
 from tests.benchmark.scripted_planners import grasp_in_scene
 
 pytestmark = pytest.mark.physics
@@ -40,18 +42,6 @@ pytestmark = pytest.mark.physics
 thorough = pytest.mark.thorough
 PLANNERS = "tests.benchmark.scripted_planners"
 DEPTH = BenchmarkSettings(depth_only=True)
-
-
-def cans(name: str, *places: tuple[float, float], board: Board = Board()) -> Scene:
-    """Standing cans at places of the board."""
-    library = burg.load_library("household")
-    height = library.entry("can").lower[2]
-    instances = tuple(
-        Instance(name=f"can_{k}", object="can", X_SO=Pose((x, y, -height)))
-        for k, (x, y) in enumerate(places)
-    )
-    document = SceneDocument(name=name, library="household", board=board, instances=instances)
-    return Scene(document, library, Path(f"{name}.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -222,6 +212,28 @@ def test_another_benchmark_in_the_folder_is_refused(cleared: BenchmarkResult, su
         run_benchmark(
             suite, f"{PLANNERS}:plan_cans", cleared.path, settings=replace(DEPTH, name="cans")
         )
+
+
+def test_a_planner_that_was_edited_is_refused(suite: Suite, tmp_path: Path) -> None:
+    def run() -> BenchmarkResult:
+        reference, folder = f"{planner}:plan", tmp_path / "result"
+        return run_benchmark(suite, reference, folder, settings=DEPTH, workers=1, progress=False)
+
+    planner = tmp_path / "own.py"
+    planner.write_text("def plan(observation): return {'X_SG': []}\n")
+    first = run().document.planner_content
+    assert run().document.planner_content == first
+    planner.write_text("def plan(observation): return {'X_CG': []}\n")
+    with pytest.raises(InvalidInputError, match=f"has changed since .* began .{first} there, "):
+        run()
+
+
+def test_replay_of_all_scenes_names_one(
+    cleared: BenchmarkResult, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trials = cleared.path / "trials"
+    assert main(["replay", str(trials), "--best"]) == 2
+    assert f"one of them, such as {trials / 'scenes' / 'two'}\n" in capsys.readouterr().err
 
 
 def test_an_unfinished_result_says_how_to_finish_it(
