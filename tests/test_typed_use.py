@@ -40,7 +40,13 @@ def pyright() -> list[Report]:
     ]
 
 
-@pytest.mark.parametrize("checker", [mypy, pyright], ids=["mypy", "pyright"])
+@pytest.mark.parametrize(
+    "checker",
+    [
+        pytest.param(mypy, id="mypy", marks=pytest.mark.thorough),
+        pytest.param(pyright, id="pyright"),
+    ],
+)
 def test_what_is_right_is_accepted_and_what_is_wrong_reported(checker) -> None:
     reports = checker()
     assert [report for report in reports if (report[0], report[2]) == (RIGHT.name, "error")] == []

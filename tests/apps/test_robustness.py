@@ -123,6 +123,7 @@ def test_it_says_at_once_how_long_it_takes(copied: Run, tmp_path: Path) -> None:
     assert 2 * trial < noise < 10 * trial < both < 60 * trial
 
 
+@pytest.mark.thorough
 def test_two_workers_and_no_journal_give_the_same_bits(copied: Run, tmp_path: Path) -> None:
     """Of the tests that take less time: four tasks, each of which either worker may take."""
     out = tmp_path / "two.csv"
@@ -172,6 +173,7 @@ def test_a_narrower_call_keeps_what_is_known(copied: Run, tmp_path: Path) -> Non
     assert other["tug_+x_g"] == row["tug_+x_g"] and other["friction_min"] == row["friction_min"]
 
 
+@pytest.mark.thorough
 def test_a_grasp_is_tested_by_the_engine_that_judged_it_again(run: Run, tmp_path: Path) -> None:
     shutil.copytree(run.path, tmp_path / "run")
     (id,) = run.best()

@@ -104,6 +104,7 @@ def many(judged: Path, tmp_path: Path) -> Campaign:
     return load_campaign(shutil.copytree(judged, tmp_path / "run"))
 
 
+@pytest.mark.thorough
 def test_all_scenes_of_a_run_are_settled(
     command: list[str], many: Campaign, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 
+@pytest.mark.thorough
 def test_all_files_are_those_of_this_machine(
     folder: Path, nodes: LocalNodes, tmp_path: Path
 ) -> None:

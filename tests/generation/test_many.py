@@ -49,6 +49,7 @@ def whole(sampled: Path, tmp_path: Path) -> Path:
     return shutil.copytree(sampled, tmp_path / "whole")
 
 
+@pytest.mark.thorough
 def test_the_same_bytes_by_workers_and_after_a_kill(
     tmp_path: Path, whole: Path, household: ObjectLibrary, tabletop: Station
 ) -> None:

@@ -123,6 +123,7 @@ def test_flat_places_become_large_triangles() -> None:
     assert fit.hausdorff < 1e-6 and mesh.volume == pytest.approx(box.volume, rel=1e-5)
 
 
+@pytest.mark.thorough
 def test_noise_does_not_keep_the_faces_of_a_scan() -> None:
     scan, rng = sphere(), np.random.default_rng(0)
     scan.vertices += rng.normal(0.0, 5e-5, scan.vertices.shape)
