@@ -165,7 +165,7 @@ COMMANDS = {
         Verb("benchmark new", "benchmark", "make a suite of your own scenes or sampled ones"),
         Verb("planner", None, "list, check and serve grasp planners"),
         Verb("planner list", "planner", "list the built-in planners, and how to name your own"),
-        Verb("planner check", "planner", "ask a planner once; find mistakes in its answer"),
+        Verb("planner check", "planner", "find frame mistakes in the answers of a planner"),
         Verb("planner serve", "planner", "serve a planner to other programs over a websocket"),
     ),
     "robot cells, files": (

@@ -27,7 +27,12 @@ from .benchmark_run import (
 from .burg_planner import Observation as Observation, observation_id as observation_id
 from .clearing import Attempt as Attempt, episodes as episodes
 from .conditions import Conditions as Conditions
-from .leaderboard import write_leaderboard as write_leaderboard
+from .leaderboard import (
+    LeaderboardExtras as LeaderboardExtras,
+    failed_grasps as failed_grasps,
+    scene_pictures as scene_pictures,
+    write_leaderboard as write_leaderboard,
+)
 from .measures import BenchmarkMeasure as BenchmarkMeasure, measure_all as measure_all
 from .method_comparison import (
     MethodComparison as MethodComparison,

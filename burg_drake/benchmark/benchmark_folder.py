@@ -86,6 +86,8 @@ class BenchmarkDocument:
         command: command line that began the benchmark.
         name: name of the method in tables.
         planner: reference by which the planner was opened.
+        planner_content: hash of the file with the planner's function, or for a built-in planner the
+            version of burg_drake; empty for servers and commands.
         suite: name of the suite.
         release: release of the suite.
         suite_hash: hash of all that decides the suite's results.
@@ -106,6 +108,7 @@ class BenchmarkDocument:
     command: str
     name: str
     planner: str
+    planner_content: str = ""
     suite: str
     release: int
     suite_hash: str

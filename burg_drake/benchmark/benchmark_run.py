@@ -151,11 +151,16 @@ def run_benchmark(
         ).about("depth_noise")
     if settings.settle:
         require_second_engine(settings.settle, ENGINES[suite.document.engine], suite.document.mode)
-    with open_planner(planner, time_limit=suite.document.budget.seconds) as opened:
+    with open_planner(
+        planner,
+        time_limit=suite.document.budget.seconds,
+        limit_source=f"the budget `seconds` of suite {suite.name}",
+    ) as opened:
         document = BenchmarkDocument(
             command=current_command(),
             name=_require_method_name(settings.name or opened.name),
             planner=opened.reference,
+            planner_content=opened.content,
             suite=suite.name,
             release=suite.document.release,
             suite_hash=suite.hash,
@@ -188,7 +193,7 @@ def _open_images(folder: str | Path, suite: Suite, settings: BenchmarkSettings) 
     """
     if settings.protocol == "clear":
         raise InvalidInputError(
-            "scenes are cleared in simulation, of which a real camera has no images; choose the"
+            "a real camera has no images of scenes that are cleared in simulation; choose the"
             " protocol single"
         ).about("images")
     rendered = sorted(
@@ -217,10 +222,17 @@ def _require_own_folder(folder: Path, document: BenchmarkDocument) -> None:
         InvalidInputError: the message says what differs.
     """
     if (folder / BENCHMARK_FILE).exists():
-        differences = load_result(folder).document.differences(document)
+        recorded = load_result(folder).document
+        differences = recorded.differences(document)
         if differences:
             raise InvalidInputError(
                 f"{folder} already holds another benchmark ({'; '.join(differences)}); choose"
+                " another folder, or delete it"
+            ).about("folder")
+        if recorded.planner_content not in ("", document.planner_content):
+            raise InvalidInputError(
+                f"planner {document.planner} has changed since the benchmark in {folder} began"
+                f" ({recorded.planner_content} there, {document.planner_content} here); choose"
                 " another folder, or delete it"
             ).about("folder")
     elif {path.name for path in folder.iterdir()} - {SUITE_FILE, ANSWERS_FOLDER}:
@@ -348,7 +360,9 @@ class _BenchmarkCall:
             for name in scenes
         }
         total, rendering, planning = len(round.cases), 0.0, 0.0
-        phase = "planning" if self.result.document.protocol == "single" else f"planning {number}"
+        phase = (
+            "planning" if self.result.document.protocol == "single" else f"planning image {number}"
+        )
         done = total - sum(map(len, missing.values()))
         progress = Progress(phase, done, total, unit="images")
         meter = ProgressMeter(self.reporter.show, progress, phase)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
-from burg_drake.benchmark.benchmark_folder import JudgedAnswer, Round
+from burg_drake.benchmark.benchmark_folder import SUITE_FILE, JudgedAnswer, Round
 from burg_drake.benchmark.method_comparison import MethodComparison
 from burg_drake.benchmark.method_tables import (
     CLEARING_MEASURES,
@@ -20,10 +23,18 @@ from burg_drake.benchmark.method_tables import (
     comparison_tables,
     further_tables,
     measure_text,
-    planning_time,
+    time_columns,
 )
 from burg_drake.benchmark.robustness import without_effects
-from burg_drake.core import NO_VALUE, atomic_write, count_with_noun, format_duration, outcome_label
+from burg_drake.benchmark.suite import load_suite
+from burg_drake.core import (
+    NO_VALUE,
+    Outcome,
+    atomic_write,
+    count_with_noun,
+    format_duration,
+    outcome_label,
+)
 from burg_drake.evaluation import (
     GROUP_CLASSES,
     REPORT_FILE,
@@ -41,48 +52,54 @@ OUTCOME_CLASSES = {
     outcome: GROUP_CLASSES[group.name] for group in OUTCOME_GROUPS for outcome in group.outcomes
 }
 """CSS class of each outcome."""
+_PACKAGES = ("burg_drake", "drake")
+"""Packages whose versions are shown."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaderboardExtras:
+    """What a leaderboard shows besides the tables of its comparisons.
+
+    Attributes:
+        sheets: contents of trials files, for success on a robot.
+        replays: pages of replays, by folder of the run and id of the grasp.
+        pictures: JPEG of each scene, by hash of the suite and name of the scene.
+    """
+
+    sheets: Sequence[TrialSheet] = ()
+    replays: Mapping[tuple[Path, str], Path] = field(default_factory=dict)
+    pictures: Mapping[tuple[str, str], bytes] = field(default_factory=dict)
 
 
 def write_leaderboard(
     comparisons: Sequence[MethodComparison],
     path: str | Path,
     *,
-    sheets: Sequence[TrialSheet] = (),
+    extras: LeaderboardExtras | None = None,
 ) -> Path:
-    """Writes the leaderboard; links to reports are relative to the page.
+    """Writes the leaderboard; links to reports and replays are relative to the page.
 
     Args:
         comparisons: methods of each suite.
         path: file to write (.html).
-        sheets: contents of trials files, for success on a robot.
+        extras: trials, replays and pictures; none if None.
     """
     path = Path(path)
-    atomic_write(path, leaderboard_page(comparisons, path.parent, sheets))
-    return path
-
-
-def leaderboard_page(
-    comparisons: Sequence[MethodComparison], folder: Path, sheets: Sequence[TrialSheet] = ()
-) -> str:
-    """The page as HTML.
-
-    Args:
-        comparisons: methods of each suite.
-        folder: folder of the page.
-        sheets: contents of trials files.
-    """
+    extras = extras or LeaderboardExtras()
     methods = len({name for one in comparisons for name in one.names})
     suites = [one.results[0].suite.name for one in comparisons]
     script, style = (
         (files("burg_drake.benchmark") / f"leaderboard.{kind}").read_text(encoding="utf-8")
         for kind in ("js", "css")
     )
-    parts = [part for one in without_effects(comparisons) for part in _suite_sections(one, folder)]
+    shown = without_effects(comparisons)
+    parts = [part for one in shown for part in _suite_sections(one, path.parent, extras)]
     parts += [
         section(one.title, summary, _text_table(one), _caption(one))
-        for one, summary in further_tables(comparisons, sheets)
+        for one, summary in further_tables(comparisons, extras.sheets)
     ]
-    return html_page(
+    parts.append(_method_section(comparisons, path.parent))
+    page = html_page(
         "Grasp planners compared",
         element("style", Html(style)),
         header(
@@ -94,10 +111,58 @@ def leaderboard_page(
         *parts,
         element("script", Html(script)),
     )
+    atomic_write(path, page)
+    return path
 
 
-def _suite_sections(comparison: MethodComparison, folder: Path) -> list[Html]:
-    success, steps, *others = comparison_tables(comparison)
+def failed_grasps(comparisons: Sequence[MethodComparison], count: int) -> list[tuple[Path, str]]:
+    """Failures to replay: for each method up to `count` best grasps of an image that did not lift
+    their object, different outcomes first. Folder of the run and id of each grasp."""
+    found: list[tuple[Path, str]] = []
+    for comparison in without_effects(comparisons):
+        for result in comparison.results:
+            first = result.rounds[0]
+            seen: Counter[Outcome] = Counter()
+            ranked = []
+            for k, one in enumerate(result.answers):
+                verdict = one.verdicts[0] if one.verdicts else None
+                if verdict is not None and verdict.outcome is not Outcome.LIFTED:
+                    run = first.run_folder(one.answer.scene)
+                    ranked.append((seen[verdict.outcome], k, run, one.ids[0]))
+                    seen[verdict.outcome] += 1
+            found += [(run, id) for _, _, run, id in sorted(ranked)[:count]]
+    return found
+
+
+def scene_pictures(comparisons: Sequence[MethodComparison]) -> dict[tuple[str, str], bytes]:
+    """What the first camera of each suite sees, as small JPEG by hash of the suite and scene.
+
+    Raises:
+        BurgError: the objects of a suite are not at hand, or there is no renderer of colours.
+    """
+    import cv2
+
+    size = (320, 240)  # Width and height [pixels].
+    found: dict[tuple[str, str], bytes] = {}
+    for comparison in comparisons:
+        result = comparison.results[0]
+        suite = load_suite(result.path / SUITE_FILE)
+        camera = replace(suite.document.cameras[0], noise=False, color=True).scene_camera()
+        for name in result.scene_names:
+            key = (result.document.suite_hash, name)
+            if key not in found:
+                scene = {**suite.scenes("test"), **suite.scenes("tuning")}[name]
+                color = camera.observe(scene, suite.station).color
+                small = cv2.resize(color, size, interpolation=cv2.INTER_AREA)
+                _, data = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
+                found[key] = data.tobytes()
+    return found
+
+
+def _suite_sections(
+    comparison: MethodComparison, folder: Path, extras: LeaderboardExtras
+) -> list[Html]:
+    success, steps, answers, *others = comparison_tables(comparison)
     suite = comparison.results[0].suite
     found = [
         section(
@@ -113,6 +178,14 @@ def _suite_sections(comparison: MethodComparison, folder: Path) -> list[Html]:
             _caption(steps),
         ),
     ]
+    found.append(
+        section(
+            answers.title,
+            "What the planners answered, and how much of it was judged.",
+            _text_table(answers),
+            _caption(answers),
+        )
+    )
     if comparison.results[0].document.protocol == "clear":
         clearing = others.pop(0)
         found.append(
@@ -130,9 +203,9 @@ def _suite_sections(comparison: MethodComparison, folder: Path) -> list[Html]:
     found.append(
         section(
             f"The best grasp in each scene of {suite.name}",
-            "How it ended. A scene opens the report of its grasps; a failed grasp is shown by the"
-            " command below with its id.",
-            _scene_table(comparison, folder),
+            "How it ended. An outcome opens the report of the scene's grasps; the command below"
+            " shows the grasp with an id again.",
+            _scene_table(comparison, folder, extras),
             command("burg-drake replay RESULT/trials/scenes/SCENE --grasp ID"),
         )
     )
@@ -150,7 +223,8 @@ def _measure_table(
     """Measures by method, with numbers to sort by."""
     rows = []
     names = [name for name in heads if name in comparison.measures[comparison.names[0]]]
-    for result in comparison.results:
+    times = time_columns(comparison) if with_times else {}
+    for k, result in enumerate(comparison.results):
         measures = comparison.measures[result.document.name]
         cells = [element("th", result.document.name, scope="row")]
         cells += [
@@ -162,15 +236,11 @@ def _measure_table(
             )
             for name in names
         ]
-        if with_times:
-            seconds = planning_time(result)
-            cells.append(
-                element(
-                    "td", format_duration(seconds), class_="number", data_value=_sortable(seconds)
-                )
-            )
+        for column in times.values():
+            text, value = format_duration(column[k]), _sortable(column[k])
+            cells.append(element("td", text, class_="number", data_value=value))
         rows.append(element("tr", *cells))
-    head = ["method", *(heads[name] for name in names), *(["time"] if with_times else [])]
+    head = ["method", *(heads[name] for name in names), *times]
     return table(head, rows, numbers=range(1, len(head)), style="sortable")
 
 
@@ -186,29 +256,73 @@ def _text_table(text: TableText) -> Html:
     return table(text.head, rows, numbers=range(1, len(text.head)), style="sortable")
 
 
-def _scene_table(comparison: MethodComparison, folder: Path) -> Html:
+def _method_section(comparisons: Sequence[MethodComparison], folder: Path) -> Html:
+    """Which planner each result is of, where it lies, and the versions of its software."""
+    rows = []
+    for result in (result for one in comparisons for result in one.results):
+        known = result.document
+        cells = [
+            element("th", known.name, scope="row"),
+            element("td", known.suite),
+            element("td", str(known.conditions)),
+            element("td", element("code", known.planner)),
+            element("td", element("a", result.path.name, href=_address(result.path, folder))),
+            element("td", ", ".join(f"{n} {known.versions.get(n, NO_VALUE)}" for n in _PACKAGES)),
+            *number_cells([format_duration(known.times.total)]),
+        ]
+        rows.append(element("tr", *cells))
+    head = (
+        *("method", "suite", "conditions", "planner", "result", "versions"),
+        "run time",
+    )
+    return section(
+        "Results",
+        "Which planner each result is of, where it lies, and with which versions it was made.",
+        table(head, rows, numbers=range(6, len(head)), style="sortable"),
+    )
+
+
+def _address(path: Path, folder: Path) -> str:
+    """Relative address of a file for a page in a folder."""
+    return quote(os.path.relpath(path.resolve(), folder.resolve()).replace(os.sep, "/"))
+
+
+def _scene_table(comparison: MethodComparison, folder: Path, extras: LeaderboardExtras) -> Html:
     """How the best grasp of each method ended, by scene and camera."""
     rows = []
+    suite_hash = comparison.results[0].document.suite_hash
     firsts = [result.rounds[0] for result in comparison.results]
     for k, (scene, camera) in enumerate(firsts[0].cases):
         label = scene if len(comparison.results[0].suite.cameras) == 1 else f"{scene}, {camera}"
         cells = [
-            _best_grasp_cell(first, result.answers[k], folder)
+            _best_grasp_cell(first, result.answers[k], folder, extras)
             for first, result in zip(firsts, comparison.results, strict=True)
         ]
-        rows.append(element("tr", element("th", label, scope="row"), *cells))
+        picture = extras.pictures.get((suite_hash, scene))
+        head = [label] if picture is None else [_picture(picture, scene), label]
+        rows.append(element("tr", element("th", *head, scope="row"), *cells))
     return table(["scene", *comparison.names], rows)
 
 
-def _best_grasp_cell(round: Round, answer: JudgedAnswer, folder: Path) -> Html:
+def _picture(jpeg: bytes, scene: str) -> Html:
+    data = base64.b64encode(jpeg).decode("ascii")
+    return element("img", src=f"data:image/jpeg;base64,{data}", alt=f"scene {scene}", width="160")
+
+
+def _best_grasp_cell(
+    round: Round, answer: JudgedAnswer, folder: Path, extras: LeaderboardExtras
+) -> Html:
     if answer.answer.error:
-        return element("td", "no answer", title=answer.answer.error)
+        why = element("details", element("summary", "no answer"), answer.answer.error)
+        return element("td", why)
     if not answer.verdicts or answer.verdicts[0] is None:
-        return element("td", NO_VALUE, title="no grasp")
+        return element("td", "no grasp")
     outcome, id = answer.verdicts[0].outcome, answer.ids[0]
-    report = round.run_folder(answer.answer.scene) / REPORT_FILE
-    content: Html | str = outcome_label(outcome)
-    if report.exists():
-        address = os.path.relpath(report.resolve(), folder.resolve()).replace(os.sep, "/")
-        content = element("a", content, href=quote(address))
-    return element("td", content, class_=f"outcome {OUTCOME_CLASSES[outcome]}", title=id)
+    run = round.run_folder(answer.answer.scene)
+    content: list[Html | str] = [outcome_label(outcome)]
+    if (run / REPORT_FILE).exists():
+        content = [element("a", *content, href=_address(run / REPORT_FILE, folder))]
+    if (run, id) in extras.replays:
+        content += [" ", element("a", "replay", href=_address(extras.replays[run, id], folder))]
+    content.append(element("small", id))
+    return element("td", *content, class_=f"outcome {OUTCOME_CLASSES[outcome]}")

@@ -37,6 +37,10 @@ STEP_MEASURES = {
 """Heading of each measure of how far grasps get."""
 
 
+TIME_MEANINGS = {"planning": "an answer", "motion": "the arm's motion to a grasp and up"}
+"""What each time is of."""
+
+
 class TableText(NamedTuple):
     """A table in words.
 
@@ -67,7 +71,8 @@ class TableText(NamedTuple):
             f"|---|{'---:|' * (len(self.head) - 1)}",
             *(f"| {' | '.join(cell.replace('|', '¦') for cell in row)} |" for row in self.rows),
         ]
-        return "\n".join([f"**{self.title}**", "", *lines, "", self.caption, ""])
+        notes = [f"- {note}" for note in self.caption.splitlines()]
+        return "\n".join([f"**{self.title}**", "", *lines, "", *notes, ""])
 
 
 def comparison_tables(comparison: MethodComparison) -> list[TableText]:
@@ -87,6 +92,7 @@ def comparison_tables(comparison: MethodComparison) -> list[TableText]:
             STEP_MEASURES,
         ),
     ]
+    tables.append(_answer_table(comparison))
     if first.document.protocol == "clear":
         tables.append(_measure_table(comparison, "Clearing the scenes", CLEARING_MEASURES))
     pairs = comparison.differences["top_success"], comparison.differences["average_precision"]
@@ -185,7 +191,7 @@ def _settings_text(result: BenchmarkResult) -> str:
     """Settings of a benchmark other than the usual ones."""
     known = result.document
     parts = [
-        *(["first image of each"] if known.protocol == "clear" else []),
+        *(["first image of each scene"] if known.protocol == "clear" else []),
         *(["for tuning"] if known.split == "tuning" else []),
         *(["depth only"] if known.depth_only else []),
         *([f"settled by {known.settled}"] if known.settled else []),
@@ -210,6 +216,26 @@ def planning_time(result: BenchmarkResult) -> float:
     return float(np.median(times)) if times else float("nan")
 
 
+def motion_time(result: BenchmarkResult) -> float:
+    """Median time of the arm's motion to a grasp and up [s]; NaN unless the arm is simulated."""
+    times = [
+        verdict.margins["duration"]
+        for one in result.answers
+        for verdict in one.verdicts
+        if verdict is not None and "duration" in verdict.margins
+    ]
+    return float(np.nanmedian(times)) if times else float("nan")
+
+
+def time_columns(comparison: MethodComparison) -> dict[str, list[float]]:
+    """Times by heading, a value [s] for each method; without those that no method has."""
+    found = {
+        "planning": [planning_time(one) for one in comparison.results],
+        "motion": [motion_time(one) for one in comparison.results],
+    }
+    return {name: times for name, times in found.items() if not np.isnan(times).all()}
+
+
 def _percent(share: float) -> str:
     return format_number(100.0 * share, 0)
 
@@ -220,19 +246,42 @@ def _measure_table(
     rows = []
     known = comparison.measures[comparison.names[0]]
     heads = {name: head for name, head in heads.items() if name in known}
-    for result in comparison.results:
+    times = time_columns(comparison) if with_times else {}
+    for k, result in enumerate(comparison.results):
         measures = comparison.measures[result.document.name]
         cells = [measure_text(measures[name]) for name in heads]
-        times = [format_duration(planning_time(result))] if with_times else []
-        rows.append((result.document.name, *cells, *times))
+        durations = [format_duration(column[k]) for column in times.values()]
+        rows.append((result.document.name, *cells, *durations))
     meanings = [f"{head}: {MEASURE_MEANINGS[name]}" for name, head in heads.items()]
     if with_times:
+        meanings += [f"{name}: median time of {TIME_MEANINGS[name]}" for name in times]
         meanings.append(
-            "in percent, with the 95 % interval if scenes were drawn again; in brackets the range"
-            " that contested verdicts leave open"
+            "in percent, in parentheses the 95 % confidence interval over scenes, in brackets the"
+            " range that contested verdicts leave open: trials that a small change would turn over"
         )
-    head = ("method", *heads.values(), *(["time"] if with_times else []))
+    head = ("method", *heads.values(), *times)
     return TableText(title, head, tuple(rows), "\n".join(meanings))
+
+
+def _answer_table(comparison: MethodComparison) -> TableText:
+    rows = []
+    for result in comparison.results:
+        answers = [one.answer for one in result.answers]
+        counts = (
+            len(answers),
+            sum(bool(one.error) for one in answers),
+            sum(not one.error and not one.answered for one in answers),
+            sum(one.answered for one in answers),
+            sum(len(one.grasps) for one in answers),
+        )
+        rows.append((result.document.name, *map(str, counts)))
+    caption = (
+        "failed: images without an answer that could be read\n"
+        "empty: images with an answer without grasps\n"
+        "judged: the best grasps within the budget, without those near a better one"
+    )
+    head = ("method", "images", "failed", "empty", "grasps", "judged")
+    return TableText("Answers", head, tuple(rows), caption)
 
 
 def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
@@ -243,12 +292,12 @@ def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
             _difference_text(d),
             format_number(d.p_value),
             format_number(d.corrected),
-            "yes" if d.is_significant else "not shown",
+            "yes" if d.is_significant else "not significant",
         )
         for d in differences
     )
     caption = (
-        "difference: in percentage points with its 95 % interval, on the same scenes\n"
+        "difference: in percentage points with its 95 % confidence interval, on the same scenes\n"
         "p: paired permutation test over scenes; corrected by Holm for the pairs of a measure"
     )
     head = ("methods", "measure", "difference", "p", "corrected", "differ")

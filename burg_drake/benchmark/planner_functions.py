@@ -6,6 +6,8 @@ import contextlib
 import importlib
 import importlib.util
 import inspect
+import io
+import os
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -22,7 +24,13 @@ from burg_drake.benchmark.burg_planner import (
     describe_error,
     plain_value,
 )
-from burg_drake.core import InvalidInputError, UnknownNameError, shorten_text, suggest_names
+from burg_drake.core import (
+    InvalidInputError,
+    UnknownNameError,
+    content_hash,
+    shorten_text,
+    suggest_names,
+)
 
 
 @dataclass(frozen=True)
@@ -35,6 +43,7 @@ class FunctionLoader:
         function: name of the function in the module; with dots for a method of an object there.
         folder: folder in which modules are found besides those of Python; none if empty.
         path: absolute path of the file, if the reference names one.
+        output: file for what the planner prints; standard error if None.
     """
 
     reference: str
@@ -42,6 +51,7 @@ class FunctionLoader:
     function: str
     folder: str = ""
     path: Path | None = None
+    output: Path | None = None
 
     def __call__(self) -> Callable[..., Any]:
         """The function.
@@ -54,6 +64,7 @@ class FunctionLoader:
         # If memory runs out, Linux ends this process rather than one that has done no harm.
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
+        self._redirect_output()
         try:
             found: Any = self._import_module()
         except (Exception, SystemExit) as error:
@@ -73,6 +84,19 @@ class FunctionLoader:
         self._require_function(found)
         function: Callable[..., Any] = found
         return function
+
+    def _redirect_output(self) -> None:
+        """Sends standard output, and standard error if there is a file for it, where they are to
+        go; also that of libraries in other languages."""
+        if self.output is None:
+            os.dup2(2, 1)
+        else:
+            file = os.open(self.output, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+            os.dup2(file, 1)
+            os.dup2(file, 2)
+            os.close(file)
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(line_buffering=True)
 
     def _import_module(self) -> ModuleType:
         if self.folder:
@@ -132,6 +156,17 @@ class FunctionError:
 def is_loaded(function: object) -> bool:
     """In a worker: whether it has a planner's function."""
     return callable(function)
+
+
+def module_content(function: object, module: str) -> str:
+    """In a worker: hash of the file of a planner's module; empty if it has none.
+
+    Args:
+        function: the planner's function, which is not used.
+        module: name of the module that was imported for it.
+    """
+    file = sys.modules[module].__file__
+    return content_hash(Path(file))[:16] if file else ""
 
 
 def call_function(

@@ -20,7 +20,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -36,6 +36,7 @@ from burg_drake.benchmark.planner_functions import (
     call_function,
     clean_text,
     is_loaded,
+    module_content,
 )
 from burg_drake.core import (
     NUMBER_KINDS,
@@ -50,10 +51,12 @@ from burg_drake.core import (
     WorkerDied,
     WorkerFuture,
     WorkerPool,
+    content_hash,
     default_workers,
     open_npz,
     quote_value,
     report_read_errors,
+    software_versions,
     suggest_names,
 )
 
@@ -123,7 +126,13 @@ REFERENCE_FORMS: Mapping[str, str] = {
 """Examples of references to other planners, and what each refers to."""
 
 
-def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
+def open_planner(
+    reference: str,
+    *,
+    time_limit: float = 60.0,
+    limit_source: str = "its time limit",
+    show_output: bool = False,
+) -> GraspPlanner:
     """Opens a planner; use it in a `with` block.
 
     Built-in planners and functions run in a process of their own, with one thread for linear
@@ -134,6 +143,9 @@ def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
         reference: name of a built-in planner (`BUILTIN_PLANNERS`), or another reference
             (`REFERENCE_FORMS`).
         time_limit: time for each answer [s]; for a command, with the start of its program.
+        limit_source: what sets this limit, for the message about an answer that takes longer.
+        show_output: whether what a function prints goes to standard error; if not, the last lines
+            are in the message about its failure.
 
     Raises:
         UnknownNameError: there is no such planner, or its module has no such function.
@@ -146,15 +158,25 @@ def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
             f"the time limit of a planner is {time_limit:g} s; give a finite time above 0"
         ).about("time_limit")
     if reference.startswith("command:"):
-        return _CommandPlanner(reference, time_limit)
-    if re.match("wss?://", reference):
-        return _ServedPlanner(reference, time_limit)
+        opened: GraspPlanner = _CommandPlanner(reference, time_limit)
+    elif re.match("wss?://", reference):
+        opened = _ServedPlanner(reference, time_limit)
+    else:
+        opened = _open_function(reference, time_limit, show_output=show_output)
+    opened.limit_source = f"10 times {limit_source}" if opened.knows_meshes else limit_source
+    return opened
+
+
+def _open_function(reference: str, time_limit: float, *, show_output: bool) -> _FunctionPlanner:
     if reference in BUILTIN_PLANNERS:
         module, _, function = BUILTIN_PLANNERS[reference].function.partition(":")
         loader = FunctionLoader(reference, f"burg_drake.benchmark.{module}", function)
-        if reference == "oracle":  # simulation takes longer than any planner may
-            return _FunctionPlanner(loader, reference, 10.0 * time_limit, knows_meshes=True)
-        return _FunctionPlanner(loader, reference, time_limit)
+        knows_meshes = reference == "oracle"
+        if knows_meshes:  # simulation takes longer than any planner may
+            time_limit *= 10.0
+        return _FunctionPlanner(
+            loader, reference, time_limit, knows_meshes=knows_meshes, show_output=show_output
+        )
     module, _, function = reference.rpartition(":")
     if not module or not all(part.isidentifier() for part in function.split(".")):
         raise _unknown_planner(reference)
@@ -163,7 +185,7 @@ def open_planner(reference: str, *, time_limit: float = 60.0) -> GraspPlanner:
         raise InvalidInputError(f"planner {reference}: there is no file {path}").about("planner")
     name = f"{path.stem}:{function}" if path else reference
     loader = FunctionLoader(reference, module, function, folder=os.getcwd(), path=path)
-    return _FunctionPlanner(loader, name, time_limit)
+    return _FunctionPlanner(loader, name, time_limit, show_output=show_output)
 
 
 def _unknown_planner(reference: str) -> UnknownNameError:
@@ -185,11 +207,15 @@ class GraspPlanner(abc.ABC):
         reference: reference by which it was opened.
         name: short name for tables.
         knows_meshes: whether it needs the scene, and so is no planner for a robot.
+        content: hash of the file that has its function, or for a built-in planner the version of
+            burg_drake; empty for servers and commands.
+        limit_source: what sets its time limit, for messages.
     """
 
     def __init__(self, reference: str, name: str, time_limit: float) -> None:
         self.reference, self.name = reference, name
         self.knows_meshes = False
+        self.content = self.limit_source = ""
         self._time_limit = time_limit
 
     def ask(
@@ -214,12 +240,13 @@ class GraspPlanner(abc.ABC):
         except TimeoutError as error:
             raise PlannerError(
                 f"planner {self.reference}, observation {observation.id[:12]}: no answer within"
-                f" {self._time_limit:g} s; make it faster, or give it more time"
+                f" {self._time_limit:g} s, {self.limit_source}; make it faster, or give it more"
+                f" time{clean_text(self._last_output(), 500)}"
             ) from error
         except _AnswerFailure as error:
             raise PlannerError(
                 f"planner {self.reference}, observation {observation.id[:12]}:"
-                f" {clean_text(str(error), 1000)}; `burg-drake planner check` tries it alone"
+                f" {clean_text(f'{error}{self._last_output()}', 1000)}"
             ) from error
         if answer.get("time") is None:
             answer["time"] = time.perf_counter() - begun
@@ -235,6 +262,10 @@ class GraspPlanner(abc.ABC):
             TimeoutError: the planner took too long.
             _AnswerFailure: it failed.
         """
+
+    def _last_output(self) -> str:
+        """End of a message with the last lines that the planner printed, if they are kept."""
+        return ""
 
     @abc.abstractmethod
     def close(self) -> None:
@@ -256,17 +287,28 @@ class _AnswerFailure(Exception):
 
 class _FunctionPlanner(GraspPlanner):
     def __init__(
-        self, loader: FunctionLoader, name: str, time_limit: float, *, knows_meshes: bool = False
+        self,
+        loader: FunctionLoader,
+        name: str,
+        time_limit: float,
+        *,
+        knows_meshes: bool = False,
+        show_output: bool,
     ) -> None:
         super().__init__(loader.reference, name, time_limit)
         self.knows_meshes = knows_meshes
-        self._loader = loader
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="burg_planner_", ignore_cleanup_errors=True
+        )
+        self._output = None if show_output else Path(self._folder.name, "output.txt")
+        self._loader = replace(loader, output=self._output)
         self._pool = WorkerPool(1, retries=0, own_group=True)
         try:
             self._load()
+            self.content = self._hash_content()
         except (WorkerDied, TimeoutError) as error:
+            why = f"{str(error) or 'it took too long'}{clean_text(self._last_output(), 500)}"
             self.close()
-            why = str(error) or "it took too long"
             raise PlannerError(
                 f"planner {self.reference} could not be loaded: {why}; import"
                 f" {loader.module} in Python to see why"
@@ -292,6 +334,17 @@ class _FunctionPlanner(GraspPlanner):
         """
         task = Task(is_loaded, session=self._session(), retries=1)
         self._wait(self._pool.submit_task(task), LOADING_TIMEOUT)
+
+    def _hash_content(self) -> str:
+        if not self._loader.folder:
+            return f"burg_drake {software_versions({}, with_platform=False)['burg_drake']}"
+        if self._loader.path is not None:
+            return content_hash(self._loader.path)[:16]
+        task = Task(module_content, (self._loader.module,), session=self._session())
+        return str(self._wait(self._pool.submit_task(task), LOADING_TIMEOUT))
+
+    def _last_output(self) -> str:
+        return "" if self._output is None else _last_lines(self._output)
 
     def _wait(self, future: WorkerFuture[Any], seconds: float) -> Any:
         """Waits for a result; ends the worker if it takes too long or if we are interrupted."""
@@ -320,6 +373,8 @@ class _FunctionPlanner(GraspPlanner):
             raise PlannerLost(
                 f"planner {self.reference} cannot be loaded again: {clean_text(str(error), 1000)}"
             ) from error
+        if self._output is not None:
+            self._output.write_bytes(b"")
         begun = time.monotonic()
         try:
             answer = self._wait(self._pool.submit_task(task), self._time_limit)
@@ -342,6 +397,7 @@ class _FunctionPlanner(GraspPlanner):
 
     def close(self) -> None:
         self._pool.kill_workers()
+        self._folder.cleanup()
 
 
 # --- programs -------------------------------------------------------------------------------------
@@ -380,9 +436,11 @@ class _CommandPlanner(GraspPlanner):
             code = self._run([*self._words, str(question), str(answer)], errors)
             if code != 0:
                 reason = _signal_name(-code) if code < 0 else f"exit code {code}"
-                raise _AnswerFailure(f"the program ended with {reason}{_last_lines(errors)}")
+                said = _last_lines(errors) or ", and no message"
+                raise _AnswerFailure(f"the program ended with {reason}{said}")
             if not answer.exists():
-                raise _AnswerFailure(f"the program wrote no answer{_last_lines(errors)}")
+                said = _last_lines(errors) or ", and no message"
+                raise _AnswerFailure(f"the program wrote no answer{said}")
             try:
                 return _read_answer(answer)
             except InvalidInputError as error:
@@ -435,7 +493,7 @@ def _signal_name(number: int) -> str:
 
 
 def _last_lines(path: Path) -> str:
-    """End of a message with the last lines that a program wrote; empty if it wrote none."""
+    """End of a message with the last lines that a planner wrote; empty if it wrote none."""
     max_bytes, max_lines = 2000, 3
     try:
         with path.open("rb") as stream:
@@ -444,7 +502,7 @@ def _last_lines(path: Path) -> str:
     except OSError:  # the program has removed it
         lines = []
     kept = [line.strip() for line in lines if line.strip()][-max_lines:]
-    return f"; its last lines: {' | '.join(kept)}" if kept else ", and no message"
+    return f"; its last lines: {' | '.join(kept)}" if kept else ""
 
 
 # --- servers --------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from burg_drake.cameras import (
     read_depth,
     read_image,
 )
-from burg_drake.core import Array, InvalidInputError, UnknownNameError, suggest_names
+from burg_drake.core import Array, Bytes, InvalidInputError, UnknownNameError, suggest_names
 from burg_drake.formats import read_poses
 from burg_drake.scene import Scene
 from burg_drake.station import Station
@@ -142,7 +142,7 @@ class RealImages:
             color=straight.color(image) if color and image is not None else None,
         )
 
-    def _camera_pose(self, scene: Scene, image: Array | None) -> Array:
+    def _camera_pose(self, scene: Scene, image: Bytes | None) -> Array:
         """(4, 4) pose of the camera in the scene frame."""
         for name in (f"{scene.name}.{CAMERA_FILE}", CAMERA_FILE):
             if (self.folder / name).is_file():

@@ -35,8 +35,9 @@ class ConditionEffect:
 
 
 def condition_effects(comparisons: Sequence[MethodComparison]) -> list[ConditionEffect]:
-    """Effects of conditions on methods that were also run under those of the suite, by suite,
-    method and condition.
+    """Effects of conditions on methods, by suite, method and condition.
+
+    Only methods that were also run under the conditions of the suite have effects.
 
     Args:
         comparisons: as `compare_by_suite` returns them.

@@ -6,6 +6,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from burg_drake.benchmark import (
     Budget,
     CameraPlacement,
     Conditions,
+    LeaderboardExtras,
     PlannedGrasps,
     Suite,
     SuiteSettings,
@@ -24,10 +26,12 @@ from burg_drake.benchmark import (
     choose_grasps,
     compare_by_suite,
     episodes,
+    failed_grasps,
     load_result,
     make_suite,
     measure_all,
     run_benchmark,
+    scene_pictures,
     verify_result,
     write_leaderboard,
 )
@@ -35,6 +39,7 @@ from burg_drake.core import InvalidInputError, Outcome
 from burg_drake.scene import Board
 from burg_drake.station import station_gripper
 from tests.benchmark.can_scenes import cans
+from tests.benchmark.judged import COLLIDES, LIFTED, SLIPPED, judged, result
 from tests.benchmark.scripted_planners import grasp_in_scene
 
 pytestmark = pytest.mark.physics
@@ -203,8 +208,28 @@ def test_tables_and_page_name_all_methods(cleared: BenchmarkResult, tmp_path: Pa
     assert comparison.names == ["cans", "same"]
     text = "\n".join(table.markdown() for table in all_tables([comparison]))
     assert "| cans | 100 (34-100) |" in text and "| cans - same | top grasp | +0 " in text
-    page = write_leaderboard([comparison], tmp_path / "page.html").read_text()
-    assert page.count("<table") == 5 and "other/trials/scenes/two/report.html" in page
+    pictures = scene_pictures([comparison])
+    assert sorted(name for _, name in pictures) == ["one", "two"]
+    image = cv2.imdecode(np.frombuffer(next(iter(pictures.values())), np.uint8), cv2.IMREAD_COLOR)
+    assert image.shape == (240, 320, 3) and image.std() > 10.0
+    run = load_result(other).rounds[0].run_folder("two")
+    id = load_result(other).answers[0].ids[0]
+    extras = LeaderboardExtras(
+        pictures=pictures, replays={(run, id): tmp_path / "page_replays" / "one.html"}
+    )
+    page = write_leaderboard([comparison], tmp_path / "page.html", extras=extras).read_text()
+    assert page.count("data:image/jpeg") == 2 and page.count('href="page_replays/one.html"') == 1
+    assert page.count("<table") == 7 and "other/trials/scenes/two/report.html" in page
+
+
+def test_failures_with_different_outcomes_are_replayed_first() -> None:
+    answers = [
+        judged(f"s{k}", [v]) for k, v in enumerate((LIFTED, SLIPPED, SLIPPED, COLLIDES, SLIPPED))
+    ]
+    comparison = compare_by_suite([result(answers, grasps=1)])
+    chosen = failed_grasps(comparison, 3)
+    assert [run.name for run, _ in chosen] == ["s1", "s3", "s2"]
+    assert failed_grasps(comparison, 0) == []
 
 
 def test_another_benchmark_in_the_folder_is_refused(cleared: BenchmarkResult, suite: Suite) -> None:

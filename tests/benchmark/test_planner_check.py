@@ -22,7 +22,7 @@ from burg_drake.benchmark import (
     CheckScene,
     PlannerCheck,
     PlannerError,
-    check_answer,
+    check_answers,
     check_planner,
     make_check_scene,
 )
@@ -139,7 +139,7 @@ class Frames:
     """Poses of the camera, from what a planner is told."""
 
     def __init__(self, seen: CheckScene) -> None:
-        self.X_WS, self.X_WC = seen.observation.X_WS, seen.observation.X_WC
+        self.X_WS, self.X_WC = seen.observations[0].X_WS, seen.observations[0].X_WC
         self.X_SC = np.linalg.inv(self.X_WS) @ self.X_WC
         self.X_CS = np.linalg.inv(self.X_SC)
 
@@ -160,11 +160,11 @@ RIGHT: dict[str, Callable[[Frames], dict[str, Any]]] = {
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_right_planners_have_no_problem(name: str, seen: CheckScene) -> None:
-    found = check_answer(RIGHT[name](Frames(seen)), seen)
+    found = check_answers([RIGHT[name](Frames(seen))], seen)
     assert found.problems == ()
     fitting, tried = found.fits
     assert tried == found.count and fitting >= (0.6 if name == "a third bad" else 0.9) * tried
-    assert not any("Cannot tell" in note for note in found.notes)
+    assert found.unclear == ()
 
 
 def quaternions_read_as_xyzw(X: Poses, quaternion: np.ndarray) -> Poses:
@@ -287,7 +287,7 @@ def corrected(answer: dict[str, Any], found: PlannerCheck, seen: CheckScene) -> 
     lines = [problem.split("\n    ")[1] for problem in found.problems]
     order = answer.get("quaternion")
     names = {key: np.copy(value) for key, value in answer.items() if key != "quaternion"}
-    names |= {"np": np, "observation": seen.observation, "quaternion": order and order[0]}
+    names |= {"np": np, "observation": seen.observations[0], "quaternion": order and order[0]}
     for line in lines:
         if line.startswith("return "):
             return dict(eval(line.removeprefix("return "), names))
@@ -311,7 +311,7 @@ def test_planted_mistakes_are_named_and_undone(
     plant, words = PLANTED[mistake]
     answer = plant(right, frames)
     given = {key: value for key, value in answer.items() if key != "quaternion"}
-    found = check_answer(given, seen)
+    found = check_answers([given], seen)
     assert len(found.problems) == (2 if mistake == "z mirrored" else 1)
     text = " ".join(found.problems).replace("\n", " ")
     assert re.search(words, text), text
@@ -353,54 +353,128 @@ def mostly_random(count: int, seed: int) -> Poses:
 def test_poor_planners_have_no_mistake_in_frames(
     planner: Callable[[int, int], Poses], seen: CheckScene
 ) -> None:
-    found = check_answer({"X_SG": planner(24, 3)}, seen)
+    found = check_answers([{"X_SG": planner(24, 3)}], seen)
     assert found.problems == ()
     fitting = found.fits[0]
     assert fitting <= 9
     if fitting < 8:
-        (note,) = found.notes
-        assert note.startswith(f"Cannot tell whether the frames are right: {fitting} of 24 grasps")
+        assert found.unclear[0].startswith(
+            f"Cannot tell whether the frames are right: {fitting} of 24 grasps"
+        )
+        counts = [
+            re.search(r"Of (\d+) grasps? of the \w+, (\d+) fit", s) for s in found.unclear[1:]
+        ]
+        assert sum(int(match[1]) for match in counts if match) == 24
+        assert sum(int(match[2]) for match in counts if match) == fitting
 
 
 def test_two_right_grasps_are_too_few(seen: CheckScene) -> None:
-    found = check_answer({"X_SG": from_above(2)}, seen)
+    found = check_answers([{"X_SG": from_above(2)}], seen)
     assert found.problems == () and found.fits == (2, 2)
-    assert found.notes == ("Only 2 of 2 grasps fit, too few to be sure that the frames are right.",)
+    assert found.unclear == (
+        "Only 2 of 2 grasps fit, too few to be sure that the frames are right.",
+    )
+
+
+def test_the_reasons_of_grasps_that_do_not_fit_are_counted(seen: CheckScene) -> None:
+    above, across = (0, 0, -1), (1, 0, 0)
+    X = [
+        X_SBOX @ grasp((0.0, 0.0, 0.1), above, across),  # the palm is in the carton
+        X_SBOX @ grasp((0.0, 0.0, 0.29), above, across),  # in the air above it
+        X_SCAN @ grasp((0.03, 0.0, 0.09), above, (0, 1, 0)),  # beside the middle, on the curve
+        grasp((0.52, 0.17, -0.05), above, (0, 1, 0)),  # in the table
+    ]
+    assert check_answers([{"X_SG": np.array(X)}], seen).unclear == (
+        "Cannot tell whether the frames are right: 0 of 4 grasps fit as returned, and no usual"
+        " mistake explains why.",
+        "Of 2 grasps of the carton, 0 fit; the open hand collides with it at 1, nothing is between"
+        " the pads at 1.",
+        "Of 2 grasps of the can, 0 fit; the pads do not close on opposite sides at 1, the open hand"
+        " collides with the table at 1.",
+    )
+
+
+def on_each_object(seen: CheckScene, turn: Poses) -> list[dict[str, Any]]:
+    """For each image one grasp of the carton and one of the can from above, in the camera frame."""
+    down = grasp((0, 0, 0), (0, 0, -1), (1, 0, 0)) @ turn
+    return [
+        {
+            "X_CG": Frames(seen).X_CS
+            @ [
+                scene.X_SO(name) @ pose(p=(0, 0, height)) @ down
+                for name, height in zip(scene.instances, (0.2, 0.092), strict=True)
+            ]
+        }
+        for scene in seen.scenes
+    ]
+
+
+def test_one_grasp_for_each_object_is_enough_in_three_images(seen: CheckScene) -> None:
+    found = check_answers(on_each_object(seen, np.eye(4)), seen)
+    assert (found.fits, found.count, found.images) == ((6, 6), 6, 3)
+    assert found.problems == () and found.unclear == ()
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"),
+    [
+        (pose((0, 0, 90)), "turned by 90 degrees about the approach"),
+        (pose((180, 0, 0)), "z points out of the scene"),
+        (pose(p=(0, 0, -0.1034)), "at the flange"),
+    ],
+)
+def test_mistakes_show_in_three_images(turn: Poses, words: str, seen: CheckScene) -> None:
+    (problem,) = check_answers(on_each_object(seen, turn), seen).problems
+    assert words in problem
+
+
+def test_answers_in_other_frames_than_the_first_are_left_out(seen: CheckScene) -> None:
+    answers = [{"X_SG": from_above(4)}, {"X_WG": from_above(4)}]
+    assert check_answers(answers, seen).fits == (4, 4)
 
 
 def test_answers_that_are_refused_are_problems(seen: CheckScene) -> None:
     X = from_above(8)
-    found = check_answer({"X_GS": X}, seen)
+    found = check_answers([{"X_GS": X}], seen)
     assert found.problems == (
         "The answer has an unknown entry 'X_GS'; return the inverse of these poses, X_SG.",
     )
-    found = check_answer({"X_SG": pose(p=(0, 0, 50)) @ X}, seen)
+    found = check_answers([{"X_SG": pose(p=(0, 0, 50)) @ X}], seen)
     assert "8 of 8 grasps of X_SG are more than 1 m away" in found.problems[0]
-    found = check_answer({"X_SG": X, "score": np.full(8, np.nan)}, seen)
+    found = check_answers([{"X_SG": X, "score": np.full(8, np.nan)}], seen)
     assert "8 of 8 scores are NaN" in found.problems[0] and found.fits == (8, 8)
-    assert check_answer([], seen).problems[0].startswith("The planner returned list")  # type: ignore[arg-type]
-    found = check_answer({"X_SG": np.empty((0, 4, 4)), "time": 0.5}, seen)
+    assert check_answers([[]], seen).problems[0].startswith("The planner returned list")  # type: ignore[arg-type]
+    found = check_answers([{"X_SG": np.empty((0, 4, 4)), "time": 0.5}], seen)
     assert found.problems[0].startswith("There are no grasps") and found.time == 0.5
 
 
 def test_grasps_that_fit_either_way_do_not_hide_turned_ones(seen: CheckScene) -> None:
     turned = from_above(12) @ pose((0, 0, 90))
-    found = check_answer({"X_SG": turned}, seen)
+    found = check_answers([{"X_SG": turned}], seen)
     (problem,) = found.problems
     assert (
         problem.startswith("The grasps are")
         and "turned by 90 degrees about the approach" in problem
     )
     assert found.fits[0] == 6 and "6 of the 12 that were tried fit" in problem
-    assert check_answer({"X_SG": from_above(12)}, seen).problems == ()
+    assert check_answers([{"X_SG": from_above(12)}], seen).problems == ()
 
 
 def test_asking_tells_the_time_and_failures(
     seen: CheckScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("burg_drake.benchmark.planner_check.make_check_scene", lambda station: seen)
-    found = check_planner(lambda *asked: {"X_SG": from_above(6)})
+    counts: list[int] = []
+
+    def answer(*asked: Any) -> dict[str, Any]:
+        counts.append(9)
+        return {"X_SG": from_above(9)}
+
+    found = check_planner(answer)
     assert found.problems == () and 0.0 < found.time < 10.0
+    assert len(counts) == found.images == 3
+    found = check_planner(lambda *asked: {"X_SG": from_above(20)})
+    assert found.images == 1
 
     def fail(*asked: Any) -> Any:
         raise PlannerError("planner mine: no answer within 3 s")
@@ -411,18 +485,20 @@ def test_asking_tells_the_time_and_failures(
 def test_the_command_prints_problems(
     seen: CheckScene, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    X = from_above(10)
+    X = from_above(20)
 
     class Planner:
         def __init__(self, reference: str) -> None:
-            self.turned = reference == "turned"
+            grasps = {"turned": X @ pose((180, 0, 0)), "right": X, "can alone": X[:1]}
+            self.X = grasps[reference]
 
         def ask(self, *asked: Any) -> dict[str, Any]:
-            return {"X_SG": X @ pose((180, 0, 0)) if self.turned else X, "time": 0.25}
+            return {"X_SG": self.X, "time": 0.25}
 
     @contextlib.contextmanager
-    def open_planner(reference: str, *, time_limit: float) -> Iterator[Planner]:
+    def open_planner(reference: str, *, time_limit: float, **options: Any) -> Iterator[Planner]:
         assert time_limit == 7.0
+        assert options == {"limit_source": "the limit of --time-limit", "show_output": True}
         yield Planner(reference)
 
     monkeypatch.setattr(benchmark, "open_planner", open_planner, raising=False)
@@ -430,10 +506,18 @@ def test_the_command_prints_problems(
     monkeypatch.setattr("burg_drake.benchmark.planner_check.make_check_scene", lambda station: seen)
     assert main(["planner", "check", "turned", "--time-limit", "7"]) == 1
     first, second, problem, line = capsys.readouterr().out.splitlines()
-    assert first == "turned: 10 grasps of a carton and a can in 250 ms"
-    assert second.startswith("  0 of 10 fit as returned")
+    assert first == "turned: 20 grasps in 1 image of a carton and a can in 250 ms"
+    assert second.startswith("  0 of 20 fit as returned")
     assert problem.startswith("problem: The grasps are turned around: z points out of the scene")
     assert line.startswith("    X_SG = X_SG @ np.array([[1, 0, 0, 0],")
     assert main(["planner", "check", "right", "--time-limit", "7"]) == 0
     out = capsys.readouterr().out
-    assert "  10 of 10 fit as returned" in out and out.endswith("  no problem found\n")
+    assert "  20 of 20 fit as returned" in out and out.endswith("  no problem found\n")
+    assert main(["planner", "check", "can alone", "--time-limit", "7"]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "can alone: 3 grasps in 3 images of a carton and a can in 750 ms",
+        "  3 of 3 fit as returned: the open hand is clear of the object, and its pads close on it",
+        "  Cannot tell whether the frames are right: only grasps of the can fit, which also fit if"
+        " they are turned about the approach.",
+        "  No grasp is near the carton.",
+    ]

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import burg_drake as burg
+from burg_drake.apps import main
 from burg_drake.benchmark import (
     CameraPlacement,
     SuiteSettings,
@@ -42,6 +43,18 @@ def test_a_suite_has_the_scenes_it_was_made_of(tmp_path: Path) -> None:
     made, given = suite.scenes()["tabletop_six"], burg.load_scene("tabletop_six")
     assert made.content == given.content
     assert suite.document.library == "household" and suite.document.station == "panda_tabletop"
+
+
+def test_the_description_is_shown_if_there_is_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(tmp_path / "one.yaml")
+    new = ["benchmark", "new", path, "--scenes", "tabletop_six"]
+    assert main([*new, "--description", "Six objects"]) == 0
+    assert main(["benchmark", "show", path]) == 0
+    assert "\none, release 1: Six objects\n" in capsys.readouterr().out
+    assert main(["benchmark", "show", str(suite_file(tmp_path))]) == 0
+    assert capsys.readouterr().out.startswith("mine, release 1\n")
 
 
 @pytest.mark.parametrize(

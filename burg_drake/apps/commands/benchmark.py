@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake import benchmark, core
+from burg_drake import benchmark, core, evaluation
 from burg_drake.apps import options
+from burg_drake.apps.commands import replay
 from burg_drake.apps.terminal import print_note_lines, print_remark, show_progress
 
 if TYPE_CHECKING:
@@ -68,7 +70,8 @@ def run_benchmark_show(arguments: argparse.Namespace) -> int:
     """Prints a suite; writes its scenes if asked for."""
     suite = benchmark.load_suite(arguments.suite)
     document = suite.document
-    print(f"{suite.name}, release {document.release}: {document.description}")
+    description = f": {document.description}" if document.description else ""
+    print(f"{suite.name}, release {document.release}{description}")
     print(f"hash      {suite.hash}")
     print(f"library   {suite.library.root}")
     print(f"station   {suite.station.path}")
@@ -188,11 +191,19 @@ def _report_failures(result: benchmark.BenchmarkResult) -> int:
     """Prints failed answers and scenes; returns the exit code."""
     max_lines = 5  # Failed answers, and kinds of notes, that are printed.
     answers = [one.answer for round in result.rounds for one in result.judged_answers(round)]
-    failed = [one for one in answers if one.error]
-    for one in failed[:max_lines]:
-        print_remark(f"{one.scene}, camera {one.camera}: {one.error}")
+    failed: dict[str, list[str]] = {}
+    for one in answers:
+        if one.error:
+            text = one.error.replace(one.observation[:12], "OBSERVATION")
+            failed.setdefault(text, []).append(one.scene)
+    for text, scenes in list(failed.items())[:max_lines]:
+        where = scenes[0] if len(scenes) == 1 else f"{len(scenes)} images, such as {scenes[0]}"
+        print_remark(f"{where}: {text}")
     if len(failed) > max_lines:
-        print_remark(f"and {len(failed) - max_lines} more answers that cannot be used")
+        print_remark(f"and {len(failed) - max_lines} other errors of the planner")
+    if failed:
+        planner = shlex.quote(result.document.planner)
+        print_remark(f"to try the planner alone: burg-drake planner check {planner}")
     notes = Counter(note for one in answers for note in one.notes)
     print_note_lines(f"{note} ({n} images)" for note, n in notes.most_common(max_lines))
     campaigns = [round.campaign for round in result.rounds]
@@ -247,17 +258,62 @@ def add_benchmark_compare_options(parser: options.Parser) -> None:
     _add_results(parser)
     _add_trials(parser)
     parser.add_argument("--html", metavar="PAGE", help="write a leaderboard as a page (.html)")
+    parser.add_argument(
+        "--replays",
+        metavar="N",
+        type=options.positive_int,
+        default=0,
+        help="with --html, simulate N failures of each method again, and show them in 3D",
+    )
+    options.add_quiet(parser)
 
 
 def run_benchmark_compare(arguments: argparse.Namespace) -> int:
     """Prints and writes the comparison of results."""
-    comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
+    comparisons = benchmark.compare_by_suite(_complete_results(arguments.results))
     sheets = _load_sheets(arguments)
     _print_tables(comparisons, sheets)
     if arguments.html is not None:
-        benchmark.write_leaderboard(comparisons, arguments.html, sheets=sheets)
-        print(f"wrote {arguments.html}")
+        page = Path(arguments.html)
+        extras = benchmark.LeaderboardExtras(
+            sheets=sheets,
+            replays=_write_replays(comparisons, page, arguments),
+            pictures=_scene_pictures(comparisons),
+        )
+        benchmark.write_leaderboard(comparisons, page, extras=extras)
+        print(f"wrote {page}")
+    elif arguments.replays:
+        raise core.InvalidInputError("--replays is for --html; add it")
     return 0
+
+
+def _write_replays(
+    comparisons: Sequence[benchmark.MethodComparison], page: Path, arguments: argparse.Namespace
+) -> dict[tuple[Path, str], Path]:
+    """Writes pages of failures beside the leaderboard, unless they are there."""
+    failures = benchmark.failed_grasps(comparisons, arguments.replays)
+    folder = page.parent / f"{page.stem}_replays"
+    found = {}
+    with show_progress("replaying", "grasps", len(failures), quiet=arguments.quiet) as meter:
+        for run, id in failures:
+            hash = evaluation.load_run(run).document.hash[:12]
+            found[run, id] = folder / f"{run.name}_{hash}_{id}.html"
+            if not found[run, id].exists():
+                core.ensure_writable_folder(folder)
+                replay.save_replay(run, id, found[run, id])
+            meter.step()
+    return found
+
+
+def _scene_pictures(
+    comparisons: Sequence[benchmark.MethodComparison],
+) -> dict[tuple[str, str], bytes]:
+    """Pictures of the scenes; none, with a remark, if they cannot be rendered."""
+    try:
+        return benchmark.scene_pictures(comparisons)
+    except core.BurgError as error:
+        print_remark(f"the page has no pictures of the scenes: {error}")
+        return {}
 
 
 def add_benchmark_table_options(parser: options.Parser) -> None:
@@ -270,7 +326,7 @@ def add_benchmark_table_options(parser: options.Parser) -> None:
 
 def run_benchmark_table(arguments: argparse.Namespace) -> int:
     """Prints the tables of results."""
-    comparisons = benchmark.compare_by_suite(list(map(benchmark.load_result, arguments.results)))
+    comparisons = benchmark.compare_by_suite(_complete_results(arguments.results))
     sheets = _load_sheets(arguments)
     if not arguments.markdown:
         _print_tables(comparisons, sheets)
@@ -334,12 +390,20 @@ def add_benchmark_new_options(parser: options.Parser) -> None:
         "--sample", metavar="LIBRARY:N", type=_library_and_count, help="sample N scenes"
     )
     source.add_argument("--scenes", metavar="SCENE", nargs="+", help="scene files or folders")
+    parser.add_argument(
+        "--description", metavar="TEXT", default="", help="what the suite has, in one sentence"
+    )
     options.add_settings_options(parser, benchmark.Budget, "grasps", "seconds", "picks")
     group = parser.add_argument_group("camera")
     options.add_settings_options(
         group,
         benchmark.CameraPlacement,
         *("sensor", "distance", "elevation_deg", "azimuth_deg", "exact_depth"),
+    )
+    parser.add_argument(
+        "--mode",
+        choices=core.MODES,
+        help="how grasps are judged, as in `evaluate` (default: reach, or hand without an arm)",
     )
     parser.add_argument(
         "--tuning-scenes",
@@ -374,7 +438,9 @@ def run_benchmark_new(arguments: argparse.Namespace) -> int:
         cameras=[placement.camera(scenes[0].board)],
         station=station,
         settings=benchmark.SuiteSettings(
+            description=arguments.description,
             budget=options.settings_from(arguments, benchmark.Budget),
+            mode=arguments.mode,
             tuning=arguments.tuning_scenes,
         ),
     )
@@ -433,6 +499,21 @@ def _add_results(parser: Any) -> None:
     parser.add_argument(
         "results", metavar="RESULT", nargs="+", help="folder that `benchmark run` wrote"
     )
+
+
+def _complete_results(folders: Sequence[str]) -> list[benchmark.BenchmarkResult]:
+    """Results in folders, without those that were interrupted, which are named."""
+    results = [benchmark.load_result(folder) for folder in folders]
+    complete = [result for result in results if result.document.complete]
+    if not complete and results:
+        results[0].require_complete()
+    for result in results:
+        if result not in complete:
+            print_remark(
+                f"{result.path} is left out, as it is not complete; finish it with:"
+                f" {result.document.command}"
+            )
+    return complete
 
 
 def _add_trials(parser: Any) -> None:

@@ -12,7 +12,7 @@ from burg_drake.apps import options
 from burg_drake.apps.terminal import sigterm_as_interrupt
 
 if TYPE_CHECKING:
-    from burg_drake.benchmark import PlannerCheck
+    from burg_drake.benchmark import GraspPlanner, PlannerCheck
 
 
 def add_planner_list_options(parser: options.Parser) -> None:
@@ -41,8 +41,10 @@ def add_planner_check_options(parser: options.Parser) -> None:
         "burg-drake planner check my_module:plan",
         "burg-drake planner check ws://127.0.0.1:9000 --station panda_wsg",
         "",
-        "The planner is asked for grasps of a carton and a can. A problem is printed with the line"
-        " of Python that corrects it. The exit code is 1 if there are problems.",
+        "The planner is asked for grasps of a carton and a can, in up to three images. A problem is"
+        " printed with the line of Python that corrects it. The exit code is 1 if there are"
+        " problems, or if the grasps do not tell whether the frames are right. What the planner"
+        " prints is shown on standard error.",
     )
     parser.add_argument(
         "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
@@ -59,25 +61,36 @@ def add_planner_check_options(parser: options.Parser) -> None:
 
 def run_planner_check(arguments: argparse.Namespace) -> int:
     """Prints what the grasps of a planner show; returns 1 if there are problems."""
-    with benchmark.open_planner(arguments.planner, time_limit=arguments.time_limit) as planner:
+    with _open_planner(arguments) as planner:
         found = benchmark.check_planner(planner.ask, arguments.station)
     _print_check(arguments.planner, found)
-    return 1 if found.problems else 0
+    return 1 if found.problems or found.unclear else 0
+
+
+def _open_planner(arguments: argparse.Namespace) -> GraspPlanner:
+    return benchmark.open_planner(
+        arguments.planner,
+        time_limit=arguments.time_limit,
+        limit_source="the limit of --time-limit",
+        show_output=True,
+    )
 
 
 def _print_check(name: str, found: PlannerCheck) -> None:
     took = f" in {core.format_duration(found.time)}" if math.isfinite(found.time) else ""
     fitting, tried = found.fits
-    print(f"{name}: {core.count_with_noun(found.count, 'grasp')} of a carton and a can{took}")
+    grasps = core.count_with_noun(found.count, "grasp")
+    images = core.count_with_noun(found.images, "image")
+    print(f"{name}: {grasps} in {images} of a carton and a can{took}")
     if tried:
         print(
             f"  {fitting} of {tried} fit as returned: the open hand is clear of the object, and its"
             " pads close on it"
         )
-    options.print_notes(found.notes)
+    options.print_notes([*found.notes, *found.unclear])
     for problem in found.problems:
         print(f"problem: {problem}")
-    if not found.problems and not found.notes:
+    if not found.problems and not found.unclear:
         print("  no problem found")
 
 
@@ -89,7 +102,8 @@ def add_planner_serve_options(parser: options.Parser) -> None:
         "burg-drake planner serve my_module:plan --host 0.0.0.0",
         "",
         "Other programs ask it as ws://127.0.0.1:9000. A planner that lives in another environment"
-        " needs no burg_drake to be served: copy burg_planner.py there.",
+        " needs no burg_drake to be served: copy burg_planner.py there. What the planner prints is"
+        " shown on standard error.",
     )
     parser.add_argument(
         "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
@@ -122,7 +136,7 @@ def run_planner_serve(arguments: argparse.Namespace) -> int:
     benchmark.require_websocket_packages()
     with (
         sigterm_as_interrupt(),
-        benchmark.open_planner(arguments.planner, time_limit=arguments.time_limit) as planner,
+        _open_planner(arguments) as planner,
         contextlib.suppress(KeyboardInterrupt),
     ):
         benchmark.serve_planner(planner, arguments.port, arguments.host)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,11 @@ class ReplaySource:
     trial: evaluation.RecordedTrial
     origin: evaluation.TrialOrigin
     inputs: evaluation.TrialInputs
+
+    @property
+    def title(self) -> str:
+        """Title of a page."""
+        return f"{self.inputs.scene.name}: {self.trial.id}"
 
 
 def add_replay_options(parser: options.Parser) -> None:
@@ -73,6 +79,49 @@ def run_replay(arguments: argparse.Namespace) -> int:
     for note in source.inputs.notes:
         print_remark(note)
     meshcat = open_view(arguments)
+    found = _replay(source, meshcat)
+    for line in found.lines:
+        print(line)
+    if arguments.html is None and found.end_time == 0.0:
+        print("nothing moves: the trial ended before its first step", file=sys.stderr)
+    present_view(meshcat, arguments, title=source.title, caption=found.lines)
+    return 0 if found.as_recorded else 1
+
+
+def save_replay(run: Path, id: str, page: Path) -> None:
+    """Simulates a grasp of a run again, and writes a page that shows it.
+
+    Args:
+        run: folder of the run.
+        id: id of the grasp.
+        page: file to write (.html).
+    """
+    loaded = evaluation.load_run(run)
+    inputs = evaluation.TrialInputs(loaded.scene(), loaded.station())
+    source = ReplaySource(loaded.trial(id), _origin(loaded, id), inputs)
+    logging.getLogger("drake").setLevel(logging.WARNING)  # pydrake sets it when imported
+    meshcat = visualization.open_meshcat(None)
+    lines = _replay(source, meshcat).lines
+    visualization.save_html(meshcat, page, title=source.title, caption=lines)
+
+
+@dataclass(frozen=True)
+class _Replay:
+    """What a replay shows.
+
+    Attributes:
+        lines: the verdict in words, and how it differs from the record.
+        end_time: simulated time at the end of what is shown [s].
+        as_recorded: whether the verdict is that of the record, but for rounding.
+    """
+
+    lines: list[str]
+    end_time: float
+    as_recorded: bool
+
+
+def _replay(source: ReplaySource, meshcat: Any) -> _Replay:
+    """Simulates a trial again, recorded in Meshcat."""
     verdict, shown, shown_part = _simulate_trial(source, meshcat)
     lines = [
         *visualization.describe_trial(evaluation.as_result(verdict)),
@@ -84,13 +133,8 @@ def run_replay(arguments: argparse.Namespace) -> int:
     lines += [] if recorded is None else evaluation.comparison(differences, source.origin)
     if shown.outcome is not verdict.outcome:
         lines += [f"shown is {shown_part}, to the end:", *visualization.describe_trial(shown)]
-    for line in lines:
-        print(line)
-    if arguments.html is None and shown.margins.end_time == 0.0:
-        print("nothing moves: the trial ended before its first step", file=sys.stderr)
-    title = f"{source.inputs.scene.name}: {source.trial.id}"
-    present_view(meshcat, arguments, title=title, caption=lines)
-    return 0 if all(difference.rounding for difference in differences) else 1
+    as_recorded = all(difference.rounding for difference in differences)
+    return _Replay(lines, float(shown.margins.end_time), as_recorded)
 
 
 def _simulate_trial(
@@ -150,14 +194,18 @@ def _shared_trial_options(source: ReplaySource, meshcat: Any) -> dict[str, Any]:
 
 
 def _source_from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
+    if evaluation.is_campaign(path):
+        campaign = evaluation.load_campaign(path)
+        raise core.InvalidInputError(
+            f"{path} is a run over many scenes; give the folder of one of them, such as"
+            f" {campaign.folder(campaign.names[0])}"
+        )
     run = evaluation.load_run(path)
     if arguments.grasp is not None:
         id = arguments.grasp
     else:
         id = str(run.results["id"][_choose_row(run.results, path, arguments)])
-    trial = run.trial(id)
-    judge = "" if trial.verdict is None else trial.verdict.judged_again
-    origin = evaluation.origin_of(run.document).judged_by(judge)
+    trial, origin = run.trial(id), _origin(run, id)
     origin.settings(f"{path / evaluation.RUN_FILE}: trial")
     if arguments.scene is None and arguments.station is None and not arguments.force:
         return ReplaySource(trial, origin, evaluation.TrialInputs(run.scene(), run.station()))
@@ -165,6 +213,12 @@ def _source_from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
     return ReplaySource(
         trial, origin, evaluation.find_inputs(origin, f"{path}, {id},", path, **moved)
     )
+
+
+def _origin(run: evaluation.Run, id: str) -> evaluation.TrialOrigin:
+    """Origin of a grasp's verdict."""
+    verdict = run.trial(id).verdict
+    return evaluation.origin_of(run.document).judged_by(verdict.judged_again if verdict else "")
 
 
 def _source_from_table(path: Path, arguments: argparse.Namespace) -> ReplaySource:
