@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,26 @@ from burg_drake.station import (
 )
 
 
+class _Sampling(NamedTuple):
+    """How grasps are sampled on each object.
+
+    Attributes:
+        counts: numbers of grasps; a further one for objects of which few grasps are clear.
+        approach_angle_deg: largest angle of the approach from straight down [degrees].
+        kept: largest number of clear grasps that are scored.
+    """
+
+    counts: tuple[int, ...]
+    approach_angle_deg: float
+    kept: int
+
+
+SAMPLING = (_Sampling((300, 1000), 60.0, 60), _Sampling((6000,), 90.0, 300))
+"""The second one for scenes in which the first finds too few grasps."""
+WANTED_GRASPS = 10
+"""Grasps that lift their object after which no more are tried."""
+
+
 def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> dict[str, Any]:
     """Plans with the objects' meshes, the arm and the simulation, which no planner can know from an
     image.
@@ -51,13 +71,26 @@ def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> 
     names = list(scene.instances)
     if observation.target is not None:
         names = [names[observation.target - 1]]
-    grasps = _clear_grasps(scene, station, names) if names else None
-    if grasps is None or not len(grasps):
+    lifted: list[tuple[Array, Array]] = []
+    untried: list[tuple[Array, Array]] = []
+    for sampling in SAMPLING:
+        wanted = WANTED_GRASPS - sum(len(X_SG) for X_SG, _ in lifted)
+        if not names or wanted <= 0:
+            break
+        grasps = _clear_grasps(scene, station, names, sampling)
+        if not len(grasps):
+            continue
+        grasps = scored_set(grasps, scene.library, station, scene)
+        X_SG = _poses_in_scene(scene, grasps)
+        order = _best_of_each(grasps, X_SG, names)
+        for rows, found in zip(
+            _try_grasps(scene, station, grasps, order, wanted), (lifted, untried), strict=True
+        ):
+            found.append((X_SG[rows], grasps.width[rows]))
+    if not lifted:
         return make_answer(observation)
-    grasps = scored_set(grasps, scene.library, station, scene)
-    X_SG = _poses_in_scene(scene, grasps)
-    rows = _try_grasps(scene, station, grasps, _best_of_each(grasps, X_SG, names))
-    return make_answer(observation, X_SG[rows], grasps.width[rows], -np.arange(float(len(rows))))
+    X, width = (np.concatenate(part) for part in zip(*lifted, *untried, strict=True))
+    return make_answer(observation, X, width, -np.arange(float(len(X))))
 
 
 def _best_of_each(grasps: GraspSet, X_SG: Array, names: list[str]) -> list[list[int]]:
@@ -73,10 +106,12 @@ def _best_of_each(grasps: GraspSet, X_SG: Array, names: list[str]) -> list[list[
     return found
 
 
-def _try_grasps(scene: Scene, station: Station, grasps: GraspSet, rows: list[list[int]]) -> Indices:
-    """Rows of the grasps that lift their object, as the benchmark judges, then of those that were
-    not tried. The object whose grasps succeed most often is tried next."""
-    wanted, max_executed = 10, 30
+def _try_grasps(
+    scene: Scene, station: Station, grasps: GraspSet, rows: list[list[int]], wanted: int
+) -> tuple[Indices, Indices]:
+    """Rows of grasps that lift their object, as the benchmark judges, until `wanted` have done so;
+    and rows that were not tried. The object whose grasps succeed most often is tried next."""
+    max_executed = 30
     judge = build_judge(
         scene, station, engine=as_engine(DEFAULT_ENGINE), mode=mode_for(station, None)
     )
@@ -93,7 +128,8 @@ def _try_grasps(scene: Scene, station: Station, grasps: GraspSet, rows: list[lis
         if verdict.outcome is Outcome.LIFTED:
             successes[best] += 1
             lifted.append(row)
-    return np.array([*lifted, *itertools.chain(*left)], dtype=np.intp)
+    untried = list(itertools.chain(*left))
+    return np.array(lifted, dtype=np.intp), np.array(untried, dtype=np.intp)
 
 
 def _candidate(grasps: GraspSet, row: int) -> Candidate:
@@ -109,22 +145,26 @@ def _poses_in_scene(scene: Scene, grasps: GraspSet) -> Array:
     return np.asarray(np.array([X_SO[name] for name in names]).reshape(-1, 4, 4) @ grasps.X_OG)
 
 
-def _clear_grasps(scene: Scene, station: Station, names: list[str]) -> GraspSet:
+def _clear_grasps(
+    scene: Scene, station: Station, names: list[str], sampling: _Sampling
+) -> GraspSet:
     """Antipodal grasps at which the open hand is clear; more are sampled where few are clear."""
-    counts, wanted, kept = (300, 1000), 20, 60  # Grasps of each object.
+    few = 20
     clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
     X_WS = station.document.X_WS.matrix()
-    settings = SamplingSettings(blind=True, approach_angle_deg=60.0, approaches=2)
+    settings = SamplingSettings(
+        blind=True, approach_angle_deg=sampling.approach_angle_deg, approaches=2
+    )
     parts: list[GraspSet] = []
-    for seed, n in enumerate(counts):
+    for n in sampling.counts:
         if not names:
             break
-        grasps = sample_grasps(scene, station, n, seed=seed, settings=settings, only=names)
+        grasps = sample_grasps(scene, station, n, seed=n, settings=settings, only=names)
         clear = clearance.is_clear(X_WS @ _poses_in_scene(scene, grasps))
         owner = grasps.column(INSTANCE_COLUMN)
-        found = {name: np.flatnonzero(clear & (owner == name))[:kept] for name in names}
+        found = {name: np.flatnonzero(clear & (owner == name))[: sampling.kept] for name in names}
         parts += [grasps.select(rows) for rows in found.values()]
-        names = [name for name in names if len(found[name]) < wanted]
+        names = [name for name in names if len(found[name]) < few]
     return GraspSet.concatenate(parts)
 
 
