@@ -261,6 +261,11 @@ class JudgedAnswer:
         return self.answer.candidate_ids
 
     @property
+    def is_judged(self) -> bool:
+        """Whether the scene could be judged, so that the answer counts."""
+        return None not in self.verdicts
+
+    @property
     def executed(self) -> int | None:
         """Index of the best grasp that can be executed: the hand is clear and the arm gets there.
         None if there is none."""

@@ -179,7 +179,8 @@ def run_benchmark(
             WorkerPool(min(executor.workers, default_workers())) as pool,
         ):
             _require_own_folder(folder, document)
-            remove_unfinished(folder)
+            for path in (folder, *folder.glob(f"**/{ANSWERS_FOLDER}")):
+                remove_unfinished(path)
             result = _open_result(folder, document, suite)
             call = _BenchmarkCall(result, suite, opened, executor, reporter, begun, pool, photos)
             return call.run(settings.settle or result.document.settled)

@@ -152,11 +152,13 @@ def episodes(result: BenchmarkResult) -> dict[str, list[Attempt]]:
 
 
 def scenes_to_clear(result: BenchmarkResult, number: int) -> list[str]:
-    """Scenes in which the last of `number` attempts was made and that are not given up."""
+    """Scenes in which the last of `number` attempts was made and judged, and that are not given
+    up."""
     last = slice(-MAX_FAILURES, None)
     return [
         name
         for name, attempts in episodes(result).items()
         if len(attempts) == number
+        and attempts[-1].answer.is_judged
         and (number < MAX_FAILURES or any(one.succeeded for one in attempts[last]))
     ]

@@ -79,6 +79,8 @@ class _Ratio(NamedTuple):
 def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     """All measures of a complete benchmark by name; see `MEASURE_MEANINGS`.
 
+    Scenes that could not be judged are left out: they are not the planner's fault.
+
     Raises:
         InvalidInputError: the benchmark is not complete.
     """
@@ -86,7 +88,8 @@ def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     ratios = _ratios(result.suite.budget.grasps)
     if result.suite.mode == "hand":  # reach is not judged
         del ratios["reachable"], ratios["planned"]
-    found = {name: measure_ratio(result.answers, ratio) for name, ratio in ratios.items()}
+    judged = [one for one in result.answers if one.is_judged]
+    found = {name: measure_ratio(judged, ratio) for name, ratio in ratios.items()}
     if result.document.protocol == "clear":
         found |= _clearing_measures(result)
     return {name: found[name] for name in MEASURE_MEANINGS if name in found}
@@ -96,13 +99,19 @@ def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
     """Measures of the protocol `clear`. ContestedAs verdicts decide how a scene goes on, so their
     range cannot be told."""
     counts = {one.name: len(one.instances) for one in result.suite.scenes}
-    attempts = episodes(result)
+    attempts = {
+        name: made
+        for name, made in episodes(result).items()
+        if all(one.answer.is_judged for one in made)
+    }
     objects = [counts[name] for name in attempts]
     taken = [sum(one.succeeded for one in made) for made in attempts.values()]
     made = [len(found) for found in attempts.values()]
     emptied = [float(n == count) for n, count in zip(taken, objects, strict=True)]
 
     def measure(successes: Sequence[float], trials: Sequence[float]) -> BenchmarkMeasure:
+        if not sum(trials):
+            return BenchmarkMeasure(*[float("nan")] * 5)
         value = sum(successes) / sum(trials)
         return BenchmarkMeasure(value, *clustered_interval(successes, trials), value, value)
 

@@ -89,8 +89,8 @@ def compare_methods(results: Sequence[BenchmarkResult]) -> MethodComparison:
     )
     budget = order[0].suite.budget.grasps
     values = {
-        "top_success": [scene_means(one, lambda a: precision_at(a, 1)) for one in order],
-        "average_precision": [scene_means(one, lambda a: trial_ap(a, budget)) for one in order],
+        "top_success": scene_means(order, lambda a: precision_at(a, 1)),
+        "average_precision": scene_means(order, lambda a: trial_ap(a, budget)),
     }
     names = [one.document.name for one in order]
     differences = {
@@ -139,7 +139,8 @@ def compare_pairs(
     p_values = [permutation_p_value(d) for d in paired]
     found = []
     for (i, j), d, p, corrected in zip(pairs, paired, p_values, holm(p_values), strict=True):
-        mean, n = float(d.mean()), len(d)
+        n = len(d)
+        mean = float(d.mean()) if n else np.nan
         spread = float(d.std(ddof=1)) if n > 1 else 0.0
         half = float(stdtrit(n - 1, 0.975)) * spread / np.sqrt(n) if spread else np.nan
         found.append(
@@ -189,12 +190,19 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(p) for p in corrected]
 
 
-def scene_means(result: BenchmarkResult, value: Callable[[JudgedAnswer], float]) -> Array:
-    """(S,) mean over the cameras of each scene."""
-    by_scene: dict[str, list[float]] = {}
-    for answer in result.answers:
-        by_scene.setdefault(answer.answer.scene, []).append(value(answer))
-    return np.array([float(np.mean(found)) for found in by_scene.values()])
+def scene_means(
+    results: Sequence[BenchmarkResult], value: Callable[[JudgedAnswer], float]
+) -> list[Array]:
+    """(S,) mean over the cameras of each scene that was judged in all results, for each result."""
+    by_scene: list[dict[str, list[float]]] = []
+    for result in results:
+        found: dict[str, list[float]] = {}
+        for answer in result.answers:
+            if answer.is_judged:
+                found.setdefault(answer.answer.scene, []).append(value(answer))
+        by_scene.append(found)
+    common = [name for name in by_scene[0] if all(name in found for found in by_scene)]
+    return [np.array([float(np.mean(found[name])) for name in common]) for found in by_scene]
 
 
 def _require_comparable(results: Sequence[BenchmarkResult]) -> None:

@@ -273,14 +273,16 @@ def _answer_table(comparison: MethodComparison) -> TableText:
             sum(not one.error and not one.answered for one in answers),
             sum(one.answered for one in answers),
             sum(len(one.grasps) for one in answers),
+            sum(not one.is_judged for one in result.answers),
         )
         rows.append((result.document.name, *map(str, counts)))
     caption = (
         "failed: images without an answer that could be read\n"
         "empty: images with an answer without grasps\n"
-        "judged: the best grasps within the budget, without those near a better one"
+        "judged: the best grasps within the budget, without those near a better one\n"
+        "left out: images of scenes that could not be judged, which count nowhere"
     )
-    head = ("method", "images", "failed", "empty", "grasps", "judged")
+    head = ("method", "images", "failed", "empty", "grasps", "judged", "left out")
     return TableText("Answers", head, tuple(rows), caption)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -98,7 +98,8 @@ def robot_successes(
 ) -> list[RobotSuccess]:
     """Success on the robot of each method with grasps in trials files.
 
-    A trial belongs to a grasp if scene, instance, pose and width are the same.
+    A trial belongs to a grasp if scene, instance, pose and width are the same; of several trials of
+    a grasp the first one that was carried out counts.
 
     Args:
         results: complete benchmarks, also those on rendered images.
@@ -107,18 +108,18 @@ def robot_successes(
     Raises:
         InvalidInputError: the trials have none of the grasps of the results.
     """
-    trials = {
-        (sheet.runs[trial.run].scene.content, trial.content): _RobotTrial(
-            trial.outcome, sheet.selection.success
-        )
-        for sheet in sheets
-        for trial in sheet.trials
-    }
+    trials: dict[tuple[str, str], _RobotTrial] = {}
+    for sheet in sheets:
+        for trial in sheet.trials:
+            key = (sheet.runs[trial.run].scene.content, trial.content)
+            if key not in trials or trials[key].is_open:
+                trials[key] = _RobotTrial(trial.outcome, sheet.selection.success)
     twins = {result.path: _rendered_twin(result, results) for result in results}
     shown = [result for result in results if all(result is not twin for twin in twins.values())]
     found = []
     for result in shown:
-        tops = [_top_grasp(result, answer, trials) for answer in result.answers]
+        answers = [answer for answer in result.answers if answer.is_judged]
+        tops = [_top_grasp(result, answer, trials) for answer in answers]
         if any(one.trial is not None for one in tops):
             found.append(_robot_success(result, tops, twins[result.path]))
     if not found:
@@ -160,6 +161,10 @@ class _TopGrasp:
     trial: _RobotTrial | None
 
     @property
+    def scene(self) -> str:
+        return self.answer.answer.scene
+
+    @property
     def is_open(self) -> bool:
         return self.feasible and (self.trial is None or self.trial.is_open)
 
@@ -194,29 +199,42 @@ def _robot_success(
     result: BenchmarkResult, tops: Sequence[_TopGrasp], rendered: BenchmarkResult | None
 ) -> RobotSuccess:
     known = [one for one in tops if not one.is_open]
-    scenes = {one.answer.answer.scene for one in known}
+    scenes = {one.scene for one in known}
     tried = [one for one in known if one.feasible]
     alike = [one.real == one.simulated for one in tried]
     return RobotSuccess(
         name=result.document.name,
-        real=_share([one.real for one in known]),
-        simulated=_share([one.simulated for one in known]),
+        real=_share([(one.scene, one.real) for one in known]),
+        simulated=_share([(one.scene, one.simulated) for one in known]),
         agreement=float(np.mean(alike)) if alike else math.nan,
-        rendered=None
-        if rendered is None
-        else _share([precision_at(a, 1) for a in rendered.answers if a.answer.scene in scenes]),
+        rendered=None if rendered is None else _share(_top_successes(rendered, scenes)),
         tried=len(tried),
         infeasible=len(known) - len(tried),
         open=len(tops) - len(known),
     )
 
 
-def _share(values: Sequence[float]) -> BenchmarkMeasure:
-    """Mean over images of different scenes with its interval; NaN without any."""
+def _top_successes(rendered: BenchmarkResult, scenes: Collection[str]) -> list[tuple[str, float]]:
+    """Success of the best grasps on rendered images of the first camera, by scene."""
+    camera = rendered.suite.cameras[0].name
+    return [
+        (one.answer.scene, precision_at(one, 1))
+        for one in rendered.answers
+        if one.answer.scene in scenes and one.answer.camera == camera and one.is_judged
+    ]
+
+
+def _share(values: Sequence[tuple[str, float]]) -> BenchmarkMeasure:
+    """Mean of the values of images, given with their scenes, with its interval over scenes; NaN
+    without any."""
     if not values:
         return BenchmarkMeasure(*[math.nan] * 5)
-    mean = float(np.mean(values))
-    return BenchmarkMeasure(mean, *mean_interval(np.array(values, dtype=float)), mean, mean)
+    by_scene: dict[str, list[float]] = {}
+    for scene, value in values:
+        by_scene.setdefault(scene, []).append(value)
+    means = np.array([np.mean(found) for found in by_scene.values()])
+    mean = float(means.mean())
+    return BenchmarkMeasure(mean, *mean_interval(means), mean, mean)
 
 
 def _rendered_twin(
@@ -228,7 +246,10 @@ def _rendered_twin(
     known = result.document
     for other in results:
         one = other.document
-        same = (one.name, one.suite_hash, one.protocol) == (known.name, known.suite_hash, "single")
-        if same and not one.images and not one.conditions.changes:
+        if one.images or one.conditions.changes or one.protocol != known.protocol:
+            continue
+        if (one.name, one.suite_hash) == (known.name, known.suite_hash) and (
+            (one.split, one.depth_only) == (known.split, known.depth_only)
+        ):
             return other
     return None

@@ -53,7 +53,7 @@ def condition_effects(comparisons: Sequence[MethodComparison]) -> list[Condition
         key=lambda one: (*_key(one), *one.document.conditions.changes.items()),
     )
     pairs = [(one, usual[_key(one)]) for one in changed]
-    means = [_scene_precisions(result) for pair in pairs for result in pair]
+    means = [values for pair in pairs for values in _scene_precisions(pair)]
     names = [f"{r.document.name}, {r.document.conditions}" for pair in pairs for r in pair]
     differences = compare_pairs(
         names, means, "average_precision", [(k, k + 1) for k in range(0, len(names), 2)]
@@ -93,7 +93,7 @@ def _key(result: BenchmarkResult) -> tuple[str, ...]:
     return (known.suite, known.suite_hash, *settings, known.name)
 
 
-def _scene_precisions(result: BenchmarkResult) -> Array:
-    """(S,) average precision in each scene."""
-    budget = result.suite.budget.grasps
-    return scene_means(result, lambda answer: trial_ap(answer, budget))
+def _scene_precisions(pair: tuple[BenchmarkResult, BenchmarkResult]) -> list[Array]:
+    """(S,) average precision in each scene, for both results."""
+    budget = pair[0].suite.budget.grasps
+    return scene_means(pair, lambda answer: trial_ap(answer, budget))

@@ -27,7 +27,7 @@ def verdict(outcome: Outcome, confidence: float = 1.0) -> Verdict:
 
 def judged(
     scene: str,
-    verdicts: Sequence[Verdict],
+    verdicts: Sequence[Verdict | None],
     friction: Sequence[float] = (),
     error: str = "",
 ) -> JudgedAnswer:

@@ -151,24 +151,37 @@ def test_equal_scores_keep_the_order_of_the_planner(suite: Suite) -> None:
         assert chosen.columns["planner_score"].tolist() == score.tolist()
 
 
-def test_slippery_objects_are_not_lifted(suite: Suite, tmp_path: Path) -> None:
+def test_slippery_objects_are_not_lifted_whatever_camera_sees_them(
+    suite: Suite, tmp_path: Path
+) -> None:
+    front = suite.document.cameras[0]
+    behind = replace(CameraPlacement(azimuth_deg=90.0, exact_depth=True).camera(Board()), name="b")
+    pair = make_suite(
+        tmp_path / "pair.yaml",
+        [suite.scenes()["two"]],
+        cameras=[front, replace(behind, size=front.size)],
+        settings=SuiteSettings(mode="hand", engine="screening"),
+    )
     settings = replace(DEPTH, conditions=Conditions(friction=0.05))
     found = run_benchmark(
-        suite,
+        pair,
         f"{PLANNERS}:plan_cans",
         tmp_path / "slippery",
         settings=settings,
         workers=1,
         progress=False,
     )
+    assert [one.answer.camera for one in found.answers] == ["front", "b"]
+    assert all(len(one.verdicts) == 2 for one in found.answers)
     held = {verdict.outcome.held for one in found.answers for verdict in one.verdicts}
     assert held == {False}
+    assert measure_all(found)["top_success"].high > 0.7  # one scene, however many images
     campaign = found.rounds[0].campaign
     own = burg.load_library("household").entry("can").friction
     assert campaign.run("two").results["friction"] == pytest.approx(0.05 * own)
     assert not verify_result(found, count=1, workers=1, progress=False).differing
     with pytest.raises(InvalidInputError, match=r"conditions is friction x 0\.05 there"):
-        run_benchmark(suite, f"{PLANNERS}:plan_cans", found.path, settings=DEPTH)
+        run_benchmark(pair, f"{PLANNERS}:plan_cans", found.path, settings=DEPTH)
 
 
 @thorough

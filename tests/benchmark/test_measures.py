@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.benchmark import measure_all
+from burg_drake.benchmark import all_tables, compare_methods, measure_all
 from burg_drake.core import Outcome
 from tests.benchmark.judged import (
     COLLIDES,
@@ -51,6 +51,19 @@ def test_steps_are_shares_of_the_judged_grasps() -> None:
 def test_a_failed_simulation_is_no_success() -> None:
     found = measure_all(result([judged("a", [FAILED])]))
     assert found["top_success"].value == 0.0 and found["planned"].value == 1.0
+
+
+def test_scenes_that_could_not_be_judged_count_nowhere() -> None:
+    answers = [judged("a", [LIFTED]), judged("b", [SLIPPED]), judged("c", [None, None])]
+    found = measure_all(result(answers))
+    assert found["top_success"].value == 1 / 2 and found["clear"].value == 1.0
+    assert measure_all(result(answers))["answered"].value == 1.0
+    other = [judged("a", [SLIPPED]), judged("b", [None]), judged("c", [LIFTED])]
+    comparison = compare_methods([result(answers, "x"), result(other, "y")])
+    (pair,) = comparison.differences["top_success"]
+    assert abs(pair.difference) == 1.0  # of scene a alone
+    (counts,) = [t for t in all_tables([comparison]) if t.title == "Answers"]
+    assert [row[-1] for row in counts.rows] == ["1", "1"]
 
 
 def test_disturbed_is_a_share_of_executed_grasps() -> None:
