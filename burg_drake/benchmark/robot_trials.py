@@ -99,7 +99,8 @@ def robot_successes(
     """Success on the robot of each method with grasps in trials files.
 
     A trial belongs to a grasp if scene, instance, pose and width are the same; of several trials of
-    a grasp the first one that was carried out counts.
+    a grasp the first one that was carried out counts. A method on images of a real camera has no
+    trials if the arm can execute none of its best grasps; it failed on all images.
 
     Args:
         results: complete benchmarks, also those on rendered images.
@@ -116,18 +117,21 @@ def robot_successes(
                 trials[key] = _RobotTrial(trial.outcome, sheet.selection.success)
     twins = {result.path: _rendered_twin(result, results) for result in results}
     shown = [result for result in results if all(result is not twin for twin in twins.values())]
-    found = []
-    for result in shown:
-        answers = [answer for answer in result.answers if answer.is_judged]
-        tops = [_top_grasp(result, answer, trials) for answer in answers]
-        if any(one.trial is not None for one in tops):
-            found.append(_robot_success(result, tops, twins[result.path]))
-    if not found:
+    tops: dict[Path, list[_TopGrasp]] = {
+        result.path: [_top_grasp(result, one, trials) for one in result.answers if one.is_judged]
+        for result in shown
+    }
+    if all(one.trial is None for found in tops.values() for one in found):
         raise InvalidInputError(
             "the trials have none of the best grasps of the results; give the trials files that"
             " were planned of them"
         )
-    return found
+    return [
+        _robot_success(result, tops[result.path], twins[result.path])
+        for result in shown
+        if any(one.trial is not None for one in tops[result.path])
+        or (result.document.images and not any(one.feasible for one in tops[result.path]))
+    ]
 
 
 @dataclass(frozen=True)

@@ -199,6 +199,15 @@ def test_the_same_planner_on_rendered_images_on_photographs_and_on_the_robot(
     assert found.simulated.value == pytest.approx(2 / 3)
     assert found.agreement == 0.5
     assert found.rendered is not None and found.rendered.value == 1.0
+    hopeless = run_benchmark(
+        *(suite, f"{PLANNERS}:plan_nothing", tmp_path / "hopeless"),
+        settings=replace(settings, name="hopeless"),
+        images=photos,
+        workers=1,
+        progress=False,
+    )
+    _, failed = robot_successes([rendered, real, hopeless], [done])  # listed without any trial
+    assert (failed.name, failed.real.value, failed.infeasible) == ("hopeless", 0.0, 3)
     table = all_tables(compare_by_suite([rendered, real]), [done])[-1]
     assert table.title == "Simulation and robot" and table.rows[0][4:] == ("50", "2", "1", "0")
 
