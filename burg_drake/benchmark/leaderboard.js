@@ -9,11 +9,17 @@ for (const head of document.querySelectorAll("table.sortable thead th")) {
     const falling = head.getAttribute("aria-sort") !== "descending";
     for (const other of table.querySelectorAll("thead th")) other.removeAttribute("aria-sort");
     head.setAttribute("aria-sort", falling ? "descending" : "ascending");
-    const key = (row) => row.children[column].dataset.value ?? row.children[column].textContent;
+    const text = (row) => row.children[column].textContent;
+    const number = (row) => {
+      const cell = row.children[column];
+      if (!cell.classList.contains("number")) return NaN;
+      return parseFloat(cell.dataset.value ?? text(row).replaceAll(",", ""));
+    };
     const rows = [...table.tBodies[0].rows];
     rows.sort((a, b) => {
-      const [x, y] = [key(a), key(b)];
-      const order = isNaN(x) || isNaN(y) ? x.localeCompare(y) : x - y;
+      const [x, y] = [number(a), number(b)];
+      const equal = x === y || (isNaN(x) && isNaN(y));
+      const order = equal ? text(a).localeCompare(text(b)) : isNaN(x) || x < y ? -1 : 1;
       return falling ? -order : order;
     });
     table.tBodies[0].append(...rows);

@@ -27,9 +27,14 @@ from burg_drake.benchmark.method_tables import (
 )
 from burg_drake.benchmark.robustness import without_effects
 from burg_drake.benchmark.suite import load_suite
+from burg_drake.cameras import encode_jpeg
 from burg_drake.core import (
     NO_VALUE,
+    Listener,
     Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
     atomic_write,
     count_with_noun,
     format_duration,
@@ -134,28 +139,40 @@ def failed_grasps(comparisons: Sequence[MethodComparison], count: int) -> list[t
     return found
 
 
-def scene_pictures(comparisons: Sequence[MethodComparison]) -> dict[tuple[str, str], bytes]:
+def scene_pictures(
+    comparisons: Sequence[MethodComparison], *, progress: bool | Listener = False
+) -> dict[tuple[str, str], bytes]:
     """What the first camera of each suite sees, as small JPEG by hash of the suite and scene.
+
+    Args:
+        comparisons: methods of each suite.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Raises:
         BurgError: the objects of a suite are not at hand, or there is no renderer of colours.
     """
     import cv2
 
-    size = (320, 240)  # Width and height [pixels].
+    width = 320  # pixels
     found: dict[tuple[str, str], bytes] = {}
-    for comparison in comparisons:
-        result = comparison.results[0]
-        suite = load_suite(result.path / SUITE_FILE)
-        camera = replace(suite.document.cameras[0], noise=False, color=True).scene_camera()
-        for name in result.scene_names:
-            key = (result.document.suite_hash, name)
-            if key not in found:
-                scene = {**suite.scenes("test"), **suite.scenes("tuning")}[name]
-                color = camera.observe(scene, suite.station).color
-                small = cv2.resize(color, size, interpolation=cv2.INTER_AREA)
-                _, data = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
-                found[key] = data.tobytes()
+    total = sum(len(one.results[0].scene_names) for one in comparisons)
+    with Reporter(progress) as reporter:
+        meter = ProgressMeter(reporter.show, Progress("rendering", total=total, unit="scenes"))
+        for comparison in comparisons:
+            result = comparison.results[0]
+            suite = load_suite(result.path / SUITE_FILE)
+            camera = replace(suite.document.cameras[0], noise=False, color=True).scene_camera()
+            image = camera.intrinsics
+            size = (width, round(width * image.height / image.width))
+            scenes = {**suite.scenes("test"), **suite.scenes("tuning")}
+            for name in result.scene_names:
+                key = (result.document.suite_hash, name)
+                if key not in found:
+                    color = camera.observe(scenes[name], suite.station).color
+                    assert color is not None
+                    small = cv2.resize(color, size, interpolation=cv2.INTER_AREA)
+                    found[key] = encode_jpeg(small, 80)
+                meter.step()
     return found
 
 
@@ -315,8 +332,10 @@ def _best_grasp_cell(
     if answer.answer.error:
         why = element("details", element("summary", "no answer"), answer.answer.error)
         return element("td", why)
-    if not answer.verdicts or answer.verdicts[0] is None:
+    if not answer.verdicts:
         return element("td", "no grasp")
+    if answer.verdicts[0] is None:
+        return element("td", "not judged")
     outcome, id = answer.verdicts[0].outcome, answer.ids[0]
     run = round.run_folder(answer.answer.scene)
     content: list[Html | str] = [outcome_label(outcome)]

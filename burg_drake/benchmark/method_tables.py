@@ -9,7 +9,11 @@ import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
 from burg_drake.benchmark.measures import MEASURE_MEANINGS, BenchmarkMeasure
-from burg_drake.benchmark.method_comparison import MethodComparison, MethodDifference
+from burg_drake.benchmark.method_comparison import (
+    SIGNIFICANCE_LEVEL,
+    MethodComparison,
+    MethodDifference,
+)
 from burg_drake.benchmark.robot_trials import RobotSuccess, robot_successes
 from burg_drake.benchmark.robustness import ConditionEffect, condition_effects, without_effects
 from burg_drake.core import NO_VALUE, TextTable, count_with_noun, format_duration, format_number
@@ -300,7 +304,9 @@ def _difference_table(differences: Sequence[MethodDifference]) -> TableText:
     )
     caption = (
         "difference: in percentage points with its 95 % confidence interval, on the same scenes\n"
-        "p: paired permutation test over scenes; corrected by Holm for the pairs of a measure"
+        "p: paired permutation test over scenes; corrected by Holm for the pairs of a measure\n"
+        f"differ: yes if the corrected p is below {SIGNIFICANCE_LEVEL:g}; otherwise these scenes do"
+        " not show a difference, which does not mean that there is none"
     )
     head = ("methods", "measure", "difference", "p", "corrected", "differ")
     return TableText("Differences", head, rows, caption)

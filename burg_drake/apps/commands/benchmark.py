@@ -278,7 +278,7 @@ def run_benchmark_compare(arguments: argparse.Namespace) -> int:
         extras = benchmark.LeaderboardExtras(
             sheets=sheets,
             replays=_write_replays(comparisons, page, arguments),
-            pictures=_scene_pictures(comparisons),
+            pictures=_scene_pictures(comparisons, quiet=arguments.quiet),
         )
         benchmark.write_leaderboard(comparisons, page, extras=extras)
         print(f"wrote {page}")
@@ -290,27 +290,34 @@ def run_benchmark_compare(arguments: argparse.Namespace) -> int:
 def _write_replays(
     comparisons: Sequence[benchmark.MethodComparison], page: Path, arguments: argparse.Namespace
 ) -> dict[tuple[Path, str], Path]:
-    """Writes pages of failures beside the leaderboard, unless they are there."""
+    """Writes pages of failures beside the leaderboard, unless they are there. What cannot be
+    replayed is left out, with a remark."""
     failures = benchmark.failed_grasps(comparisons, arguments.replays)
     folder = page.parent / f"{page.stem}_replays"
-    found = {}
+    found: dict[tuple[Path, str], Path] = {}
+    problems: Counter[str] = Counter()
     with show_progress("replaying", "grasps", len(failures), quiet=arguments.quiet) as meter:
         for run, id in failures:
             hash = evaluation.load_run(run).document.hash[:12]
-            found[run, id] = folder / f"{run.name}_{hash}_{id}.html"
-            if not found[run, id].exists():
-                core.ensure_writable_folder(folder)
-                replay.save_replay(run, id, found[run, id])
+            file = folder / f"{run.name}_{hash}_{id}.html"
+            try:
+                if not file.exists():
+                    replay.save_replay(run, id, core.ensure_writable_folder(folder) / file.name)
+                found[run, id] = file
+            except core.BurgError as error:
+                problems[str(error)] += 1
             meter.step()
+    for text, count in problems.items():
+        print_remark(f"{core.count_with_noun(count, 'grasp')} cannot be replayed: {text}")
     return found
 
 
 def _scene_pictures(
-    comparisons: Sequence[benchmark.MethodComparison],
+    comparisons: Sequence[benchmark.MethodComparison], *, quiet: bool
 ) -> dict[tuple[str, str], bytes]:
     """Pictures of the scenes; none, with a remark, if they cannot be rendered."""
     try:
-        return benchmark.scene_pictures(comparisons)
+        return benchmark.scene_pictures(comparisons, progress=not quiet)
     except core.BurgError as error:
         print_remark(f"the page has no pictures of the scenes: {error}")
         return {}
