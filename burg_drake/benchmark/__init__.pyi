@@ -72,12 +72,12 @@ from .robustness import (
     condition_effects as condition_effects,
 )
 from .settings import (
+    SUITE_FOLDER as SUITE_FOLDER,
     VERIFIED_GRASPS as VERIFIED_GRASPS,
     BenchmarkSettings as BenchmarkSettings,
     Budget as Budget,
 )
 from .suite import (
-    SUITE_FOLDER as SUITE_FOLDER,
     Suite as Suite,
     SuiteDocument as SuiteDocument,
     SuiteLike as SuiteLike,

@@ -250,20 +250,17 @@ class JudgedAnswer:
     Attributes:
         answer: the answer.
         verdicts: verdict of each grasp, best first; None if the scene could not be judged.
+        is_judged: whether the scene could be judged, so that the answer counts.
     """
 
     answer: StoredAnswer
     verdicts: tuple[Verdict | None, ...]
+    is_judged: bool = True
 
     @property
     def ids(self) -> list[str]:
         """Ids of the grasps in the run over all scenes."""
         return self.answer.candidate_ids
-
-    @property
-    def is_judged(self) -> bool:
-        """Whether the scene could be judged, so that the answer counts."""
-        return None not in self.verdicts
 
     @property
     def executed(self) -> int | None:
@@ -364,6 +361,7 @@ class BenchmarkResult:
         finish = f"finish it with the command that began it: {self.document.command}"
         if campaign is not None and campaign.open_scenes:
             raise InvalidInputError(f"grasps in {campaign.path} are not all judged; {finish}")
+        failed = {} if campaign is None else campaign.failed
         for scene in round.scenes:
             verdicts = _scene_verdicts(campaign, scene)
             for camera in round.cameras:
@@ -377,7 +375,7 @@ class BenchmarkResult:
                 if len(answer.grasps) and campaign is None:
                     raise InvalidInputError(f"grasps of {self.path} are not judged; {finish}")
                 known = tuple(verdicts.get(id) for id in answer.candidate_ids)
-                found.append(JudgedAnswer(answer, known))
+                found.append(JudgedAnswer(answer, known, scene not in failed))
         return found
 
 
@@ -455,6 +453,7 @@ def load_result(folder: str | Path) -> BenchmarkResult:
     Raises:
         UnknownNameError: the folder holds no benchmark.
         DocumentError: a file of it is damaged.
+        InvalidInputError: its suite is not the one that the benchmark was run on.
     """
     path = Path(folder)
     if not (path / BENCHMARK_FILE).is_file():
@@ -463,4 +462,11 @@ def load_result(folder: str | Path) -> BenchmarkResult:
             " that `benchmark run` wrote"
         )
     document = load_document(path / BENCHMARK_FILE, BenchmarkDocument)
-    return BenchmarkResult(path, document, load_document(path / SUITE_FILE, SuiteDocument))
+    suite = load_document(path / SUITE_FILE, SuiteDocument)
+    if suite.hash != document.suite_hash:
+        raise InvalidInputError(
+            f"{path / SUITE_FILE} has been changed since the benchmark was run (its hash is"
+            f" {suite.hash}, that of the benchmark {document.suite_hash}); restore it, or run the"
+            " benchmark again into another folder"
+        )
+    return BenchmarkResult(path, document, suite)

@@ -202,11 +202,20 @@ def _open_images(folder: str | Path, suite: Suite, settings: BenchmarkSettings) 
     )
     if rendered:
         raise InvalidInputError(
-            f"{list_names(rendered)} can be changed in rendered images only; leave it as it is with"
-            " images of a real camera"
+            f"{list_names(rendered)} can be changed in rendered images only; leave out with images"
+            " of a real camera"
         ).about("images")
-    names = list(suite.scenes(settings.split))
-    return RealImages.open(folder, names, depth_unit=settings.depth_unit)
+    scenes = suite.scenes(settings.split)
+    every = [one.name for one in suite.document.scenes]
+    images = RealImages.open(folder, every, depth_unit=settings.depth_unit)
+    images = replace(images, scenes=tuple(name for name in images.scenes if name in scenes))
+    if not images.scenes:
+        raise InvalidInputError(
+            f"{folder} has no depth image of a scene of split {settings.split!r}"
+        ).about("images")
+    for name in images.scenes:  # before the planner is asked
+        images.observe(scenes[name], suite.station, color=not settings.depth_only)
+    return images
 
 
 def _require_method_name(name: str) -> str:
@@ -383,20 +392,26 @@ class _BenchmarkCall:
         ]
         stored: list[tuple[_Answer, Future[None]]] = []
         before = time.monotonic()
-        for scene, observations in self._observe(work):
-            rendering += time.monotonic() - before
-            before = time.monotonic()
-            for camera, observation in observations.items():
-                answer = self._ask_once(scene, camera, observation, round.path)
-                stored.append((answer, self.pool.submit(_store_answer, answer)))
-                meter.step()
-            planning += time.monotonic() - before
-            before = time.monotonic()
-        for answer, future in stored:
-            try:
-                future.result()
-            except WorkerDied as error:
-                _store_answer(replace(answer, error=f"the answer cannot be read: {error}"))
+        try:
+            for scene, observations in self._observe(work):
+                rendering += time.monotonic() - before
+                before = time.monotonic()
+                for camera, observation in observations.items():
+                    answer = self._ask_once(scene, camera, observation, round.path)
+                    stored.append((answer, self.pool.submit(_store_answer, answer)))
+                    meter.step()
+                planning += time.monotonic() - before
+                before = time.monotonic()
+            for answer, future in stored:
+                try:
+                    future.result()
+                except WorkerDied as error:
+                    _store_answer(replace(answer, error=f"the answer cannot be read: {error}"))
+        except BaseException:  # the pool is about to end its workers
+            for answer, future in stored:
+                if not future.done():
+                    _store_answer(answer)
+            raise
         return BenchmarkTimes(rendering=rendering, planning=planning)
 
     def _observe(

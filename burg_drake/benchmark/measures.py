@@ -96,7 +96,7 @@ def measure_all(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
 
 
 def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
-    """Measures of the protocol `clear`. ContestedAs verdicts decide how a scene goes on, so their
+    """Measures of the protocol `clear`. Contested verdicts decide how a scene goes on, so their
     range cannot be told."""
     counts = {one.name: len(one.instances) for one in result.suite.scenes}
     attempts = {

@@ -160,7 +160,7 @@ def robot_table(successes: Sequence[RobotSuccess]) -> TableText:
         "simulated, robot: planned on the given images, in simulation and on the robot\n"
         "agree: tried grasps that ended alike in simulation and on the robot\n"
         "infeasible: images without a grasp, or whose best one the arm cannot execute; failures\n"
-        "open: still to be tried, and not counted"
+        "open: still to be tried; until then in brackets the range that they leave open"
     )
     head = ("method", "rendered", "simulated", "robot", "agree", "tried", "infeasible", "open")
     return TableText("Simulation and robot", head, tuple(rows), caption)
@@ -209,7 +209,9 @@ def measure_text(measure: BenchmarkMeasure) -> str:
     """A measure with its interval, and what contested verdicts leave open, in percent."""
     if np.isnan(measure.value):
         return NO_VALUE
-    text = f"{_percent(measure.value)} ({_percent(measure.low)}-{_percent(measure.high)})"
+    text = _percent(measure.value)
+    if not np.isnan(measure.low):
+        text += f" ({_percent(measure.low)}-{_percent(measure.high)})"
     least, most = _percent(measure.least), _percent(measure.most)
     return text if least == most else f"{text} [{least}-{most}]"
 

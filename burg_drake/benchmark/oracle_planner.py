@@ -56,8 +56,9 @@ def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> 
     """Plans with the objects' meshes, the arm and the simulation, which no planner can know from an
     image.
 
-    Grasps are antipodal, and tried in simulation as the benchmark will judge them, with the default
-    engine, until ten have lifted their object. Grasps that were not tried follow.
+    Grasps are antipodal, and tried in simulation as `evaluate` judges them by default, until ten
+    have lifted their object. Grasps that were not tried follow. It is no bound if the benchmark
+    judges otherwise: in another mode, with another engine, or with other friction.
 
     Args:
         observation: names the target, if any.
@@ -87,7 +88,7 @@ def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> 
             _try_grasps(scene, station, grasps, order, wanted), (lifted, untried), strict=True
         ):
             found.append((X_SG[rows], grasps.width[rows]))
-    if not lifted:
+    if not lifted and not untried:
         return make_answer(observation)
     X, width = (np.concatenate(part) for part in zip(*lifted, *untried, strict=True))
     return make_answer(observation, X, width, -np.arange(float(len(X))))

@@ -157,7 +157,7 @@ class RealImages:
         if not estimate.valid:
             raise InvalidInputError(
                 f"{self._color_path(scene.name)}: the camera's pose cannot be measured on the"
-                f" board: {estimate.reason}; {missing} either"
+                f" board: {estimate.reason}; {missing}, which would tell it"
             ).about("images")
         return estimate.X_SC
 

@@ -14,7 +14,6 @@ from burg_drake.benchmark.measures import BenchmarkMeasure, precision_at
 from burg_drake.core import (
     InvalidInputError,
     RealOutcome,
-    Stage,
     count_with_noun,
     mean_interval,
 )
@@ -32,16 +31,15 @@ NO_INFORMATION = (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
 
 
 def plan_robot_trials(
-    results: Sequence[BenchmarkResult], out: str | Path, *, count: int = 1, seed: int = 0
+    results: Sequence[BenchmarkResult], out: str | Path, *, seed: int = 0
 ) -> TrialSheet:
-    """Plans trials of the best grasps of each image, in random order over all methods.
+    """Plans a trial of the best grasp of each image, in random order over all methods.
 
     Grasps that the arm cannot execute are left out; `robot_successes` counts them as failures.
 
     Args:
         results: complete benchmarks.
         out: trials file to write.
-        count: number of grasps of each image.
         seed: random seed of the order.
 
     Raises:
@@ -54,15 +52,14 @@ def plan_robot_trials(
         (first, *_) = result.rounds
         for answer in result.judged_answers(first):
             folder = first.run_folder(answer.answer.scene)
-            for id, verdict in list(zip(answer.ids, answer.verdicts, strict=True))[:count]:
-                if verdict is not None and verdict.stage is Stage.EXECUTED:
-                    chosen.setdefault(folder, set()).add(id)
+            if answer.executed == 0:
+                chosen.setdefault(folder, set()).add(answer.ids[0])
     if not chosen:
         raise InvalidInputError(
             f"none of the best grasps of {count_with_noun(len(results), 'result')} can be executed"
             " by the arm; there is nothing to try on the robot"
         )
-    settings = SelectionSettings(per_object=count, balance="none", seed=seed)
+    settings = SelectionSettings(per_object=1, balance="none", seed=seed)
     return plan_trials(list(chosen), settings=settings, grasps=chosen, out=out)
 
 
@@ -72,14 +69,16 @@ class RobotSuccess:
 
     Attributes:
         name: name of the method.
-        real: share of images whose best grasp succeeded on the robot; without those that are still
-            to be tried.
-        simulated: the same in simulation, of the same images.
+        real: share of images whose best grasp succeeded on the robot. While trials are open, they
+            count as likely to succeed as those that were carried out, there is no interval, and
+            `least` and `most` are the shares if all of them fail, or succeed.
+        simulated: the same in simulation.
         agreement: share of tried grasps that ended alike, NaN if none was tried.
         rendered: success of the best grasp on rendered images of the same scenes; None if there is
             no such benchmark of the method.
         tried: number of grasps that were tried.
-        infeasible: number of images without a grasp that the arm can execute: failures.
+        infeasible: number of images without a grasp, or whose best one the arm cannot execute:
+            failures.
         open: number of grasps that are still to be tried.
     """
 
@@ -202,20 +201,32 @@ def _top_grasp(
 def _robot_success(
     result: BenchmarkResult, tops: Sequence[_TopGrasp], rendered: BenchmarkResult | None
 ) -> RobotSuccess:
-    known = [one for one in tops if not one.is_open]
-    scenes = {one.scene for one in known}
-    tried = [one for one in known if one.feasible]
+    scenes = {one.scene for one in tops}
+    tried = [one for one in tops if one.feasible and not one.is_open]
     alike = [one.real == one.simulated for one in tried]
+    conditions = result.document.conditions
     return RobotSuccess(
-        name=result.document.name,
-        real=_share([(one.scene, one.real) for one in known]),
-        simulated=_share([(one.scene, one.simulated) for one in known]),
+        name=result.document.name + (f", {conditions}" if conditions.changes else ""),
+        real=_real_share(tops),
+        simulated=_share([(one.scene, one.simulated) for one in tops]),
         agreement=float(np.mean(alike)) if alike else math.nan,
         rendered=None if rendered is None else _share(_top_successes(rendered, scenes)),
         tried=len(tried),
-        infeasible=len(known) - len(tried),
-        open=len(tops) - len(known),
+        infeasible=sum(not one.feasible for one in tops),
+        open=sum(one.is_open for one in tops),
     )
+
+
+def _real_share(tops: Sequence[_TopGrasp]) -> BenchmarkMeasure:
+    """Share of successes on the robot; see `RobotSuccess.real`."""
+    n_open = sum(one.is_open for one in tops)
+    if not n_open:
+        return _share([(one.scene, one.real) for one in tops])
+    succeeded = sum(one.real for one in tops)
+    tried = sum(one.feasible for one in tops) - n_open
+    likely = succeeded + n_open * succeeded / tried if tried else math.nan
+    shares = [count / len(tops) for count in (likely, succeeded, succeeded + n_open)]
+    return BenchmarkMeasure(shares[0], math.nan, math.nan, *shares[1:])
 
 
 def _top_successes(rendered: BenchmarkResult, scenes: Collection[str]) -> list[tuple[str, float]]:
@@ -250,7 +261,7 @@ def _rendered_twin(
     known = result.document
     for other in results:
         one = other.document
-        if one.images or one.conditions.changes or one.protocol != known.protocol:
+        if one.images or one.conditions != known.conditions or one.protocol != known.protocol:
             continue
         if (one.name, one.suite_hash) == (known.name, known.suite_hash) and (
             (one.split, one.depth_only) == (known.split, known.depth_only)

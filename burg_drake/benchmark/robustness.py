@@ -37,7 +37,8 @@ class ConditionEffect:
 def condition_effects(comparisons: Sequence[MethodComparison]) -> list[ConditionEffect]:
     """Effects of conditions on methods, by suite, method and condition.
 
-    Only methods that were also run under the conditions of the suite have effects.
+    Only methods that were also run under the conditions of the suite have effects, and only with
+    the protocol `single`: its scenes are the same.
 
     Args:
         comparisons: as `compare_by_suite` returns them.
@@ -65,9 +66,9 @@ def condition_effects(comparisons: Sequence[MethodComparison]) -> list[Condition
 
 
 def without_effects(comparisons: Sequence[MethodComparison]) -> list[MethodComparison]:
-    """The comparisons, without those under other conditions whose methods all have effects."""
+    """The comparisons, without those of one method whose effect `condition_effects` has."""
     usual = _usual_results(comparisons)
-    return [c for c in comparisons if not all(_has_usual(one, usual) for one in c.results)]
+    return [c for c in comparisons if len(c.results) > 1 or not _has_usual(c.results[0], usual)]
 
 
 def _usual_results(
@@ -83,7 +84,8 @@ def _usual_results(
 
 
 def _has_usual(result: BenchmarkResult, usual: Mapping[tuple[str, ...], object]) -> bool:
-    return bool(result.document.conditions.changes) and _key(result) in usual
+    known = result.document
+    return known.protocol == "single" and bool(known.conditions.changes) and _key(result) in usual
 
 
 def _key(result: BenchmarkResult) -> tuple[str, ...]:

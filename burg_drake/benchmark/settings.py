@@ -10,6 +10,8 @@ from burg_drake.core import Ranges, require_ranges, setting
 
 Split = Literal["tuning", "test"]
 Protocol = Literal["single", "clear"]
+SUITE_FOLDER = "scenes/suites"
+"""Kind of the built-in suites, for `resolve_reference`."""
 VERIFIED_GRASPS = 20
 """Number of grasps that are judged again by default."""
 

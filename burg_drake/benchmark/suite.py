@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
-from burg_drake.benchmark.settings import Budget, Split
+from burg_drake.benchmark.settings import SUITE_FOLDER, Budget, Split
 from burg_drake.benchmark.suite_camera import SuiteCamera
 from burg_drake.core import (
     FieldError,
@@ -53,8 +53,6 @@ from burg_drake.station import (
     require_valid_scene,
 )
 
-SUITE_FOLDER = "scenes/suites"
-"""Kind of the built-in suites, for `resolve_reference`."""
 HASH_DIGITS = 16
 """Digits of the hashes in suites and results."""
 
@@ -135,6 +133,12 @@ class SuiteDocument:
                 if name.casefold() in [other.casefold() for other in names[:k]]:
                     raise FieldError(f"two {key} are called {name!r}; rename one", key, k, "name")
 
+    @property
+    def hash(self) -> str:
+        """See `Suite.hash`."""
+        placed = replace(self, description="", library="", station="")
+        return content_hash(dump_document(placed))[:HASH_DIGITS]
+
 
 @dataclass(frozen=True, eq=False)
 class Suite:
@@ -159,12 +163,11 @@ class Suite:
         """The suite's name."""
         return self.document.name
 
-    @cached_property
+    @property
     def hash(self) -> str:
         """Hash of scenes, cameras, budget, name of the engine, objects and station. The figures of
         sensors and engines are those of the release of burg_drake."""
-        placed = replace(self.document, description="", library="", station="")
-        return content_hash(dump_document(placed))[:HASH_DIGITS]
+        return self.document.hash
 
     def scenes(self, split: Split = "test") -> dict[str, Scene]:
         """The scenes of a split by name."""

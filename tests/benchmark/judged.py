@@ -37,7 +37,11 @@ def judged(
     needed = np.array(friction or [0.1] * n, dtype=float)
     columns = {"instance": np.full(n, "mug"), "friction_needed": needed}
     grasps = GraspSet.create(X_OG, object="mug", columns=columns)
-    return JudgedAnswer(StoredAnswer(scene, "front", grasps, "0", 0.5, n, error), tuple(verdicts))
+    return JudgedAnswer(
+        StoredAnswer(scene, "front", grasps, "0", 0.5, n, error),
+        tuple(verdicts),
+        None not in verdicts,
+    )
 
 
 def result(

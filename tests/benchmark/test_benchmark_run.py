@@ -118,6 +118,17 @@ def test_results_can_be_shared_and_verified(cleared: BenchmarkResult, tmp_path: 
     assert len(found.grasps) == 2 and not found.differing
 
 
+def test_a_changed_suite_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    copy = tmp_path / "easier"
+    shutil.copytree(cleared.path, copy)
+    suite = copy / "suite.yaml"
+    suite.write_text(suite.read_text().replace("grasps: 3", "grasps: 1"))
+    with pytest.raises(
+        InvalidInputError, match=r"suite\.yaml has been changed since the benchmark"
+    ):
+        load_result(copy)
+
+
 def test_a_changed_answer_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
     copy = tmp_path / "changed"
     shutil.copytree(cleared.path, copy)
@@ -224,7 +235,7 @@ def test_tables_and_page_name_all_methods(cleared: BenchmarkResult, tmp_path: Pa
     pictures = scene_pictures([comparison])
     assert sorted(name for _, name in pictures) == ["one", "two"]
     image = cv2.imdecode(np.frombuffer(next(iter(pictures.values())), np.uint8), cv2.IMREAD_COLOR)
-    assert image.shape == (240, 320, 3) and image.std() > 10.0
+    assert image.shape == (181, 320, 3) and image.std() > 10.0  # as 212 x 120 pixels are
     run = load_result(other).rounds[0].run_folder("two")
     id = load_result(other).answers[0].ids[0]
     extras = LeaderboardExtras(

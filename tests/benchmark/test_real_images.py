@@ -188,6 +188,12 @@ def test_the_same_planner_on_rendered_images_on_photographs_and_on_the_robot(
     }
     (found,) = robot_successes([rendered, real], [sheet])
     assert (found.tried, found.infeasible, found.open) == (0, 1, 2)
+    assert np.isnan(found.real.value) and (found.real.least, found.real.most) == (0.0, 2 / 3)
+    one = replace(sheet.trials[0], outcome=RealOutcome.LIFTED)
+    half = replace(sheet, trials=(one, *sheet.trials[1:]))
+    (found,) = robot_successes([real], [half])
+    assert (found.real.least, found.real.value, found.real.most) == (1 / 3, 2 / 3, 2 / 3)
+    assert np.isnan(found.real.low) and found.open == 1 and found.rendered is None
     ended = [RealOutcome.LIFTED, RealOutcome.SLIPPED]
     done = replace(
         sheet,

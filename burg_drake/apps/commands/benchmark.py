@@ -157,6 +157,7 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
 
 def run_benchmark_run(arguments: argparse.Namespace) -> int:
     """Benchmarks a planner; returns 1 if scenes could not be judged."""
+    core.resolve_reference(arguments.suite, benchmark.SUITE_FOLDER)  # a wrong name is told at once
     with options.cluster_from_options(arguments) as executor:
         result = benchmark.run_benchmark(
             arguments.suite,
@@ -224,14 +225,6 @@ def add_benchmark_trials_options(parser: options.Parser) -> None:
     _add_results(parser)
     options.add_output(parser, "FILE", "trials file to write (.yaml)")
     parser.add_argument(
-        "-n",
-        dest="count",
-        metavar="N",
-        type=options.positive_int,
-        default=1,
-        help="number of grasps of each image, the best ones (default: %(default)d)",
-    )
-    parser.add_argument(
         "--seed", type=options.seed, default=0, help="seed of the order (default: %(default)d)"
     )
 
@@ -239,9 +232,7 @@ def add_benchmark_trials_options(parser: options.Parser) -> None:
 def run_benchmark_trials(arguments: argparse.Namespace) -> int:
     """Plans trials of the best grasps on a robot."""
     results = list(map(benchmark.load_result, arguments.results))
-    sheet = benchmark.plan_robot_trials(
-        results, arguments.output, count=arguments.count, seed=arguments.seed
-    )
+    sheet = benchmark.plan_robot_trials(results, arguments.output, seed=arguments.seed)
     print_note_lines(sheet.notes)
     count = core.count_with_noun(len(sheet.trials), "trial")
     print(f"wrote {arguments.output}: {count} on {core.count_with_noun(len(sheet.runs), 'scene')}")
@@ -498,7 +489,7 @@ def _add_suite(parser: Any) -> None:
     parser.add_argument(
         "suite",
         metavar="SUITE",
-        help=f"suite file, or built-in: {', '.join(core.builtin_names('scenes/suites'))}",
+        help=f"suite file, or built-in: {', '.join(core.builtin_names(benchmark.SUITE_FOLDER))}",
     )
 
 

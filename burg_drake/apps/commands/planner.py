@@ -77,7 +77,7 @@ def _open_planner(arguments: argparse.Namespace) -> GraspPlanner:
 
 
 def _print_check(name: str, found: PlannerCheck) -> None:
-    took = f" in {core.format_duration(found.time)}" if math.isfinite(found.time) else ""
+    took = f", planned in {core.format_duration(found.time)}" if math.isfinite(found.time) else ""
     fitting, tried = found.fits
     grasps = core.count_with_noun(found.count, "grasp")
     images = core.count_with_noun(found.images, "image")
