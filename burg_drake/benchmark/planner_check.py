@@ -415,7 +415,7 @@ class _PlannerSearch:
         )
         return [
             f"The widths are {words}, at {count} of the {len(ratios)} grasps that touch an object."
-            f" Correct the planner, such as by:\n    width = {line}"
+            f" Correct it like this:\n    width = {line}"
             for low, high, words, line in units
             if (count := int(((low < ratios) & (ratios < high)).sum())) >= 0.8 * len(ratios)
         ]
@@ -491,7 +491,7 @@ def _repair_matrices(answer: Mapping[str, Any]) -> tuple[Mapping[str, Any], list
             X[mirrored, :3, 1] = np.cross(X[mirrored, :3, 2], X[mirrored, :3, 0])
             problems.append(
                 f"{mirrored.sum()} of {len(X)} grasps have left-handed axes, with determinant -1:"
-                " an axis is mirrored, or two are swapped. Correct the planner, such as by:\n"
+                " an axis is mirrored, or two are swapped. Correct it like this:\n"
                 f"    {entry}[:, :3, 1] = np.cross({entry}[:, :3, 2], {entry}[:, :3, 0])"
             )
         if problems:
@@ -515,9 +515,9 @@ def _problem(found: MistakeFound, poses: AnsweredPoses, seen: CheckScene) -> str
     if found.alternatives:
         sentences.append(f"Equally many fit {' or '.join(found.alternatives)}.")
     names = _frame_names(found)
-    frame = f' this line, or "frame": "{names[0]}" to the answer' if names else ""
+    frame = f', or add "frame": "{names[0]}" to the answer' if names else ""
     line = _correction_line(found.mistake, poses, seen)
-    return " ".join([*sentences, f"Correct the planner, such as by{frame}:\n    {line}"])
+    return " ".join([*sentences, f"Correct it like this{frame}:\n    {line}"])
 
 
 def _frame_names(found: MistakeFound) -> list[str]:

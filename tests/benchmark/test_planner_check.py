@@ -270,7 +270,7 @@ PLANTED: dict[str, tuple[Plant, str]] = {
     ),
     "named acronym": (
         lambda X, f: {"X_CG": f.X_CS @ X, "frame": "acronym"},
-        '0.1034 m ahead of .* or "frame": "burg_drake" to the answer',
+        '0.1034 m ahead of .* or add "frame": "burg_drake" to the answer',
     ),
 }
 """How each mistake is made, and what the problem says."""
@@ -506,7 +506,7 @@ def test_the_command_prints_problems(
     monkeypatch.setattr("burg_drake.benchmark.planner_check.make_check_scene", lambda station: seen)
     assert main(["planner", "check", "turned", "--time-limit", "7"]) == 1
     first, second, problem, line = capsys.readouterr().out.splitlines()
-    assert first == "turned: 20 grasps in 1 image of a carton and a can in 250 ms"
+    assert first == "turned: 20 grasps in 1 image of a carton and a can, planned in 250 ms"
     assert second.startswith("  0 of 20 fit as returned")
     assert problem.startswith("problem: The grasps are turned around: z points out of the scene")
     assert line.startswith("    X_SG = X_SG @ np.array([[1, 0, 0, 0],")
@@ -515,7 +515,7 @@ def test_the_command_prints_problems(
     assert "  20 of 20 fit as returned" in out and out.endswith("  no problem found\n")
     assert main(["planner", "check", "can alone", "--time-limit", "7"]) == 1
     assert capsys.readouterr().out.splitlines() == [
-        "can alone: 3 grasps in 3 images of a carton and a can in 750 ms",
+        "can alone: 3 grasps in 3 images of a carton and a can, planned in 750 ms",
         "  3 of 3 fit as returned: the open hand is clear of the object, and its pads close on it",
         "  Cannot tell whether the frames are right: only grasps of the can fit, which also fit if"
         " they are turned about the approach.",
