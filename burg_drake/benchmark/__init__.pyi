@@ -41,6 +41,7 @@ from .method_comparison import (
     compare_methods as compare_methods,
     holm as holm,
     permutation_p_value as permutation_p_value,
+    version_notes as version_notes,
 )
 from .method_tables import all_tables as all_tables
 from .observing import SceneCamera as SceneCamera

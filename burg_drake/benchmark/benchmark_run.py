@@ -488,7 +488,7 @@ def _store_answer(answer: _Answer) -> None:
         try:
             planned = read_answer(answer.raw, answer.observation, gripper)
             chosen = choose_grasps(answer.scene, planned, gripper, answer.count, answer.camera)
-            grasps = _with_friction_needed(chosen, answer.scene, answer.station)
+            grasps = with_friction_needed(chosen, answer.scene, answer.station)
             if answer.friction != 1.0:
                 grasps = _with_trial_friction(grasps, answer.scene, answer.friction)
             seconds, answered, notes = planned.time, len(planned.score), planned.notes
@@ -590,7 +590,7 @@ def _with_columns(grasps: GraspSet, instance: Array | str, camera: str) -> Grasp
     return grasps.with_columns(**columns)
 
 
-def _with_friction_needed(grasps: GraspSet, scene: Scene, station: Station) -> GraspSet:
+def with_friction_needed(grasps: GraspSet, scene: Scene, station: Station) -> GraspSet:
     """Grasps with the smallest friction coefficient at which each holds by the geometry of its
     contacts; NaN if the pads do not both touch."""
     jaws = jaws_of(station.hand, station.hand_model, station.packages)

@@ -99,6 +99,19 @@ def compare_methods(results: Sequence[BenchmarkResult]) -> MethodComparison:
     return MethodComparison(tuple(order), measures, differences)
 
 
+def version_notes(results: Sequence[BenchmarkResult]) -> list[str]:
+    """Notes on packages that decide verdicts and images, of which results have several versions."""
+    notes = []
+    for package in ("burg_drake", "drake", "mujoco"):
+        versions = sorted({r.document.versions.get(package, "") for r in results} - {""})
+        if len(versions) > 1:
+            notes.append(
+                f"the results were made with several versions of {package}"
+                f" ({', '.join(versions)}); what differs may be due to that"
+            )
+    return notes
+
+
 def compare_by_suite(results: Sequence[BenchmarkResult]) -> list[MethodComparison]:
     """Compares benchmarks of the same suite, protocol and settings, in their order.
 

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import (
+    FRICTION_COLUMN,
     BenchmarkResult,
     JudgedAnswer,
     Round,
     load_result,
 )
+from burg_drake.benchmark.benchmark_run import with_friction_needed
 from burg_drake.benchmark.settings import VERIFIED_GRASPS
 from burg_drake.core import (
+    GraspSet,
     InvalidInputError,
     Listener,
     Progress,
@@ -72,6 +75,8 @@ def verify_result(
 ) -> Verification:
     """Judges a random sample of the grasps of a benchmark again.
 
+    Times, and the numbers of answered grasps, are those that the benchmark recorded.
+
     Args:
         result: a complete benchmark, or its folder.
         count: number of grasps; all if there are fewer.
@@ -85,20 +90,19 @@ def verify_result(
     """
     found = result if isinstance(result, BenchmarkResult) else load_result(result)
     found.require_complete()
-    judged: list[tuple[Path, str]] = []
+    judged: dict[tuple[Path, str], float] = {}  # cameras may share a grasp
     for round in found.rounds:
         answers = found.judged_answers(round)
         _require_consistent(round, answers)
-        judged += [
-            (round.run_folder(one.answer.scene), id)
-            for one in answers
-            for id, verdict in zip(one.ids, one.verdicts, strict=True)
-            if verdict is not None
-        ]
+        for one in answers:
+            needed = one.answer.grasps.columns[FRICTION_COLUMN].tolist()
+            for id, verdict, friction in zip(one.ids, one.verdicts, needed, strict=True):
+                if verdict is not None:
+                    judged[round.run_folder(one.answer.scene), id] = friction
     rng = np.random.default_rng(seed)
-    judged = list(dict.fromkeys(judged))  # cameras may share a grasp
     chosen = sorted(rng.permutation(len(judged))[:count].tolist())
-    work = [judged[k] for k in chosen]
+    every = [(folder, id, friction) for (folder, id), friction in judged.items()]
+    work = [every[k] for k in chosen]
     again: list[VerifiedGrasp] = []
     with Reporter(progress) as reporter:
         meter = ProgressMeter(reporter.show, Progress("verifying", total=len(work)))
@@ -132,16 +136,24 @@ def _require_consistent(round: Round, answers: Sequence[JudgedAnswer]) -> None:
             )
 
 
-def _judge_again(work: tuple[Path, str]) -> VerifiedGrasp:
-    """Judges one grasp of a scene again."""
-    folder, id = work
+def _judge_again(work: tuple[Path, str, float]) -> VerifiedGrasp:
+    """Judges one grasp of a scene again, and finds again the friction that it needs."""
+    folder, id, friction = work
     run = load_run(folder)
     trial = run.trial(id)
     assert trial.verdict is not None
     origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
-    now, _ = rerun(run.scene(), run.station(), trial, origin)
+    scene, station = run.scene(), run.station()
+    now, _ = rerun(scene, station, trial, origin)
     found = differences(trial.verdict, now)
-    return VerifiedGrasp(str(folder), id, tuple(comparison(found, origin)), not found)
+    text = list(comparison(found, origin))
+    object = scene.instance(trial.instance).object
+    grasp = GraspSet.create(trial.X_OG[None], object=object)
+    (needed,) = with_friction_needed(grasp, scene, station).columns[FRICTION_COLUMN]
+    same_friction = bool(np.isclose(needed, friction, rtol=1e-9, equal_nan=True))
+    if not same_friction:
+        text.append(f"needed friction: {friction:g} recorded, {needed:g} now")
+    return VerifiedGrasp(str(folder), id, tuple(text), not found and same_friction)
 
 
 def _version_notes(result: BenchmarkResult) -> Sequence[str]:

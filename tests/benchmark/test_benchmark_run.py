@@ -20,6 +20,7 @@ from burg_drake.benchmark import (
     Conditions,
     LeaderboardExtras,
     PlannedGrasps,
+    StoredAnswer,
     Suite,
     SuiteSettings,
     all_tables,
@@ -116,6 +117,18 @@ def test_results_can_be_shared_and_verified(cleared: BenchmarkResult, tmp_path: 
     shutil.copytree(cleared.path, copy)
     found = verify_result(copy, count=2, workers=1, progress=False)
     assert len(found.grasps) == 2 and not found.differing
+
+
+def test_changed_friction_of_an_answer_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    copy = tmp_path / "slippery"
+    shutil.copytree(cleared.path, copy)
+    for scene in ("one", "two"):
+        answer = StoredAnswer.load(copy, scene, "front")
+        changed = answer.grasps.with_columns(friction_needed=np.full(len(answer.grasps), 0.1))
+        replace(answer, grasps=changed).save(copy)
+    found = verify_result(copy, count=9, workers=1, progress=False)
+    assert len(found.differing) == 3  # of the first images; those of the second are as they were
+    assert all("needed friction: " in one.text[-1] for one in found.differing)
 
 
 def test_a_changed_suite_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:

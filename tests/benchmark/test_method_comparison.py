@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import comb
 
 import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests
 
-from burg_drake.benchmark import compare_by_suite, compare_methods, holm, permutation_p_value
+from burg_drake.benchmark import (
+    compare_by_suite,
+    compare_methods,
+    holm,
+    permutation_p_value,
+    version_notes,
+)
 from burg_drake.core import InvalidInputError
 from tests.benchmark.judged import LIFTED, SLIPPED, judged, result
 
@@ -52,6 +59,17 @@ def test_the_best_method_comes_first_and_pairs_are_told_apart() -> None:
     assert not pairs["strong", "same"].is_significant
     far = pairs["strong", "weak"]
     assert far.difference == pytest.approx(0.75) and far.low < 0.75 < far.high
+
+
+def test_several_versions_are_noted() -> None:
+    def by(drake: str) -> object:
+        found = made(drake, 3)
+        document = replace(found.document, versions={"drake": drake, "numpy": drake})
+        return type(found)(found.path, document, found.suite)
+
+    assert version_notes([by("1.51.1"), by("1.51.1"), made("old", 3)]) == []
+    (note,) = version_notes([by("1.51.1"), by("1.58.0")])
+    assert "several versions of drake (1.51.1, 1.58.0)" in note
 
 
 @pytest.mark.parametrize(

@@ -511,6 +511,7 @@ def _complete_results(folders: Sequence[str]) -> list[benchmark.BenchmarkResult]
                 f"{result.path} is left out, as it is not complete; finish it with:"
                 f" {result.document.command}"
             )
+    print_note_lines(benchmark.version_notes(complete))
     return complete
 
 
