@@ -26,7 +26,6 @@ from .benchmark_run import (
 )
 from .burg_planner import Observation as Observation, observation_id as observation_id
 from .clearing import Attempt as Attempt, episodes as episodes
-from .conditions import Conditions as Conditions
 from .leaderboard import (
     LeaderboardExtras as LeaderboardExtras,
     failed_grasps as failed_grasps,
@@ -39,7 +38,6 @@ from .method_comparison import (
     MethodDifference as MethodDifference,
     compare_by_suite as compare_by_suite,
     compare_methods as compare_methods,
-    holm as holm,
     permutation_p_value as permutation_p_value,
     version_notes as version_notes,
 )
@@ -77,6 +75,7 @@ from .settings import (
     VERIFIED_GRASPS as VERIFIED_GRASPS,
     BenchmarkSettings as BenchmarkSettings,
     Budget as Budget,
+    Conditions as Conditions,
 )
 from .suite import (
     Suite as Suite,

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.benchmark.conditions import Conditions
-from burg_drake.benchmark.settings import Protocol, Split
+from burg_drake.benchmark.settings import Conditions, Protocol, Split
 from burg_drake.benchmark.suite import SuiteDocument
 from burg_drake.core import (
     Array,

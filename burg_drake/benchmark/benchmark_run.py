@@ -41,10 +41,9 @@ from burg_drake.benchmark.benchmark_folder import (
 )
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.clearing import ExecutedGrasp, scene_after, scenes_to_clear
-from burg_drake.benchmark.conditions import Conditions
 from burg_drake.benchmark.planners import GraspPlanner, PlannerError, PlannerLost, open_planner
 from burg_drake.benchmark.real_images import RealImages
-from burg_drake.benchmark.settings import BenchmarkSettings
+from burg_drake.benchmark.settings import BenchmarkSettings, Conditions
 from burg_drake.benchmark.suite import HASH_DIGITS, Suite, SuiteLike, as_suite
 from burg_drake.benchmark.suite_camera import SuiteCamera
 from burg_drake.core import (

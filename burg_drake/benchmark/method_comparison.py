@@ -11,6 +11,7 @@ import numpy as np
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
 from burg_drake.benchmark.measures import BenchmarkMeasure, measure_all, precision_at, trial_ap
 from burg_drake.core import Array, InvalidInputError, list_names
+from burg_drake.experiment import holm_correction
 
 SIGNIFICANCE_LEVEL = 0.05
 """Two methods differ if the corrected p value is below this."""
@@ -151,7 +152,9 @@ def compare_pairs(
     paired = [means[i] - means[j] for i, j in pairs]
     p_values = [permutation_p_value(d) for d in paired]
     found = []
-    for (i, j), d, p, corrected in zip(pairs, paired, p_values, holm(p_values), strict=True):
+    for (i, j), d, p, corrected in zip(
+        pairs, paired, p_values, holm_correction(p_values), strict=True
+    ):
         n = len(d)
         mean = float(d.mean()) if n else np.nan
         spread = float(d.std(ddof=1)) if n > 1 else 0.0
@@ -190,17 +193,6 @@ def permutation_p_value(differences: Array) -> float:
         rng=np.random.default_rng(0),
     )
     return float(found.pvalue)
-
-
-def holm(p_values: Sequence[float]) -> list[float]:
-    """p values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979)."""
-    order = np.argsort(p_values, kind="stable")
-    corrected = np.empty(len(order))
-    largest = 0.0
-    for place, k in enumerate(order.tolist()):
-        largest = max(largest, min(1.0, (len(order) - place) * p_values[k]))
-        corrected[k] = largest
-    return [float(p) for p in corrected]
 
 
 def scene_means(

@@ -46,7 +46,7 @@ class _Sampling(NamedTuple):
     kept: int
 
 
-SAMPLING = (_Sampling((300, 1000), 60.0, 60), _Sampling((6000,), 90.0, 300))
+SAMPLING_PASSES = (_Sampling((300, 1000), 60.0, 60), _Sampling((6000,), 90.0, 300))
 """The second one for scenes in which the first finds too few grasps."""
 WANTED_GRASPS = 10
 """Grasps that lift their object after which no more are tried."""
@@ -74,7 +74,7 @@ def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> 
         names = [names[observation.target - 1]]
     lifted: list[tuple[Array, Array]] = []
     untried: list[tuple[Array, Array]] = []
-    for sampling in SAMPLING:
+    for sampling in SAMPLING_PASSES:
         wanted = WANTED_GRASPS - sum(len(X_SG) for X_SG, _ in lifted)
         if not names or wanted <= 0:
             break

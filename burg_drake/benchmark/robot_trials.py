@@ -26,9 +26,6 @@ from burg_drake.experiment import (
     plan_trials,
 )
 
-NO_INFORMATION = (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
-"""Outcomes that say nothing about a grasp."""
-
 
 def plan_robot_trials(
     results: Sequence[BenchmarkResult], out: str | Path, *, seed: int = 0
@@ -142,7 +139,7 @@ class _RobotTrial:
 
     @property
     def is_open(self) -> bool:
-        return self.outcome is None or self.outcome in NO_INFORMATION
+        return self.outcome is None or not self.outcome.attempted
 
     @property
     def succeeded(self) -> bool:

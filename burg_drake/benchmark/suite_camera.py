@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from burg_drake.benchmark.conditions import Conditions
+from burg_drake.benchmark.settings import Conditions
 from burg_drake.core import FieldError, Pose, require_name, setting
 
 if TYPE_CHECKING:

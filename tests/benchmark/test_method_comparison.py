@@ -7,12 +7,10 @@ from math import comb
 
 import numpy as np
 import pytest
-from statsmodels.stats.multitest import multipletests
 
 from burg_drake.benchmark import (
     compare_by_suite,
     compare_methods,
-    holm,
     permutation_p_value,
     version_notes,
 )
@@ -36,14 +34,6 @@ def test_p_values_of_random_differences_are_uniform() -> None:
     rng = np.random.default_rng(5)
     p = [permutation_p_value(rng.normal(size=9)) for _ in range(300)]
     assert 0.02 <= np.mean(np.array(p) < 0.05) <= 0.09
-
-
-def test_holm_is_that_of_statsmodels() -> None:
-    rng = np.random.default_rng(2)
-    for n in (1, 2, 6, 10):
-        p = rng.random(n) ** 3
-        expected = multipletests(p, method="holm")[1]
-        assert holm(p.tolist()) == pytest.approx(expected.tolist())
 
 
 def made(name: str, lifted: int, n: int = 20, **more: str) -> object:

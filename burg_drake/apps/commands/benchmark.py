@@ -157,6 +157,8 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
 
 def run_benchmark_run(arguments: argparse.Namespace) -> int:
     """Benchmarks a planner; returns 1 if scenes could not be judged."""
+    if arguments.depth_unit is not None and arguments.images is None:
+        raise core.InvalidInputError("--depth-unit is for --images; add it")
     core.resolve_reference(arguments.suite, benchmark.SUITE_FOLDER)  # a wrong name is told at once
     with options.cluster_from_options(arguments) as executor:
         result = benchmark.run_benchmark(
@@ -235,7 +237,8 @@ def run_benchmark_trials(arguments: argparse.Namespace) -> int:
     sheet = benchmark.plan_robot_trials(results, arguments.output, seed=arguments.seed)
     print_note_lines(sheet.notes)
     count = core.count_with_noun(len(sheet.trials), "trial")
-    print(f"wrote {arguments.output}: {count} on {core.count_with_noun(len(sheet.runs), 'scene')}")
+    scenes = len({run.scene.content for run in sheet.runs.values()})
+    print(f"wrote {arguments.output}: {count} on {core.count_with_noun(scenes, 'scene')}")
     return 0
 
 
@@ -261,6 +264,8 @@ def add_benchmark_compare_options(parser: options.Parser) -> None:
 
 def run_benchmark_compare(arguments: argparse.Namespace) -> int:
     """Prints and writes the comparison of results."""
+    if arguments.replays and arguments.html is None:
+        raise core.InvalidInputError("--replays is for --html; add it")
     comparisons = benchmark.compare_by_suite(_complete_results(arguments.results))
     sheets = _load_sheets(arguments)
     _print_tables(comparisons, sheets)
@@ -273,8 +278,6 @@ def run_benchmark_compare(arguments: argparse.Namespace) -> int:
         )
         benchmark.write_leaderboard(comparisons, page, extras=extras)
         print(f"wrote {page}")
-    elif arguments.replays:
-        raise core.InvalidInputError("--replays is for --html; add it")
     return 0
 
 

@@ -46,17 +46,8 @@ def add_planner_check_options(parser: options.Parser) -> None:
         " problems, or if the grasps do not tell whether the frames are right. What the planner"
         " prints is shown on standard error.",
     )
-    parser.add_argument(
-        "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
-    )
+    _add_planner(parser)
     options.add_station(parser)
-    parser.add_argument(
-        "--time-limit",
-        type=options.positive,
-        metavar="S",
-        default=60.0,
-        help="time for the answer [s] (default: 60)",
-    )
 
 
 def run_planner_check(arguments: argparse.Namespace) -> int:
@@ -65,6 +56,19 @@ def run_planner_check(arguments: argparse.Namespace) -> int:
         found = benchmark.check_planner(planner.ask, arguments.station)
     _print_check(arguments.planner, found)
     return 1 if found.problems or found.unclear else 0
+
+
+def _add_planner(parser: options.Parser) -> None:
+    parser.add_argument(
+        "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=options.positive,
+        metavar="S",
+        default=60.0,
+        help="time for each answer [s] (default: 60)",
+    )
 
 
 def _open_planner(arguments: argparse.Namespace) -> GraspPlanner:
@@ -105,9 +109,7 @@ def add_planner_serve_options(parser: options.Parser) -> None:
         " needs no burg_drake to be served: copy burg_planner.py there. What the planner prints is"
         " shown on standard error.",
     )
-    parser.add_argument(
-        "planner", metavar="PLANNER", help="name or reference (burg-drake planner list)"
-    )
+    _add_planner(parser)
     parser.add_argument(
         "--port",
         type=options.port,
@@ -121,13 +123,6 @@ def add_planner_serve_options(parser: options.Parser) -> None:
         default="127.0.0.1",
         help="address to listen on (default: 127.0.0.1, this computer alone); with 0.0.0.0 every"
         " computer in the network can ask the planner",
-    )
-    parser.add_argument(
-        "--time-limit",
-        type=options.positive,
-        metavar="S",
-        default=60.0,
-        help="time for each answer [s] (default: 60)",
     )
 
 
