@@ -76,7 +76,7 @@ class Setting:
     above: float | None = None
     high: float | None = None
     infinite: bool = False
-    noun: str = "number"
+    noun: str = "a number"
 
     def option(self, field: str) -> str:
         """The long option of a field with this declaration, such as `--lift-mm`."""
