@@ -175,6 +175,7 @@ def test_what_is_not_known_leads_to_the_help_of_its_verb(
         (["evaluate", "a", "--engine", "standart"], "'standart'; did you mean 'standard'? Known: "),
         (["evaluate", "a", "--grasp-per-object=5"], "=5; did you mean '--grasps-per-object'? (see"),
         (["evaluate", "a", "--zzz"], "unrecognized arguments: --zzz (see "),
+        (["scene", "sample", "a", "--ouput", "b"], "--ouput; did you mean '--output'? (see "),
     ],
 )
 def test_the_nearest_of_what_is_misspelt_is_named(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import shutil
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from burg_drake.apps.options.values import (
@@ -132,8 +133,16 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
         """Refuses unknown arguments here, so that the error refers to the help of this command and
-        not to that of `burg-drake`."""
+        not to that of `burg-drake`; before missing ones, as one may be the other, misspelt."""
         self.add_deferred_options()
+        if self._subparsers is None:
+            known = self._option_string_actions
+            options = [
+                word
+                for word in itertools.takewhile("--".__ne__, arguments[0])
+                if word.startswith("--") and " " not in word  # with a space it is a value
+            ]
+            self._refuse_unknown([one for one in options if one.partition("=")[0] not in known])
         found, unknown = super().parse_known_args(*arguments, **named)
         if not hasattr(found, "flags"):  # the command's parser comes before that of its group
             found.flags = {
@@ -141,12 +150,16 @@ class Parser(argparse.ArgumentParser):
                 for action in self._actions
                 if action.option_strings and action.help is not argparse.SUPPRESS
             }
+        self._refuse_unknown(unknown)
+        return found, unknown
+
+    def _refuse_unknown(self, unknown: Sequence[str]) -> None:
+        """Ends the program if there are unknown arguments; the message suggests a similar one."""
         if unknown:
             option = unknown[0].partition("=")[0]
             known = self._option_string_actions if option.startswith("-") else ()
             meant = did_you_mean(option, known)
             self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
-        return found, unknown
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuses an unknown choice or command; the message suggests similar ones."""
