@@ -7,12 +7,17 @@ N ?= 100
 # Of all packages that pyproject.toml names, something that they are needed for, but for mypy, which is slow.
 LOWEST_TESTS := tests/benchmark/test_adapters.py tests/benchmark/test_burg_planner.py tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_progress.py \
 	tests/dataset/test_coco.py tests/dataset/test_shards.py tests/dataset/test_webdataset.py \
-	tests/evaluation/test_cluster.py tests/evaluation/test_jobs.py tests/evaluation/test_table.py \
-	tests/experiment/test_agreement.py tests/export/test_mjcf.py tests/export/test_usd.py \
-	tests/formats/test_acronym.py tests/geometry/test_rays.py tests/objects/test_decompose.py \
-	tests/objects/test_solids.py tests/objects/test_stable_poses.py tests/printout/test_board_printout.py \
-	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/simulation/test_statics.py::test_pads_press_round_objects_with_the_commanded_force \
-	tests/station/test_hand.py tests/test_documents.py tests/test_packaging.py tests/ui/test_incoming.py tests/ui/test_panels.py \
+	tests/evaluation/test_cluster.py::test_jobs_are_judged_as_they_are_here \
+	tests/evaluation/test_jobs.py tests/evaluation/test_table.py \
+	tests/experiment/test_agreement.py::test_selected_trials_as_scikit_learn_has_them \
+	tests/experiment/test_agreement.py::test_mcnemar_as_statsmodels_has_it \
+	tests/export/test_mjcf.py tests/export/test_usd.py tests/formats/test_acronym.py tests/geometry/test_rays.py \
+	tests/objects/test_decompose.py::test_a_corner_is_two_bars tests/objects/test_solids.py \
+	tests/objects/test_stable_poses.py::test_probabilities_are_those_of_trimesh \
+	tests/printout/test_board_printout.py::test_words_on_every_page \
+	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/station/test_hand.py \
+	tests/test_documents.py::test_names_in_the_text_exist tests/test_documents.py::test_yaml_fits_its_schema \
+	tests/test_packaging.py::test_every_module_can_be_imported tests/ui/test_incoming.py tests/ui/test_panels.py \
 	"tests/test_typed_use.py::test_what_is_right_is_accepted_and_what_is_wrong_reported[pyright]"
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 

@@ -247,7 +247,7 @@ def _measure_table(
         cells += [
             element(
                 "td",
-                measure_text(measures[name]),
+                measure_text(measures[name], name),
                 class_="number",
                 data_value=_sortable(measures[name].value),
             )

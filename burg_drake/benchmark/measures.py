@@ -55,10 +55,13 @@ MEASURE_MEANINGS = {
     "lifted": "share of judged grasps that lifted it, and moved nothing else",
     "disturbed": "share of executed grasps that moved another object by more than 10 mm",
     "cleared": "share of objects that were taken away (declutter rate)",
+    "mean_picks": "mean number of objects that were taken from a scene",
     "pick_success": "share of attempts that took an object away",
     "emptied": "share of scenes that were emptied",
 }
-"""Meaning of each measure by name; the last three are of the protocol `clear`."""
+"""Meaning of each measure by name; the last four are of the protocol `clear`."""
+COUNTS = frozenset({"mean_picks"})
+"""Measures that are no shares."""
 
 ContestedAs = bool | None
 """What contested verdicts count as: what they say if None."""
@@ -115,8 +118,11 @@ def _clearing_measures(result: BenchmarkResult) -> dict[str, BenchmarkMeasure]:
         value = sum(successes) / sum(trials)
         return BenchmarkMeasure(value, *clustered_interval(successes, trials), value, value)
 
+    cleared = measure(taken, objects)
+    mean_objects = float(np.mean(objects)) if objects else float("nan")
     return {
-        "cleared": measure(taken, objects),
+        "cleared": cleared,
+        "mean_picks": BenchmarkMeasure(*(mean_objects * share for share in cleared)),
         "pick_success": measure(taken, made),
         "emptied": measure(emptied, [1.0] * len(emptied)),
     }

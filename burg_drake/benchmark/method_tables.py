@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
-from burg_drake.benchmark.measures import MEASURE_MEANINGS, BenchmarkMeasure
+from burg_drake.benchmark.measures import COUNTS, MEASURE_MEANINGS, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import (
     SIGNIFICANCE_LEVEL,
     MethodComparison,
@@ -27,7 +28,12 @@ SUCCESS_MEASURES = {
     "graspnet_ap": "GraspNet AP",
 }
 """Heading of each measure of success."""
-CLEARING_MEASURES = {"cleared": "cleared", "pick_success": "picks", "emptied": "emptied"}
+CLEARING_MEASURES = {
+    "cleared": "cleared",
+    "mean_picks": "mean picks",
+    "pick_success": "pick success",
+    "emptied": "emptied",
+}
 """Heading of each measure of the protocol `clear`."""
 STEP_MEASURES = {
     "answered": "answered",
@@ -205,14 +211,15 @@ def _settings_text(result: BenchmarkResult) -> str:
     return "".join(f", {part}" for part in parts)
 
 
-def measure_text(measure: BenchmarkMeasure) -> str:
-    """A measure with its interval, and what contested verdicts leave open, in percent."""
+def measure_text(measure: BenchmarkMeasure, name: str = "") -> str:
+    """A measure with its interval, and what contested verdicts leave open; shares in percent."""
     if np.isnan(measure.value):
         return NO_VALUE
-    text = _percent(measure.value)
+    number = partial(format_number, decimals=1) if name in COUNTS else _percent
+    text = number(measure.value)
     if not np.isnan(measure.low):
-        text += f" ({_percent(measure.low)}-{_percent(measure.high)})"
-    least, most = _percent(measure.least), _percent(measure.most)
+        text += f" ({number(measure.low)}-{number(measure.high)})"
+    least, most = number(measure.least), number(measure.most)
     return text if least == most else f"{text} [{least}-{most}]"
 
 
@@ -255,7 +262,7 @@ def _measure_table(
     times = time_columns(comparison) if with_times else {}
     for k, result in enumerate(comparison.results):
         measures = comparison.measures[result.document.name]
-        cells = [measure_text(measures[name]) for name in heads]
+        cells = [measure_text(measures[name], name) for name in heads]
         durations = [format_duration(column[k]) for column in times.values()]
         rows.append((result.document.name, *cells, *durations))
     meanings = [f"{head}: {MEASURE_MEANINGS[name]}" for name, head in heads.items()]

@@ -96,6 +96,8 @@ def test_scenes_are_cleared_object_by_object(cleared: BenchmarkResult) -> None:
     assert all(one.succeeded for made in attempts.values() for one in made)
     measures = measure_all(cleared)
     assert measures["cleared"].value == measures["pick_success"].value == 1.0
+    assert measures["mean_picks"].value == 1.5
+    assert measures["mean_picks"].low < measures["mean_picks"].high == 1.5
     second = burg.load_scene(cleared.rounds[1].path / "scenes" / "two.yaml")
     assert len(second.instances) == 1
     (left,) = second.instances
