@@ -280,7 +280,8 @@ class _BenchmarkCall:
 
     def run(self, settle: str) -> BenchmarkResult:
         """Goes through the rounds, and returns the complete result."""
-        document = replace(self.result.document, settled=settle, complete=False)
+        before = self.result.document
+        document = replace(before, settled=settle, complete=False)
         self.result = save_result(self.result.path, document, self.result.suite)
         first, times = self.result.rounds[0], BenchmarkTimes()
         known = self.suite.scenes(self.result.document.split)
@@ -296,7 +297,9 @@ class _BenchmarkCall:
             if not scenes:
                 break
         times = replace(times, total=time.monotonic() - self.begun)
-        document = replace(document, complete=True, times=document.times + times)
+        if not before.complete or settle != before.settled:
+            document = replace(document, times=document.times + times)
+        document = replace(document, complete=True)
         return save_result(self.result.path, document, self.result.suite)
 
     def _is_last(self, number: int) -> bool:

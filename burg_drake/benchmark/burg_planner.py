@@ -511,7 +511,10 @@ def run(plan: PlanFunction, arguments: list[str] | None = None) -> None:
                 f"cannot listen on port {given.port} of {given.host}: {error.strerror or error}"
             )
     elif len(given.files) == 2 and given.port is None:
-        observation = Observation.from_arrays(read_arrays(given.files[0]))
+        try:
+            observation = Observation.from_arrays(read_arrays(given.files[0]))
+        except (OSError, ValueError, KeyError) as error:
+            sys.exit(f"{given.files[0]} cannot be read as an observation: {error}")
         write_arrays(given.files[1], answer_observation(plan, observation))
     else:
         parser.error("give --port, or the file of an observation and the file for the answer")

@@ -165,7 +165,8 @@ def robot_table(successes: Sequence[RobotSuccess]) -> TableText:
         "rendered: planned on rendered images of the same scenes, in simulation\n"
         "simulated, robot: planned on the given images, in simulation and on the robot\n"
         "agree: tried grasps that ended alike in simulation and on the robot\n"
-        "infeasible: images without a grasp, or whose best one the arm cannot execute; failures\n"
+        "infeasible: images without a grasp, or whose best one is out of reach or collides;"
+        " failures\n"
         "open: still to be tried; until then in brackets the range that they leave open"
     )
     head = ("method", "rendered", "simulated", "robot", "agree", "tried", "infeasible", "open")
@@ -206,7 +207,7 @@ def _settings_text(result: BenchmarkResult) -> str:
         *(["depth only"] if known.depth_only else []),
         *([f"settled by {known.settled}"] if known.settled else []),
         *([str(known.conditions)] if known.conditions.changes else []),
-        *(["images of a real camera"] if known.images else []),
+        *([f"images {known.images[:8]} of a real camera"] if known.images else []),
     ]
     return "".join(f", {part}" for part in parts)
 

@@ -20,7 +20,7 @@ from burg_drake.evaluation import (
     sample_grasps,
     scored_set,
 )
-from burg_drake.grasping import HandClearance
+from burg_drake.grasping import HandClearance, jaws_of
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.station import (
     DEFAULT_ENGINE,
@@ -151,10 +151,15 @@ def _clear_grasps(
 ) -> GraspSet:
     """Antipodal grasps at which the open hand is clear; more are sampled where few are clear."""
     few = 20
+    # Flat objects are clear of the table only where the tips of the fingers hold them.
+    tip = jaws_of(station.hand, station.hand_model, station.packages).z[1]
     clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
     X_WS = station.document.X_WS.matrix()
     settings = SamplingSettings(
-        blind=True, approach_angle_deg=sampling.approach_angle_deg, approaches=2
+        blind=True,
+        approach_angle_deg=sampling.approach_angle_deg,
+        approaches=2,
+        standoffs=(0.0, 0.45 * tip, 0.9 * tip),
     )
     parts: list[GraspSet] = []
     for n in sampling.counts:

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from burg_drake.benchmark.answers import (
+    OTHER_ENTRIES,
     POSE_ENTRIES,
     AnsweredPoses,
     AnswerError,
@@ -602,4 +603,6 @@ def _matrix_text(X: Array) -> str:
 
 
 def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] if not text.startswith("X_") else text
+    """A message as a sentence; it may begin with the name of an entry."""
+    begins_with_entry = text.split(maxsplit=1)[0] in (*POSE_ENTRIES, *OTHER_ENTRIES)
+    return text if begins_with_entry else text[:1].upper() + text[1:]

@@ -189,10 +189,15 @@ def _open_function(reference: str, time_limit: float, *, show_output: bool) -> _
 
 
 def _unknown_planner(reference: str) -> UnknownNameError:
-    if reference.endswith(".py"):
+    file = reference if reference.endswith(".py") else f"{reference}.py"
+    if file == reference or Path(file).is_file():
         return UnknownNameError(
-            f"planner {reference} names no function; give {reference}:plan, or whatever the"
-            " function is called"
+            f"planner {reference} names no function; give {file}:plan, or whatever the function is"
+            " called"
+        ).about("planner")
+    if reference.startswith("http://"):
+        return UnknownNameError(
+            f"planner {reference} is no websocket; give ws://{reference.removeprefix('http://')}"
         ).about("planner")
     return UnknownNameError(
         f"planner {quote_value(reference)} is unknown; {suggest_names(reference, BUILTIN_PLANNERS)}"
@@ -239,14 +244,13 @@ class GraspPlanner(abc.ABC):
             answer = self._answer(observation, scene, station)
         except TimeoutError as error:
             raise PlannerError(
-                f"planner {self.reference}, observation {observation.id[:12]}: no answer within"
-                f" {self._time_limit:g} s, {self.limit_source}; make it faster, or give it more"
+                f"planner {self.reference}: no answer within {self._time_limit:g} s,"
+                f" {self.limit_source}; make it faster, or give it more"
                 f" time{clean_text(self._last_output(), 500)}"
             ) from error
         except _AnswerFailure as error:
             raise PlannerError(
-                f"planner {self.reference}, observation {observation.id[:12]}:"
-                f" {clean_text(f'{error}{self._last_output()}', 1000)}"
+                f"planner {self.reference}: {clean_text(f'{error}{self._last_output()}', 1000)}"
             ) from error
         if answer.get("time") is None:
             answer["time"] = time.perf_counter() - begun
@@ -381,7 +385,7 @@ class _FunctionPlanner(GraspPlanner):
         except WorkerDied as error:
             if time.monotonic() - begun >= self._time_limit:
                 raise TimeoutError from error
-            raise _AnswerFailure(f"it crashed: {error}") from error
+            raise _AnswerFailure(f"it crashed; {error}") from error
         except TaskCancelled as error:
             raise _AnswerFailure(f"it was closed meanwhile: {error}") from error
         except TimeoutError:

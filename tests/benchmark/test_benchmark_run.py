@@ -43,7 +43,7 @@ from tests.benchmark.can_scenes import cans
 from tests.benchmark.judged import COLLIDES, LIFTED, SLIPPED, judged, result
 from tests.benchmark.scripted_planners import grasp_in_scene
 
-pytestmark = pytest.mark.physics
+pytestmark = [pytest.mark.physics, pytest.mark.usefixtures("benchmarked_here")]
 
 thorough = pytest.mark.thorough
 PLANNERS = "tests.benchmark.scripted_planners"

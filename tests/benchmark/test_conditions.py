@@ -16,13 +16,13 @@ from burg_drake.benchmark import (
     condition_effects,
 )
 from burg_drake.core import FieldError
-from burg_drake.scene import load_scene
 from burg_drake.station import load_station
+from tests.benchmark.can_scenes import cans
 from tests.benchmark.judged import LIFTED, SLIPPED, judged, result
 
 
 def observed(conditions: Conditions | None = None, **camera: object) -> Observation:
-    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    scene, station = cans("can", (0.3, 0.2)), load_station("panda_tabletop")
     placed = replace(CameraPlacement().camera(scene.board), color=False, size=(212, 120), **camera)
     return placed.scene_camera(conditions).observe(scene, station)
 

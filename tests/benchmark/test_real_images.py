@@ -153,6 +153,7 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Suite:
 
 
 @pytest.mark.physics
+@pytest.mark.usefixtures("benchmarked_here")
 def test_the_same_planner_on_rendered_images_on_photographs_and_on_the_robot(
     suite: Suite, tmp_path: Path
 ) -> None:
