@@ -124,12 +124,13 @@ class BenchmarkDocument:
 
     def differences(self, other: BenchmarkDocument) -> list[str]:
         """Differences of two requests in words; `self` is in the folder, `other` is asked for."""
-        names = ["name", "planner", "suite", "suite_hash", "protocol", "split", "depth_only"]
+        names = ["planner" if self.planner != other.planner else "name"]
+        names += ["suite", "suite_hash", "protocol", "split", "depth_only"]
         names += ["conditions", "images"]
         if self.protocol == "clear":  # verdicts decide how a scene goes on
             names.append("settled")
         return [
-            f"{name.replace('_', ' ')} is {getattr(self, name) or 'none'} there,"
+            f"{name.replace('_', ' ')}: {getattr(self, name) or 'none'} there,"
             f" {getattr(other, name) or 'none'} here"
             for name in names
             if getattr(self, name) != getattr(other, name)

@@ -235,19 +235,19 @@ def _require_own_folder(folder: Path, document: BenchmarkDocument) -> None:
         differences = recorded.differences(document)
         if differences:
             raise InvalidInputError(
-                f"{folder} already holds another benchmark ({'; '.join(differences)}); choose"
-                " another folder, or delete it"
+                f"{folder} already holds another benchmark ({'; '.join(differences)}); delete"
+                " it, or choose another folder"
             ).about("folder")
         if recorded.planner_content not in ("", document.planner_content):
             raise InvalidInputError(
                 f"planner {document.planner} has changed since the benchmark in {folder} began"
-                f" ({recorded.planner_content} there, {document.planner_content} here); choose"
-                " another folder, or delete it"
+                f" ({recorded.planner_content} there, {document.planner_content} here); delete"
+                " it, or choose another folder"
             ).about("folder")
     elif {path.name for path in folder.iterdir()} - {SUITE_FILE, ANSWERS_FOLDER}:
         raise InvalidInputError(
-            f"{folder} is not empty, but has no benchmark ({BENCHMARK_FILE} is missing); choose"
-            " another folder, or delete it"
+            f"{folder} is not empty, but has no benchmark ({BENCHMARK_FILE} is missing); delete"
+            " it, or choose another folder"
         ).about("folder")
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from burg_drake.benchmark.benchmark_folder import BenchmarkResult, JudgedAnswer
+from burg_drake.benchmark.benchmark_folder import BENCHMARK_FILE, BenchmarkResult, JudgedAnswer
 from burg_drake.benchmark.measures import BenchmarkMeasure, measure_all, precision_at, trial_ap
-from burg_drake.core import Array, InvalidInputError, list_names
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.experiment import holm_correction
 
 SIGNIFICANCE_LEVEL = 0.05
@@ -230,10 +231,11 @@ def _require_comparable(results: Sequence[BenchmarkResult]) -> None:
                     f" in {other.path} (suite {other.document.suite}); only results of the same"
                     " version of a suite and of the same settings can be compared"
                 )
-    names = [one.document.name for one in results]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InvalidInputError(
-            f"several results are called {list_names(repeated)}; give each method a name of its own"
-            " when it is run"
-        )
+    paths: dict[str, Path] = {}
+    for one in results:
+        path = paths.setdefault(one.document.name, one.path)
+        if path is not one.path:
+            raise InvalidInputError(
+                f"{path} and {one.path} are both called {one.document.name}; change the name in"
+                f" one {BENCHMARK_FILE}"
+            )

@@ -414,12 +414,19 @@ class _PlannerSearch:
             (700.0, 2000.0, "in millimetres", "width / 1000.0"),
             (70.0, 200.0, "in centimetres", "width / 100.0"),
         )
-        return [
+        problems = [
             f"The widths are {words}, at {count} of the {len(ratios)} grasps that touch an object."
             f" Correct it like this:\n    width = {line}"
             for low, high, words, line in units
             if (count := int(((low < ratios) & (ratios < high)).sum())) >= 0.8 * len(ratios)
         ]
+        median = float(np.median(ratios))
+        if not problems and not 0.35 < median < 3.0:
+            problems.append(
+                f"The widths are {median:.2g} times the distance between the object's two sides, at"
+                " the median grasp; return that distance in metres."
+            )
+        return problems
 
     @cached_property
     def _as_returned(self) -> dict[str, GraspSet]:

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from burg_drake.benchmark.burg_planner import Observation
 from burg_drake.benchmark.observing import make_observation
 from burg_drake.cameras import (
@@ -23,7 +25,14 @@ from burg_drake.cameras import (
     read_depth,
     read_image,
 )
-from burg_drake.core import Array, Bytes, InvalidInputError, UnknownNameError, suggest_names
+from burg_drake.core import (
+    Array,
+    Bytes,
+    InvalidInputError,
+    Single,
+    UnknownNameError,
+    suggest_names,
+)
 from burg_drake.formats import read_poses
 from burg_drake.scene import Scene
 from burg_drake.station import Station
@@ -117,8 +126,9 @@ class RealImages:
             color: whether the planner gets the colours.
 
         Raises:
-            InvalidInputError: an image is missing or has another size than the intrinsics, or the
-                board is not seen and there is no pose of the camera; the message names the file.
+            InvalidInputError: an image is missing or has another size than the intrinsics, the
+                board is not seen and there is no pose of the camera, or the depth cannot be that of
+                the board; the message names the file.
         """
         depth_path, color_path = self._depth_path(scene.name), self._color_path(scene.name)
         depth = read_depth(depth_path, self.depth_unit)
@@ -132,6 +142,7 @@ class RealImages:
                 " planner depth only"
             ).about("images")
         X_SC = self._camera_pose(scene, image)
+        self._require_plausible_depth(depth, X_SC, depth_path)
         straight = Undistortion(self.intrinsics)
         return make_observation(
             scene,
@@ -141,6 +152,21 @@ class RealImages:
             depth=straight.depth(depth),
             color=straight.color(image) if color and image is not None else None,
         )
+
+    def _require_plausible_depth(self, depth: Single, X_SC: Array, path: Path) -> None:
+        """Refuses depth (H, W) in another unit: what a camera sees of a board is little nearer than
+        the plane of the board."""
+        K = self.intrinsics.K
+        height, width = depth.shape
+        x, y = (np.arange(width) - K[0, 2]) / K[0, 0], (np.arange(height) - K[1, 2]) / K[1, 1]
+        fall = -(X_SC[2, 0] * x + X_SC[2, 1] * y[:, None] + X_SC[2, 2])  # of a ray, by depth
+        seen = (depth > 0.0) & (fall > 0.05)
+        ratio = np.median(depth[seen] * fall[seen] / X_SC[2, 3]) if seen.any() else 1.0
+        if not 0.3 < ratio < 3.0:
+            raise InvalidInputError(
+                f"{path}: the depth is {ratio:.2g} times the distance of the board; give its unit"
+                " in metres, or correct the pose of the camera"
+            ).about("depth_unit")
 
     def _camera_pose(self, scene: Scene, image: Bytes | None) -> Array:
         """(4, 4) pose of the camera in the scene frame."""

@@ -77,7 +77,7 @@ def test_serve_answers_until_ctrl_c(tmp_path: Path) -> None:
                 answer = planner.plan(observation())
                 assert np.array_equal(answer["X_CG"], observation().X_WC[None])
                 assert answer["observation"] == observation().id
-                with pytest.raises(RuntimeError, match="it crashed: the worker process ended: exi"):
+                with pytest.raises(RuntimeError, match="it crashed; the worker process ended: exi"):
                     planner.plan(observation(2))
                 last = planner.plan(observation())
                 assert last["pid"] not in (answer["pid"], process.pid)

@@ -30,7 +30,7 @@ class PoolHere(Executor):
 
 @pytest.fixture(scope="module")
 def benchmarked_here(judged_here: None) -> Iterator[None]:
-    """Benchmarks with one worker render, store and judge in this process; the planner has its own."""
+    """Benchmarks with one worker render, store and judge in this process; planners have theirs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "burg_drake.benchmark.benchmark_run.WorkerPool",

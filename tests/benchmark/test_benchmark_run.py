@@ -206,7 +206,7 @@ def test_slippery_objects_are_not_lifted_whatever_camera_sees_them(
     own = burg.load_library("household").entry("can").friction
     assert campaign.run("two").results["friction"] == pytest.approx(0.05 * own)
     assert not verify_result(found, count=1, workers=1, progress=False).differing
-    with pytest.raises(InvalidInputError, match=r"conditions is friction x 0\.05 there"):
+    with pytest.raises(InvalidInputError, match=r"conditions: friction x 0\.05 there"):
         run_benchmark(pair, f"{PLANNERS}:plan_cans", found.path, settings=DEPTH)
 
 
@@ -272,7 +272,7 @@ def test_failures_with_different_outcomes_are_replayed_first() -> None:
 
 
 def test_another_benchmark_in_the_folder_is_refused(cleared: BenchmarkResult, suite: Suite) -> None:
-    with pytest.raises(InvalidInputError, match="protocol is clear there, single here"):
+    with pytest.raises(InvalidInputError, match="protocol: clear there, single here"):
         run_benchmark(
             suite, f"{PLANNERS}:plan_cans", cleared.path, settings=replace(DEPTH, name="cans")
         )

@@ -66,7 +66,7 @@ def test_several_versions_are_noted() -> None:
     ("other", "message"),
     [
         (made("b", 3, suite_hash="1" * 16), "version is 0{16} in nowhere/a .* but 1{16}"),
-        (made("a", 3), "several results are called a"),
+        (made("a", 3), "nowhere/a and nowhere/a are both called a; change the name in one bench"),
     ],
 )
 def test_results_that_do_not_compare_are_refused(other: object, message: str) -> None:

@@ -153,9 +153,7 @@ def test_a_function_fails_in_any_way_and_is_asked_again(folder: Path) -> None:
         for target, message in stays.items():
             with pytest.raises(PlannerError, match=message) as raised:
                 planner.ask(observation(target))
-            assert str(raised.value).startswith(
-                "planner own_planners:plan: it raised"
-            )
+            assert str(raised.value).startswith("planner own_planners:plan: it raised")
             assert "\n" not in str(raised.value)
         assert answers()["pid"] == first["pid"]
         dies = {
@@ -222,7 +220,7 @@ def test_files_and_methods_of_objects(
     ("reference", "kind", "message"),
     [
         ("antipodl", UnknownNameError, "'antipodl' is unknown; did you mean 'antipodal'? Known: "),
-        ("http://localhost:9000", UnknownNameError, "is unknown; known: antipodal, "),
+        ("http://localhost:9000", UnknownNameError, "give ws://localhost:9000"),
         ("", UnknownNameError, "planner '' is unknown; known: antipodal, "),
         (":plan", UnknownNameError, "is unknown"),
         ("own_planners:", UnknownNameError, "is unknown"),

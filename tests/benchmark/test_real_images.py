@@ -114,6 +114,11 @@ def other_size(folder: Path) -> None:
     (folder / "six.depth.png").unlink()
 
 
+def tenths_of_millimetres(folder: Path) -> None:
+    path = folder / "six.depth.png"
+    cv2.imwrite(str(path), 10 * cv2.imread(str(path), cv2.IMREAD_UNCHANGED))
+
+
 def no_board(folder: Path) -> None:
     cv2.imwrite(str(folder / "six.png"), np.full((480, 640, 3), 90, np.uint8))
 
@@ -125,6 +130,10 @@ def no_board(folder: Path) -> None:
         (remove("intrinsics.yaml"), r"intrinsics.yaml does not exist"),
         (remove("six.png"), r"six.png does not exist; add the colour image"),
         (other_size, r"six.depth.npy.* 100 x 100"),
+        (
+            tenths_of_millimetres,
+            r"six.depth.png: the depth is 10 times the distance of the board; give its unit",
+        ),
         (no_board, r"six.png: the camera's pose cannot be measured on the board: .*camera.yaml"),
         (lambda f: (f / "six.png").write_bytes(b"no image"), "six.png cannot be read"),
         (lambda f: (f / "sex.depth.png").touch(), "sex.depth.png: the suite has no scene 'sex'"),
@@ -218,7 +227,7 @@ def test_the_same_planner_on_rendered_images_on_photographs_and_on_the_robot(
     table = all_tables(compare_by_suite([rendered, real]), [done])[-1]
     assert table.title == "Simulation and robot" and table.rows[0][4:] == ("50", "2", "1", "0")
 
-    with pytest.raises(InvalidInputError, match=r"images is .* there, none here"):
+    with pytest.raises(InvalidInputError, match=r"images: .* there, none here"):
         run_benchmark(suite, planner, real.path, settings=settings)
     slippery = replace(sheet, trials=())
     with pytest.raises(InvalidInputError, match="none of the best grasps"):

@@ -156,7 +156,7 @@ def add_benchmark_run_options(parser: options.Parser) -> None:
 
 
 def run_benchmark_run(arguments: argparse.Namespace) -> int:
-    """Benchmarks a planner; returns 1 if scenes could not be judged."""
+    """Benchmarks a planner; returns 1 if scenes could not be judged, or no answer has grasps."""
     if arguments.depth_unit is not None and arguments.images is None:
         raise core.InvalidInputError("--depth-unit is for --images; add it")
     core.resolve_reference(arguments.suite, benchmark.SUITE_FOLDER)  # a wrong name is told at once
@@ -178,8 +178,9 @@ def run_benchmark_run(arguments: argparse.Namespace) -> int:
         )
     _print_tables(benchmark.compare_by_suite([result]))
     times = result.document.times
+    seeing = "reading" if arguments.images else "rendering"
     print(
-        f"time      {core.format_duration(times.total)}: rendering"
+        f"time      {core.format_duration(times.total)}: {seeing}"
         f" {core.format_duration(times.rendering)}, planner {core.format_duration(times.planning)},"
         f" trials {core.format_duration(times.judging)}"
     )
@@ -197,14 +198,15 @@ def _report_failures(result: benchmark.BenchmarkResult) -> int:
     failed: dict[str, list[str]] = {}
     for one in answers:
         if one.error:
-            text = one.error.replace(one.observation[:12], "OBSERVATION")
-            failed.setdefault(text, []).append(one.scene)
+            failed.setdefault(one.error, []).append(one.scene)
     for text, scenes in list(failed.items())[:max_lines]:
         where = scenes[0] if len(scenes) == 1 else f"{len(scenes)} images, such as {scenes[0]}"
         print_remark(f"{where}: {text}")
     if len(failed) > max_lines:
         print_remark(f"and {len(failed) - max_lines} other errors of the planner")
-    if failed:
+    if failed and result.document.images:
+        print_remark("images of a camera have no segmentation, which rendered ones have")
+    elif failed:
         planner = shlex.quote(result.document.planner)
         print_remark(f"to try the planner alone: burg-drake planner check {planner}")
     notes = Counter(note for one in answers for note in one.notes)
@@ -213,6 +215,9 @@ def _report_failures(result: benchmark.BenchmarkResult) -> int:
     unjudged = {name: why for one in campaigns if one for name, why in one.failed.items()}
     for name, why in unjudged.items():
         print_remark(f"scene {name} could not be judged: {why}")
+    if not any(one.answered for one in answers):
+        print_remark("no answer has grasps")
+        return 1
     return 1 if unjudged else 0
 
 
@@ -239,6 +244,12 @@ def run_benchmark_trials(arguments: argparse.Namespace) -> int:
     count = core.count_with_noun(len(sheet.trials), "trial")
     scenes = len({run.scene.content for run in sheet.runs.values()})
     print(f"wrote {arguments.output}: {count} on {core.count_with_noun(scenes, 'scene')}")
+    left_out = sum(answer.executed != 0 for result in results for answer in result.answers)
+    if left_out:
+        print(
+            f"{core.count_with_noun(left_out, 'image')} without a grasp, or whose best one is out"
+            " of reach or collides, will count as failures"
+        )
     return 0
 
 
@@ -278,6 +289,9 @@ def run_benchmark_compare(arguments: argparse.Namespace) -> int:
         )
         benchmark.write_leaderboard(comparisons, page, extras=extras)
         print(f"wrote {page}")
+        if extras.replays:
+            folders = {str(replay.parent) for replay in extras.replays.values()}
+            print(f"wrote {', '.join(sorted(folders))}: replays that the page opens")
     return 0
 
 
@@ -504,7 +518,8 @@ def _add_results(parser: Any) -> None:
 
 def _complete_results(folders: Sequence[str]) -> list[benchmark.BenchmarkResult]:
     """Results in folders, without those that were interrupted, which are named."""
-    results = [benchmark.load_result(folder) for folder in folders]
+    given = {Path(folder).resolve(): folder for folder in folders}
+    results = [benchmark.load_result(folder) for folder in given.values()]
     complete = [result for result in results if result.document.complete]
     if not complete and results:
         results[0].require_complete()

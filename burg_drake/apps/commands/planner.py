@@ -81,12 +81,12 @@ def _open_planner(arguments: argparse.Namespace) -> GraspPlanner:
 
 
 def _print_check(name: str, found: PlannerCheck) -> None:
-    took = f", planned in {core.format_duration(found.time)}" if math.isfinite(found.time) else ""
+    took = f", {core.format_duration(found.time)} in all" if math.isfinite(found.time) else ""
     fitting, tried = found.fits
-    grasps = core.count_with_noun(found.count, "grasp")
+    grasps = f"{core.count_with_noun(found.count, 'grasp')} in " if found.count else ""
     images = core.count_with_noun(found.images, "image")
-    print(f"{name}: {grasps} in {images} of a carton and a can{took}")
-    if tried:
+    print(f"{name}: {grasps}{images} of a carton and a can{took}")
+    if tried and not found.problems:
         print(
             f"  {fitting} of {tried} fit as returned: the open hand is clear of the object, and its"
             " pads close on it"
