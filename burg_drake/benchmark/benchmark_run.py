@@ -312,6 +312,12 @@ class _BenchmarkCall:
         grasps = round.stored_grasps()
         if not grasps.count:
             return
+
+        def show(event: Progress) -> None:
+            # The run learns of the grasps of a scene when it begins with it.
+            is_judging = event.phase == "judging"
+            self.reporter.show(replace(event, total=grasps.count) if is_judging else event)
+
         campaign = evaluate(
             list(scenes.values()),
             self.suite.station,
@@ -321,7 +327,7 @@ class _BenchmarkCall:
                 mode=self.suite.document.mode, engine=self.suite.document.engine
             ),
             executor=self.executor,
-            progress=self.reporter.show,
+            progress=show,
         )
         if settle:
             judge_again(

@@ -112,6 +112,7 @@ def test_a_complete_result_is_not_asked_for_again(cleared: BenchmarkResult, suit
         suite, f"{PLANNERS}:plan_cans", cleared.path, settings=settings, workers=1, progress=False
     )
     assert written(again.path) == before and outcomes(again) == outcomes(cleared)
+    assert again.document.times == cleared.document.times
 
 
 def test_results_can_be_shared_and_verified(cleared: BenchmarkResult, tmp_path: Path) -> None:
@@ -152,15 +153,14 @@ def test_a_changed_answer_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -
         verify_result(copy, count=1, workers=1, progress=False)
 
 
-def test_a_planner_that_always_fails_has_a_result(suite: Suite, tmp_path: Path) -> None:
-    found = run_benchmark(
-        suite,
-        f"{PLANNERS}:plan_nothing",
-        tmp_path / "result",
-        settings=DEPTH,
-        workers=1,
-        progress=False,
-    )
+def test_a_planner_that_always_fails_has_a_result(
+    suite: Suite, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "result"
+    options = ["--planner", f"{PLANNERS}:plan_nothing", "--depth-only", "--workers", "1", "--quiet"]
+    assert main(["benchmark", "run", str(suite.path), *options, "-o", str(folder)]) == 1
+    assert capsys.readouterr().err.endswith("burg-drake: no answer has grasps\n")
+    found = load_result(folder)
     assert all("KeyError" in one.answer.error for one in found.answers)
     measures = measure_all(found)
     assert measures["answered"].value == measures["top_success"].value == 0.0

@@ -220,6 +220,7 @@ def test_files_and_methods_of_objects(
     ("reference", "kind", "message"),
     [
         ("antipodl", UnknownNameError, "'antipodl' is unknown; did you mean 'antipodal'? Known: "),
+        ("ends", UnknownNameError, "planner ends names no function; give ends.py:plan, or"),
         ("http://localhost:9000", UnknownNameError, "give ws://localhost:9000"),
         ("", UnknownNameError, "planner '' is unknown; known: antipodal, "),
         (":plan", UnknownNameError, "is unknown"),
