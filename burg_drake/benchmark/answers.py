@@ -178,6 +178,7 @@ def pose_array(value: Any, entry: str) -> Array:
     advice = {
         (4, 4): "put a single pose into an array of shape (1, 4, 4)",
         (3, 4): "add the row 0 0 0 1 to each pose",
+        (17,): "rows of GraspNet have position and rotation in columns 13-15 and 4-12",
         (16,): f"{entry}.reshape(-1, 4, 4) makes matrices of the rows",
         (7,): "make matrices of positions and quaternions",
         (6,): "make matrices of positions and rotation vectors or angles",
@@ -306,7 +307,7 @@ def _read_frame(value: Any) -> GraspFormat:
     """The format with the grasp frame that an answer names; ours if it names none."""
     name = "burg_drake" if value is None else _plain(value)
     if not isinstance(name, str) or name not in GRASP_FORMATS:
-        hint = suggest_names(quote_value(name), GRASP_FORMATS)
+        hint = suggest_names(quote_value(name).strip("'").lower(), GRASP_FORMATS)
         raise AnswerError(
             f"frame {quote_value(name)} of the answer is not the grasp frame of a project; {hint}"
         )

@@ -9,7 +9,7 @@ RESULT/trials/                   run over all scenes, as `evaluate` writes it
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -275,18 +275,21 @@ class JudgedAnswer:
         Args:
             contested_as: what contested verdicts count as; what they say if None.
         """
-        return np.array(
-            [
-                v is not None
-                and (
-                    contested_as
-                    if v.contested and contested_as is not None
-                    else v.outcome is Outcome.LIFTED
-                )
-                for v in self.verdicts
-            ],
-            dtype=float,
-        )
+        return self._shares(lambda outcome: outcome is Outcome.LIFTED, contested_as)
+
+    def held(self, *, contested_as: bool | None = None) -> Array:
+        """(N,) whether each grasp held its object to the end, 0 or 1; see `lifted`."""
+        return self._shares(lambda outcome: outcome.held, contested_as)
+
+    def _shares(self, holds: Callable[[Outcome], bool], contested_as: bool | None) -> Array:
+        """(N,) whether something holds of the outcome of each grasp, 0 or 1."""
+        found = []
+        for verdict in self.verdicts:
+            if verdict is not None and verdict.contested and contested_as is not None:
+                found.append(contested_as)
+            else:
+                found.append(verdict is not None and holds(verdict.outcome))
+        return np.array(found, dtype=float)
 
 
 def _is_executed(verdict: Verdict | None) -> bool:

@@ -24,7 +24,7 @@ observation from a file and writes the answer to another.
 - `X_CG`: (N, 4, 4) grasps in the camera's frame; or `X_WG` in the world, or `X_SG` in the scene.
 - `score`: (N,) higher is better. Without it the first grasp is the best.
 - `width`: (N,) distance between the object's two sides along the closing direction [m].
-- `frame`: the frame G of the poses, by the name of a project, such as `acronym` or `graspnet`
+- `frame`: the frame G of the poses, by the name of a project, such as `acronym` or `vgn`
   (`burg-drake frames` lists them). Without it: origin midway between the finger pads, z along the
   approach, x along the closing direction.
 - `time`: time that planning took [s], if the time around the call of the function is not right.
@@ -176,6 +176,8 @@ def plain_value(name: str, value: Any) -> Any:
         array = np.asarray(value)
     except Exception as error:  # lists of different lengths, tensors on a graphics card
         raise TypeError(f"{name} cannot be made an array: {error}") from error
+    if array.dtype.kind == "f" and array.dtype.itemsize > 8:  # which few readers know
+        array = array.astype(float)
     if array.ndim == 0 and array.dtype.kind == "U":
         return str(array)
     if array.dtype.kind not in ARRAY_KINDS:
@@ -285,7 +287,11 @@ def _unpack_array(dtype: Any, shape: Any, data: Any) -> Any:
 
 def describe_error(error: BaseException) -> str:
     """An error of a planner as one line: its type, its message, and the line of the planner."""
-    text = f"{type(error).__name__}: {' '.join(str(error).split())}".rstrip(": ")
+    try:
+        message = " ".join(str(error).encode(errors="replace").decode().split())
+    except Exception:  # of anybody's class of errors
+        message = ""
+    text = f"{type(error).__name__}: {message}".rstrip(": ")
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         if not (frame.filename.startswith("<") or frame.filename == __file__) and (
             "/lib/python3" not in frame.filename
@@ -357,15 +363,17 @@ class RemotePlanner:
                 ping_interval=None,
                 proxy=None,
             )
-        except WebSocketException as error:
+        except (WebSocketException, ValueError) as error:
             raise ValueError(f"{self.url} is not a planner: {error}") from error
         except TimeoutError as error:
             raise ConnectionError(f"no connection within {connect_timeout:g} s") from error
         try:
             try:
-                greeting = self._exchange(None, connect_timeout)
+                # It may still work on an observation of which the answer was not waited for.
+                patience = max(connect_timeout, self.timeout)
+                greeting = self._exchange(None, patience)
             except TimeoutError as error:
-                raise ConnectionError(f"no greeting within {connect_timeout:g} s") from error
+                raise ConnectionError(f"no greeting within {patience:g} s") from error
             if greeting.get("protocol") != PROTOCOL_NAME:
                 raise ValueError(f"{self.url} is not a planner: it sends no {PROTOCOL_NAME!r}")
             if greeting.get("version") != PROTOCOL_VERSION:
@@ -433,14 +441,14 @@ def serve(plan: PlanFunction, port: int, host: str = "127.0.0.1", name: str = ""
     from websockets.sync.server import ServerConnection, serve as serve_websocket
 
     name = name or getattr(plan, "__name__", "planner")
+    greeting = {"protocol": PROTOCOL_NAME, "version": PROTOCOL_VERSION, "name": name}
     questions: queue.SimpleQueue[tuple[ServerConnection, Any, Any]] = queue.SimpleQueue()
 
     def talk(client: ServerConnection) -> None:
         replies: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         try:
-            client.send(
-                pack_message({"protocol": PROTOCOL_NAME, "version": PROTOCOL_VERSION, "name": name})
-            )
+            questions.put((client, None, replies))  # greet it when the planner is free
+            client.send(replies.get())
             for data in client:
                 questions.put((client, data, replies))
                 client.send(replies.get())
@@ -461,13 +469,13 @@ def serve(plan: PlanFunction, port: int, host: str = "127.0.0.1", name: str = ""
         print(f"planner {name} listens on ws://{shown}:{listening}", flush=True)
         try:
             while True:
-                _answer_next(plan, questions)
+                _answer_next(plan, questions, greeting)
         finally:
             server.shutdown()
 
 
-def _answer_next(plan: PlanFunction, questions: Any) -> None:
-    """Waits a moment for an observation, and answers it."""
+def _answer_next(plan: PlanFunction, questions: Any, greeting: Mapping[str, Any]) -> None:
+    """Waits a moment for a new client, and greets it, or for an observation, and answers it."""
     try:
         # A wait without end could not be interrupted.
         client, data, replies = questions.get(timeout=0.5)
@@ -476,12 +484,15 @@ def _answer_next(plan: PlanFunction, questions: Any) -> None:
     if client.close_code is not None:  # it did not wait for the answer
         replies.put(b"")
         return
+    if data is None:
+        replies.put(pack_message(greeting))
+        return
     try:
         observation = Observation.from_arrays(unpack_message(data))
         reply = pack_message(answer_observation(plan, observation))
         if len(reply) > MAX_ANSWER_BYTES:
             raise ValueError(f"the answer has {len(reply)} bytes; at most {MAX_ANSWER_BYTES}")
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         traceback.print_exc()
         reply = pack_message({"error": describe_error(error)})
     replies.put(reply)
@@ -506,10 +517,9 @@ def run(plan: PlanFunction, arguments: list[str] | None = None) -> None:
             sys.exit(130)
         except ImportError as error:
             sys.exit(f"{error}; --port needs: pip install msgpack websockets")
-        except OSError as error:
-            sys.exit(
-                f"cannot listen on port {given.port} of {given.host}: {error.strerror or error}"
-            )
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            sys.exit(f"cannot listen on port {given.port} of {given.host}: {reason}")
     elif len(given.files) == 2 and given.port is None:
         try:
             observation = Observation.from_arrays(read_arrays(given.files[0]))

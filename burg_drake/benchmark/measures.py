@@ -199,7 +199,7 @@ def _ratios(budget: int) -> dict[str, _Ratio]:
         "clear": per_grasp(_is_clear),
         "reachable": per_grasp(lambda v: _has_passed(v, Stage.REACHABLE)),
         "planned": per_grasp(lambda v: _has_passed(v, Stage.PLANNED)),
-        "held": per_grasp(lambda v: v.outcome.held),
+        "held": _Ratio(lambda a, c: float(a.held(contested_as=c).sum()), lambda a: len(a.verdicts)),
         "lifted": _Ratio(
             lambda a, c: float(a.lifted(contested_as=c).sum()), lambda a: len(a.verdicts)
         ),

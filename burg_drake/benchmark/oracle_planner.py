@@ -9,7 +9,7 @@ import numpy as np
 
 from burg_drake.benchmark.baselines import best_apart, make_answer
 from burg_drake.benchmark.burg_planner import Observation
-from burg_drake.core import Array, Booleans, GraspSet, Indices, Outcome, Stage
+from burg_drake.core import Array, Booleans, GraspSet, Outcome, Stage
 from burg_drake.evaluation import (
     INSTANCE_COLUMN,
     Candidate,
@@ -72,65 +72,85 @@ def oracle(observation: Observation, scene: SceneLike, station: StationLike) -> 
     names = list(scene.instances)
     if observation.target is not None:
         names = [names[observation.target - 1]]
-    lifted: list[tuple[Array, Array]] = []
+    lifted, width = np.empty((0, 4, 4)), np.empty(0)
     untried: list[tuple[Array, Array]] = []
     for sampling in SAMPLING_PASSES:
-        wanted = WANTED_GRASPS - sum(len(X_SG) for X_SG, _ in lifted)
-        if not names or wanted <= 0:
+        if not names or len(lifted) >= WANTED_GRASPS:
             break
         grasps = _clear_grasps(scene, station, names, sampling)
         if not len(grasps):
             continue
         grasps = scored_set(grasps, scene.library, station, scene)
         X_SG = _poses_in_scene(scene, grasps)
-        order = _best_of_each(grasps, X_SG, names)
-        for rows, found in zip(
-            _try_grasps(scene, station, grasps, order, wanted), (lifted, untried), strict=True
-        ):
-            found.append((X_SG[rows], grasps.width[rows]))
-    if not lifted and not untried:
-        return make_answer(observation)
-    X, width = (np.concatenate(part) for part in zip(*lifted, *untried, strict=True))
+        rows, rest = _try_grasps(scene, station, grasps, X_SG, lifted)
+        lifted, width = np.concatenate([lifted, X_SG[rows]]), np.append(width, grasps.width[rows])
+        untried.append((X_SG[rest], grasps.width[rest]))
+    X = np.concatenate([lifted, *(poses for poses, _ in untried)])
+    width = np.concatenate([width, *(widths for _, widths in untried)])
     return make_answer(observation, X, width, -np.arange(float(len(X))))
 
 
-def _best_of_each(grasps: GraspSet, X_SG: Array, names: list[str]) -> list[list[int]]:
-    """For each object, rows of its grasps that are apart, the best first; those that do not bear
-    its weight come last."""
-    quality, firm = _quality(grasps)
-    owner = grasps.column(INSTANCE_COLUMN)
-    found = []
-    for name in names:
-        rows = np.flatnonzero(owner == name)
-        rows = rows[best_apart(X_SG[rows], quality[rows])]
-        found.append(rows[np.argsort(~firm[rows], kind="stable")].tolist())
-    return found
-
-
 def _try_grasps(
-    scene: Scene, station: Station, grasps: GraspSet, rows: list[list[int]], wanted: int
-) -> tuple[Indices, Indices]:
-    """Rows of grasps that lift their object, as the benchmark judges, until `wanted` have done so;
-    and rows that were not tried. The object whose grasps succeed most often is tried next."""
-    max_executed = 30
+    scene: Scene, station: Station, grasps: GraspSet, X_SG: Array, lifted: Array
+) -> tuple[list[int], list[int]]:
+    """Tries grasps, as the benchmark judges them, until enough have lifted their object.
+
+    The best grasps of each object that are apart come first, then others; none near one that has
+    lifted. The object whose grasps succeed most often is tried next.
+
+    Args:
+        scene, station: where they are tried.
+        grasps: (N,) scored grasps.
+        X_SG: (N, 4, 4) their poses in the scene.
+        lifted: (K, 4, 4) poses of other grasps that have lifted their object.
+
+    Returns:
+        Rows of the grasps that lifted, and of others, apart from them, that were not tried.
+    """
+    max_executed, max_tried = 30, 100
     judge = build_judge(
         scene, station, engine=as_engine(DEFAULT_ENGINE), mode=mode_for(station, None)
     )
-    lifted: list[int] = []
-    left, successes, tried = [list(own) for own in rows], [0] * len(rows), [0] * len(rows)
-    executed = 0
-    while any(left) and len(lifted) < wanted and executed < max_executed:
-        open_objects = [k for k, own in enumerate(left) if own]
-        best = max(open_objects, key=lambda k: (successes[k] + 1) / (tried[k] + 1))
+    quality, firm = _quality(grasps)
+    owner = grasps.column(INSTANCE_COLUMN)
+    names = np.unique(owner).tolist()
+    is_open = np.ones(len(grasps), dtype=bool)
+    found: list[int] = []
+
+    def open_rows(name: str) -> list[int]:
+        """Rows that were not tried and are apart, the best first; those that do not bear the
+        object's weight come last."""
+        rows = np.flatnonzero(is_open & (owner == name))
+        known = np.concatenate([lifted, X_SG[found]])
+        ahead = np.full(len(known), np.inf)
+        kept = best_apart(
+            np.concatenate([known, X_SG[rows]]), np.concatenate([ahead, quality[rows]])
+        )
+        rows = rows[kept[kept >= len(known)] - len(known)]
+        return [int(row) for row in rows[np.argsort(~firm[rows], kind="stable")]]
+
+    left = {name: open_rows(name) for name in names}
+    successes, tried, executed = dict.fromkeys(names, 0), dict.fromkeys(names, 0), 0
+    while (
+        len(lifted) + len(found) < WANTED_GRASPS
+        and executed < max_executed
+        and sum(tried.values()) < max_tried
+    ):
+        if not any(left.values()):
+            left = {name: open_rows(name) for name in names}
+            if not any(left.values()):
+                break
+        open_names = [name for name in names if left[name]]
+        best = max(open_names, key=lambda name: (successes[name] + 1) / (tried[name] + 1))
         row = left[best].pop(0)
+        is_open[row] = False
         verdict = judge_grasp(judge, _candidate(grasps, row))
         executed += verdict.stage is Stage.EXECUTED
         tried[best] += 1
         if verdict.outcome is Outcome.LIFTED:
             successes[best] += 1
-            lifted.append(row)
-    untried = list(itertools.chain(*left))
-    return np.array(lifted, dtype=np.intp), np.array(untried, dtype=np.intp)
+            found.append(row)
+    return found, list(itertools.chain(*left.values()))
 
 
 def _candidate(grasps: GraspSet, row: int) -> Candidate:

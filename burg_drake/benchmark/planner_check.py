@@ -224,6 +224,12 @@ def check_answers(answers: Sequence[Mapping[str, Any]], seen: CheckScene) -> Pla
     fits, found = search.examine()
     problems += far if found is None else [_problem(found, search.poses, seen)]
     problems += search.width_problems(found)
+    entries = sorted({one.poses.entry for one in readable if one.count and one.poses})
+    if len(entries) > 1:
+        problems.append(
+            f"Poses are in {' and '.join(entries)}, in different images; return the same entry for"
+            " all. Only those like the first ones were looked at."
+        )
     return replace(
         asked,
         count=count,
@@ -316,6 +322,8 @@ class _PlannerSearch:
                 X_MG.append(inverse(one.poses.X_SM) @ one.planned.X_SG[best])
                 width.append(one.planned.width[best])
         self._X_MG, self._width = np.concatenate(X_MG), np.concatenate(width)
+        _, first = np.unique(self._X_MG, axis=0, return_index=True)  # copies show nothing new
+        self._X_MG, self._width = self._X_MG[np.sort(first)], self._width[np.sort(first)]
 
     def examine(self) -> tuple[tuple[int, int], MistakeFound | None]:
         """Number of grasps that fit as returned and of those tried, and the mistake in poses."""
@@ -523,7 +531,7 @@ def _problem(found: MistakeFound, poses: AnsweredPoses, seen: CheckScene) -> str
     if found.alternatives:
         sentences.append(f"Equally many fit {' or '.join(found.alternatives)}.")
     names = _frame_names(found)
-    frame = f', or add "frame": "{names[0]}" to the answer' if names else ""
+    frame = f', or set "frame": "{names[0]}" in the answer' if names else ""
     line = _correction_line(found.mistake, poses, seen)
     return " ".join([*sentences, f"Correct it like this{frame}:\n    {line}"])
 

@@ -10,7 +10,6 @@ import abc
 import errno
 import importlib
 import importlib.util
-import math
 import os
 import re
 import shlex
@@ -66,6 +65,8 @@ if TYPE_CHECKING:
 
 LOADING_TIMEOUT = 300.0
 """Seconds to import a planner's module, with the models that it loads."""
+MAX_TIME_LIMIT = 1e6
+"""Largest time for an answer [s]."""
 SIGNAL_MARGIN = 5.0
 """Seconds after a limit until a worker is killed that the system's timer has not ended."""
 
@@ -153,9 +154,10 @@ def open_planner(
         PlannerError: the planner crashed while it was loaded, or no server answers.
         MissingDependencyError: the packages for websockets are missing.
     """
-    if not (math.isfinite(time_limit) and time_limit > 0.0):
+    if not 0.0 < time_limit <= MAX_TIME_LIMIT:
         raise InvalidInputError(
-            f"the time limit of a planner is {time_limit:g} s; give a finite time above 0"
+            f"the time limit of a planner is {time_limit:g} s; give a time above 0, at most"
+            f" {MAX_TIME_LIMIT:g} s"
         ).about("time_limit")
     if reference.startswith("command:"):
         opened: GraspPlanner = _CommandPlanner(reference, time_limit)
@@ -314,8 +316,8 @@ class _FunctionPlanner(GraspPlanner):
             why = f"{str(error) or 'it took too long'}{clean_text(self._last_output(), 500)}"
             self.close()
             raise PlannerError(
-                f"planner {self.reference} could not be loaded: {why}; import"
-                f" {loader.module} in Python to see why"
+                f"planner {self.reference} could not be loaded: {why}; to see why:"
+                f" {f'python {loader.path}' if loader.path else f'python -m {loader.module}'}"
             ).about("planner") from error
         except BaseException:
             self.close()
@@ -410,7 +412,8 @@ class _FunctionPlanner(GraspPlanner):
 class _CommandPlanner(GraspPlanner):
     def __init__(self, reference: str, time_limit: float) -> None:
         try:
-            self._words = shlex.split(reference.removeprefix("command:"))
+            words = shlex.split(reference.removeprefix("command:"))
+            self._words = [os.path.expanduser(word) for word in words]
         except ValueError as error:
             raise InvalidInputError(f"planner {reference}: {error}").about("planner") from error
         if not self._words:
@@ -462,8 +465,8 @@ class _CommandPlanner(GraspPlanner):
                 process = subprocess.Popen(
                     words,
                     stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=stream,
+                    stdout=stream,
+                    stderr=subprocess.STDOUT,
                     start_new_session=True,
                 )
         except OSError as error:

@@ -57,7 +57,7 @@ class Conditions:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
     RANGES: ClassVar[Ranges] = {
-        "depth_noise": (0.0, 100.0),
+        "depth_noise": (0.0, 10.0),
         "camera_shift": (0.0, 1.0),
         "camera_turn": (0.0, math.pi),
         "friction": (0.01, 100.0),
@@ -68,7 +68,7 @@ class Conditions:
         "standard deviations of depth, as a multiple of the sensor's",
         metavar="FACTOR",
         low=0,
-        high=100,
+        high=10,
     )
     camera_shift: float = setting(
         0.0,

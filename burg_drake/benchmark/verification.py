@@ -17,6 +17,7 @@ from burg_drake.benchmark.benchmark_folder import (
 )
 from burg_drake.benchmark.benchmark_run import with_friction_needed
 from burg_drake.benchmark.settings import VERIFIED_GRASPS
+from burg_drake.benchmark.suite import SuiteDocument
 from burg_drake.core import (
     GraspSet,
     InvalidInputError,
@@ -93,7 +94,7 @@ def verify_result(
     judged: dict[tuple[Path, str], float] = {}  # cameras may share a grasp
     for round in found.rounds:
         answers = found.judged_answers(round)
-        _require_consistent(round, answers)
+        _require_consistent(round, answers, found.suite)
         for one in answers:
             needed = one.answer.grasps.columns[FRICTION_COLUMN].tolist()
             for id, verdict, friction in zip(one.ids, one.verdicts, needed, strict=True):
@@ -115,8 +116,10 @@ def verify_result(
     return Verification(tuple(again), tuple(_version_notes(found)))
 
 
-def _require_consistent(round: Round, answers: Sequence[JudgedAnswer]) -> None:
-    """Refuses verdicts of other answers, and missing verdicts.
+def _require_consistent(
+    round: Round, answers: Sequence[JudgedAnswer], suite: SuiteDocument
+) -> None:
+    """Refuses verdicts of other answers or in another way, and missing verdicts.
 
     Raises:
         InvalidInputError: the message says which.
@@ -127,6 +130,13 @@ def _require_consistent(round: Round, answers: Sequence[JudgedAnswer]) -> None:
         raise InvalidInputError(
             f"{campaign.path}: the verdicts are not those of the answers, which have changed since"
         )
+    if campaign is not None:
+        judged = campaign.document.mode, campaign.document.engine.name
+        if judged != (suite.mode, suite.engine):
+            raise InvalidInputError(
+                f"{campaign.path}: the grasps were judged in mode {judged[0]} with engine"
+                f" {judged[1]}; the suite says {suite.mode} and {suite.engine}"
+            )
     failed = {} if campaign is None else campaign.failed
     for one in answers:
         if None in one.verdicts and one.answer.scene not in failed:

@@ -49,6 +49,12 @@ def plan(observation: Observation) -> dict:
         return None
     if observation.target == 5:
         time.sleep(0.5)
+    if observation.target == 6:
+        time.sleep(2.0)
+    if observation.target == 7:
+        raise ValueError("\\udcff")
+    if observation.target == 8:
+        sys.exit("enough")
     echo = {f"seen_{k}": np.copy(v) for k, v in observation.arrays().items()}
     observation.depth[:] = 0.0  # a planner may work in place
     return {**echo, "pid": os.getpid(), "modules": " ".join(sys.modules), "width": None,

@@ -134,6 +134,31 @@ def test_changed_friction_of_an_answer_is_noticed(cleared: BenchmarkResult, tmp_
     assert all("needed friction: " in one.text[-1] for one in found.differing)
 
 
+def test_verdicts_of_another_engine_are_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
+    copy = tmp_path / "other"
+    shutil.copytree(cleared.path, copy)
+    for run in copy.glob("**/campaign.yaml"):
+        run.write_text(run.read_text().replace("mode: hand", "mode: reach"))
+    with pytest.raises(InvalidInputError, match=r"judged in mode reach .* suite says hand"):
+        verify_result(copy, count=1, workers=1, progress=False)
+
+
+@thorough
+def test_any_number_of_workers_gives_the_same_bits(
+    cleared: BenchmarkResult, suite: Suite, tmp_path: Path
+) -> None:
+    settings = replace(DEPTH, protocol="clear", name="cans")
+    two = run_benchmark(
+        suite, f"{PLANNERS}:plan_cans", tmp_path / "two", settings=settings, workers=2
+    )
+    for one, other in zip(cleared.rounds, two.rounds, strict=True):
+        for own, found in zip(cleared.judged_answers(one), two.judged_answers(other), strict=True):
+            assert own.answer.grasps.X_OG.tobytes() == found.answer.grasps.X_OG.tobytes()
+            assert own.ids == found.ids
+            for verdict, again in zip(own.verdicts, found.verdicts, strict=True):
+                assert verdict.outcome is again.outcome and verdict.margins == again.margins
+
+
 def test_a_changed_suite_is_noticed(cleared: BenchmarkResult, tmp_path: Path) -> None:
     copy = tmp_path / "easier"
     shutil.copytree(cleared.path, copy)

@@ -27,6 +27,7 @@ from burg_drake.benchmark import (
     make_check_scene,
 )
 from burg_drake.objects import ObjectLibrary
+from tests.thorough import thorough
 
 Poses = np.ndarray
 
@@ -270,7 +271,7 @@ PLANTED: dict[str, tuple[Plant, str]] = {
     ),
     "named acronym": (
         lambda X, f: {"X_CG": f.X_CS @ X, "frame": "acronym"},
-        '0.1034 m ahead of .* or add "frame": "burg_drake" to the answer',
+        '0.1034 m ahead of .* or set "frame": "burg_drake" in the answer',
     ),
 }
 """How each mistake is made, and what the problem says."""
@@ -349,7 +350,7 @@ def mostly_random(count: int, seed: int) -> Poses:
     return X
 
 
-@pytest.mark.parametrize("planner", [random_grasps, any_approach, mostly_random])
+@pytest.mark.parametrize("planner", [random_grasps, any_approach, thorough(mostly_random)])
 def test_poor_planners_have_no_mistake_in_frames(
     planner: Callable[[int, int], Poses], seen: CheckScene
 ) -> None:
@@ -430,7 +431,14 @@ def test_mistakes_show_in_three_images(turn: Poses, words: str, seen: CheckScene
 
 def test_answers_in_other_frames_than_the_first_are_left_out(seen: CheckScene) -> None:
     answers = [{"X_SG": from_above(4)}, {"X_WG": from_above(4)}]
-    assert check_answers(answers, seen).fits == (4, 4)
+    found = check_answers(answers, seen)
+    assert found.fits == (4, 4)
+    assert found.problems[0].startswith("Poses are in X_SG and X_WG, in different images;")
+
+
+def test_copies_of_a_grasp_show_nothing_new(seen: CheckScene) -> None:
+    found = check_answers([{"X_SG": np.repeat(from_above(1), 3, axis=0)}], seen)
+    assert found.fits == (1, 1) and found.unclear
 
 
 def test_answers_that_are_refused_are_problems(seen: CheckScene) -> None:
@@ -493,6 +501,7 @@ def test_the_command_prints_problems(
             self.X = grasps[reference]
 
         def ask(self, *asked: Any) -> dict[str, Any]:
+            self.X = self.X @ pose(p=(0.0, 0.0, 1e-4))  # no answer twice
             return {"X_SG": self.X, "time": 0.25}
 
     @contextlib.contextmanager

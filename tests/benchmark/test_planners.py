@@ -260,6 +260,11 @@ def test_files_and_methods_of_objects(
             "no server answers there: [Errno 111] Connection refu",
         ),
         ("ws://", PlannerError, "planner ws:// is not a planner"),
+        (
+            "ws://127.0.0.1:99999",
+            PlannerError,
+            "planner ws://127.0.0.1:99999 is not a planner: ",
+        ),
     ],
 )
 def test_what_cannot_be_opened_is_one_clear_line(
@@ -276,7 +281,7 @@ def test_what_cannot_be_opened_is_one_clear_line(
     assert raised.value.arguments == ("planner",)
 
 
-@pytest.mark.parametrize("limit", [0.0, -1.0, math.inf, math.nan])
+@pytest.mark.parametrize("limit", [0.0, -1.0, 1e10, math.inf, math.nan])
 def test_the_time_limit_is_a_time(limit: float) -> None:
     with pytest.raises(InvalidInputError, match="the time limit of a planner is"):
         open_planner("antipodal", time_limit=limit)
@@ -541,6 +546,12 @@ def test_a_server_goes_down_and_comes_back(tmp_path: Path) -> None:
         assert planner.ask(observation())["pid"] == process.pid
         with pytest.raises(PlannerError, match="the server reports ValueError: no object at all"):
             planner.ask(observation(1))
+        for target, message in {7: "ValueError: [?]", 8: "SystemExit: enough"}.items():
+            with pytest.raises(PlannerError, match=f"the server reports {message}"):
+                planner.ask(observation(target))
+        with pytest.raises(PlannerError, match="no answer within 1 s"):
+            planner.ask(observation(6))
+        assert planner.ask(observation())["pid"] == process.pid  # late answers cost no others
         with pytest.raises(PlannerError, match="no answer within 1 s"):
             planner.ask(observation(3))
     with pytest.raises(PlannerError, match=r"no server answers .*Connection refused"):

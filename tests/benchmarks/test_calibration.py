@@ -91,7 +91,7 @@ def _poses(found: Calibration) -> np.ndarray:
     return np.array([used.X_CT for used in found.views])
 
 
-@pytest.mark.parametrize("camera", [RATIONAL, EQUIDISTANT])
+@pytest.mark.parametrize("camera", [RATIONAL, thorough(EQUIDISTANT)])
 def test_own_lenses_are_those_of_opencv(camera: Camera) -> None:
     X_SC = look_at(np.array([0.2, 0.15]), 0.3, np.radians(40), 0.5, 0.2)
     p_S = np.c_[np.random.default_rng(0).uniform(0.0, 0.4, (50, 2)), np.zeros(50)]

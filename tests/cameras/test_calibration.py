@@ -305,6 +305,7 @@ def test_live_views_are_asked_for_until_there_are_enough(monkeypatch: pytest.Mon
     assert taken and word.startswith("enough, the camera is known to 0.") and collector.enough
 
 
+@pytest.mark.thorough
 def test_the_sides_to_which_the_target_was_not_tilted_are_asked_for() -> None:
     """Turned about y, which points down in the image, its right side comes nearer, and it faces
     left; turned about x, its upper side comes nearer, and it faces down."""
@@ -318,6 +319,7 @@ def test_the_sides_to_which_the_target_was_not_tilted_are_asked_for() -> None:
         assert lines == (f"tilt the target by 20 to 45 degrees, so that it faces {missing}",)
 
 
+@pytest.mark.thorough
 def test_another_distance_is_asked_for() -> None:
     sides = [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)]
     views = facing(sides, (0.25,))

@@ -85,6 +85,7 @@ def test_scenes_are_sampled_where_they_are_rendered(nodes: LocalNodes, tmp_path:
     assert files(there) == files(here)
 
 
+@pytest.mark.thorough
 def test_grasps_of_a_run_travel_and_a_scene_without_any_fails_alone(
     nodes: LocalNodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

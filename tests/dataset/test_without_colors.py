@@ -151,6 +151,7 @@ def test_without_libraries_all_is_checked_and_made_again(
         sample_again(burg.load_dataset(colored), "000000_001")
 
 
+@pytest.mark.thorough
 def test_sheets_and_exports_do_without_or_say_what_they_need(
     lost: None, without: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -117,6 +117,7 @@ def test_work_at_which_several_workers_are_lost_is_given_up(
     }
 
 
+@pytest.mark.thorough
 def test_leaving_early_ends_the_children(executor: DaskExecutor, tmp_path: Path) -> None:
     log = tmp_path / "log"
     work = [Known(0, log=log), Known(1, pause=60.0, log=log)]
@@ -148,6 +149,7 @@ def test_children_without_work_end(
         until(lambda: not is_alive(child))
 
 
+@pytest.mark.thorough
 def test_other_versions_are_refused(
     executor: DaskExecutor, nodes: LocalNodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -103,6 +103,7 @@ def test_what_was_made_with_other_things_is_refused(
         sample_again(Scene(replace(scene.document, origin=None), household, scene.path))
 
 
+@pytest.mark.thorough
 def test_refusals_do_not_change_the_mix_of_objects(
     household: ObjectLibrary, tabletop: Station
 ) -> None:

@@ -91,6 +91,7 @@ def flange(q: np.ndarray, station: Station) -> np.ndarray:
     return np.array([arm.X_WA.matrix() @ ur_ik.forward(one) for one in q])
 
 
+@pytest.mark.thorough
 def test_out_of_reach_is_named(verdicts: list[Reach]) -> None:
     assert verdicts[-1].outcome is Outcome.NO_IK and verdicts[-1].path is None
 

@@ -61,7 +61,11 @@ def off_cylinder(points: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize(
     ("surface", "off", "most_faces"),
-    [(sphere(), off_sphere, 1500), (torus(), off_torus, 2500), (cylinder(), off_cylinder, 250)],
+    [
+        (sphere(), off_sphere, 1500),
+        thorough(torus(), off_torus, 2500),
+        (cylinder(), off_cylinder, 250),
+    ],
 )
 def test_distance_and_normals_are_those_of_the_closed_form(surface, off, most_faces) -> None:  # type: ignore[no-untyped-def]
     mesh, fit = contact_surface(surface, True)

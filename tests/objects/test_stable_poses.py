@@ -22,6 +22,7 @@ def _solid_angle_of_rectangle(a: float, b: float, d: float) -> float:
     return 4.0 * np.arcsin(a * b / np.sqrt((a * a + 4 * d * d) * (b * b + 4 * d * d)))
 
 
+@pytest.mark.thorough
 def test_icosahedron() -> None:
     ico = trimesh.creation.icosahedron().apply_scale(0.05)
     facets = PotentialLandscape(np.asarray(ico.vertices), np.zeros(3)).minima()

@@ -302,6 +302,7 @@ def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
     assert report.library.path(entry.sdf).read_text().count("<drake:declare_convex/>") == 2
 
 
+@pytest.mark.thorough
 def test_objects_of_before_get_a_surface_and_are_told(tmp_path: Path) -> None:
     torus = trimesh.creation.torus(0.04, 0.012)
     source = ObjectSource(name="ring", mesh=torus, mass=0.1, pieces=(torus.convex_hull,))

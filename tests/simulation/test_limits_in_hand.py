@@ -41,6 +41,7 @@ def unlimited(run: Callable[..., TrialResult]) -> dict[float, TrialResult]:
     return {mu: run(mu, whole=True) for mu in FRICTIONS}
 
 
+@pytest.mark.thorough
 def test_without_limits_all_that_is_held_is_lifted(unlimited: dict[float, TrialResult]) -> None:
     tilts = [result.margins.tilt for result in unlimited.values()]
     assert tilts == sorted(tilts, reverse=True)

@@ -63,6 +63,7 @@ def test_every_stable_pose_of_the_household(bare: Station) -> None:
     _require_standing(library, bare, library.document.objects)
 
 
+@pytest.mark.thorough
 def test_stable_poses_of_what_its_pieces_do_not_fit(made: ObjectLibrary, bare: Station) -> None:
     bottoms = {name: _bottoms(made, name) for name in made.document.objects}
     assert bottoms["bulging"] == pytest.approx([1.3e-3] * 3, abs=1e-9)
