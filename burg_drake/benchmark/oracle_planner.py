@@ -138,9 +138,9 @@ def _try_grasps(
     ):
         if not any(left.values()):
             left = {name: open_rows(name) for name in names}
-            if not any(left.values()):
-                break
         open_names = [name for name in names if left[name]]
+        if not open_names:
+            break
         best = max(open_names, key=lambda name: (successes[name] + 1) / (tried[name] + 1))
         row = left[best].pop(0)
         is_open[row] = False
