@@ -60,7 +60,7 @@ MEASURE_MEANINGS = {
     "emptied": "share of scenes that were emptied",
 }
 """Meaning of each measure by name; the last four are of the protocol `clear`."""
-COUNTS = frozenset({"mean_picks"})
+COUNT_MEASURES = frozenset({"mean_picks"})
 """Measures that are no shares."""
 
 ContestedAs = bool | None

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from burg_drake.benchmark.benchmark_folder import BenchmarkResult
-from burg_drake.benchmark.measures import COUNTS, MEASURE_MEANINGS, BenchmarkMeasure
+from burg_drake.benchmark.measures import COUNT_MEASURES, MEASURE_MEANINGS, BenchmarkMeasure
 from burg_drake.benchmark.method_comparison import (
     SIGNIFICANCE_LEVEL,
     MethodComparison,
@@ -216,7 +216,7 @@ def measure_text(measure: BenchmarkMeasure, name: str = "") -> str:
     """A measure with its interval, and what contested verdicts leave open; shares in percent."""
     if np.isnan(measure.value):
         return NO_VALUE
-    number = partial(format_number, decimals=1) if name in COUNTS else _percent
+    number = partial(format_number, decimals=1) if name in COUNT_MEASURES else _percent
     text = number(measure.value)
     if not np.isnan(measure.low):
         text += f" ({number(measure.low)}-{number(measure.high)})"

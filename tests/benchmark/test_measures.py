@@ -78,6 +78,8 @@ def test_contested_verdicts_open_a_range() -> None:
     lost = verdict(Outcome.SLIPPED, confidence=0.6)
     found = measure_all(result([judged("a", [lost]), judged("b", [LIFTED])]))["top_success"]
     assert (found.value, found.least, found.most) == (0.5, 0.5, 1.0)
+    held = measure_all(result([judged("a", [CONTESTED]), judged("b", [lost, LIFTED])]))["held"]
+    assert (held.value, held.least, held.most) == (2 / 3, 1 / 3, 1.0)
 
 
 def test_graspnet_ap_asks_for_a_clear_hand_and_enough_friction() -> None:
